@@ -66,10 +66,11 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         files: &loaded.files,
         fingerprints: &loaded.fingerprints,
     };
-    // Samples are mounted by simulated hands; everything else is played by the
-    // simulated device.
+    // Samples are mounted by simulated hands, which also stand for a program whose
+    // realizations have no tables; everything else is played by the simulated device.
     let kind = match loaded.protocol.device.kind {
         DeviceKind::Manual => DeviceKind::Manual,
+        DeviceKind::Process if loaded.models.is_empty() => DeviceKind::Process,
         _ => DeviceKind::Simulated,
     };
     super::run::refuse_unplayable(kind, &loaded)?;
@@ -127,7 +128,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
                 group: None,
                 device_kind: kind,
                 device: match kind {
-                    DeviceKind::Manual => Box::new(Manual::default()),
+                    DeviceKind::Manual | DeviceKind::Process => Box::new(Manual::default()),
                     _ => with_manual_samples(Box::new(VirtualDevice::new(options)), &protocol),
                 },
                 device_check: None,
@@ -153,12 +154,17 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         .filter(|row| !row.practice && row.status == Status::Ok)
         .count();
     let shown = folder.display();
-    let target = match percepts.target() {
-        Some(best) => format!("the realization with the highest VAF, {best}"),
-        None => "the simulated switch B".to_owned(),
+    let compared = match percepts.target() {
+        _ if loaded.models.is_empty() && protocol.families.is_empty() => {
+            "The realizations have no tables: the raters' answers do not depend on them.".to_owned()
+        }
+        Some(best) => {
+            format!("The raters compare with the realization with the highest VAF, {best}.")
+        }
+        None => "The raters compare with the simulated switch B.".to_owned(),
     };
     console.out(format!(
-        "{done} simulated participants, {rated} rated trials in {shown}.\nThe raters compare with {target}.\nSimulated: the effects are built in (docs/simulation.md) and are no evidence.\nNext: study analyze {shown}\n"
+        "{done} simulated participants, {rated} rated trials in {shown}.\n{compared}\nSimulated: the effects are built in (docs/simulation.md) and are no evidence.\nNext: study analyze {shown} --include simulated\n"
     ))
 }
 

@@ -296,7 +296,7 @@ fn say_behind(study: &StudyFolder, console: &mut Console) {
 
 /// Whether the environment asks for lines: `STUDY_PLAIN`, or a terminal that cannot
 /// position text.
-fn wants_plain(var: impl Fn(&str) -> Option<String>) -> bool {
+pub(super) fn wants_plain(var: impl Fn(&str) -> Option<String>) -> bool {
     let asked = var("STUDY_PLAIN").is_some_and(|value| !value.is_empty() && value != "0");
     asked || var("TERM").is_some_and(|term| term == "dumb")
 }

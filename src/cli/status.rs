@@ -27,13 +27,25 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             &study_folder::warnings(study, &sessions, None)?,
             console,
         );
-        console.out(of_study(study, &sessions))?;
+        // Bars and colours are for eyes: a pipe and a dumb terminal get words.
+        let look = Look {
+            bars: console.terminal && !super::run::wants_plain(|name| std::env::var(name).ok()),
+            colour: console.colour,
+        };
+        console.out(of_study(study, &sessions, look))?;
         truncated = truncated.and(study_folder::whole(study, &sessions));
     }
     truncated
 }
 
-fn of_study(study: &StudyFolder, sessions: &[SessionData]) -> String {
+/// How the states are shown.
+#[derive(Debug, Clone, Copy)]
+struct Look {
+    bars: bool,
+    colour: bool,
+}
+
+fn of_study(study: &StudyFolder, sessions: &[SessionData], look: Look) -> String {
     let manifest = study.manifest();
     let mut out = format!(
         "{} · {} · protocol version {}\n",
@@ -56,7 +68,8 @@ fn of_study(study: &StudyFolder, sessions: &[SessionData]) -> String {
         if !title.is_empty() {
             let _ = writeln!(out, "\n{title}");
         }
-        out.push_str(&table(rows));
+        let runs = |row: &ParticipantRow| is_running(study, sessions, row);
+        out.push_str(&table(rows, runs, look));
     }
     let _ = writeln!(out, "\n{}", summary(study, &real));
     if let Some(forces) = forces(sessions) {
@@ -133,7 +146,27 @@ fn lateness(sessions: &[SessionData]) -> Option<[f64; 2]> {
         .reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])])
 }
 
-fn table(rows: &[&ParticipantRow]) -> String {
+/// Whether a session is open in a program at this moment.
+fn is_running(study: &StudyFolder, sessions: &[SessionData], row: &ParticipantRow) -> bool {
+    let own = |s: &&SessionData| s.participant == row.participant && s.session == row.session;
+    let own = sessions.iter().find(own);
+    row.state == State::Unfinished && own.is_some_and(|session| study.is_open(session))
+}
+
+/// Cells of the bar of a participant.
+const BAR: usize = 10;
+
+/// The trials done: `━━━━━━────  9/15`.
+fn trials((done, planned): (u32, u32), look: Look) -> String {
+    let words = format!("{done}/{planned}");
+    if !look.bars || planned == 0 {
+        return words;
+    }
+    let full = (BAR * done as usize / planned as usize).min(BAR);
+    format!("{}{} {words:>5}", "━".repeat(full), "─".repeat(BAR - full))
+}
+
+fn table(rows: &[&ParticipantRow], runs: impl Fn(&ParticipantRow) -> bool, look: Look) -> String {
     let mut lines = vec![
         [
             "participant",
@@ -147,10 +180,10 @@ fn table(rows: &[&ParticipantRow]) -> String {
         .map(str::to_owned),
     ];
     for row in rows {
-        let state = if row.erased {
-            format!("{}, erased", row.state.as_str())
-        } else {
-            row.state.as_str().to_owned()
+        let state = match row.state.as_str() {
+            state if row.erased => format!("{state}, erased"),
+            _ if runs(row) => "running now".to_owned(),
+            state => state.to_owned(),
         };
         lines.push([
             row.participant.to_string(),
@@ -160,7 +193,7 @@ fn table(rows: &[&ParticipantRow]) -> String {
                 None => row.session.to_string(),
             },
             state,
-            format!("{}/{}", row.trials_done, row.trials_planned),
+            trials((row.trials_done, row.trials_planned), look),
             row.started_at.map_or_else(String::new, |at| {
                 at.format("%Y-%m-%d %H:%M %:z").to_string()
             }),
@@ -174,12 +207,25 @@ fn table(rows: &[&ParticipantRow]) -> String {
         }
     }
     let mut out = String::new();
-    for line in &lines {
+    let states = [None]
+        .into_iter()
+        .chain(rows.iter().map(|row| Some(row.state)));
+    for (line, state) in lines.iter().zip(states) {
         let mut text = String::new();
         for (width, cell) in widths.iter().zip(line) {
             let _ = write!(text, "{cell:width$}  ");
         }
-        let _ = writeln!(out, "{}", text.trim_end());
+        let text = text.trim_end();
+        // Green and yellow of the terminal; the words say the same.
+        let colour = match state {
+            Some(State::Done) => "\u{1b}[32m",
+            Some(State::Unfinished) => "\u{1b}[33m",
+            _ => "",
+        };
+        let _ = match look.colour && !colour.is_empty() {
+            true => writeln!(out, "{colour}{text}\u{1b}[0m"),
+            false => writeln!(out, "{text}"),
+        };
     }
     out
 }
@@ -210,5 +256,30 @@ fn summary(study: &StudyFolder, real: &[&ParticipantRow]) -> String {
     match study_folder::frozen(study) {
         Ok(loaded) => format!("{people}; {} planned", loaded.protocol.design.participants),
         Err(_) => people,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_bar_is_full_at_the_last_trial_only() {
+        let look = Look {
+            bars: true,
+            colour: false,
+        };
+        let bar = |done: u32, planned: u32| trials((done, planned), look);
+        assert_eq!(bar(0, 15), "──────────  0/15");
+        assert_eq!(bar(14, 15), "━━━━━━━━━─ 14/15");
+        assert_eq!(bar(15, 15), "━━━━━━━━━━ 15/15");
+        assert_eq!(bar(0, 0), "0/0");
+        // more than were planned, after repetitions
+        assert_eq!(bar(16, 15), "━━━━━━━━━━ 16/15");
+        let plain = Look {
+            bars: false,
+            colour: false,
+        };
+        assert_eq!(trials((7, 15), plain), "7/15");
     }
 }

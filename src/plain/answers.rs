@@ -1,7 +1,7 @@
 //! Questions in words, and typed lines as answers.
 
 use crate::tui::ui_state::field;
-use study_base::text::Untrusted;
+use study_base::text::{Untrusted, ascii_number};
 use study_core::protocol::phrases::{Phrase, Words};
 use study_core::protocol::question::cut_to_fit;
 use study_core::protocol::{Answer, Question, QuestionKind};
@@ -72,11 +72,11 @@ fn labelled(value: &dyn std::fmt::Display, label: &str, words: &Words) -> String
 }
 
 /// An answer in words.
-pub fn in_words(answer: &Answer) -> String {
+pub fn in_words(answer: &Answer, words: &Words) -> String {
     match answer {
-        Answer::Declined { .. } => "declined".to_owned(),
+        Answer::Declined { .. } => words.get(Phrase::Declined).to_owned(),
         answer => match answer.cell() {
-            empty if empty.trim().is_empty() => "empty".to_owned(),
+            empty if empty.trim().is_empty() => words.get(Phrase::Empty).to_owned(),
             cell => Untrusted(&cell).to_string(),
         },
     }
@@ -87,7 +87,8 @@ pub fn in_words(answer: &Answer) -> String {
 /// # Errors
 /// What to type instead.
 pub fn read(question: &Question, line: &str, words: &Words) -> Result<Option<Answer>, String> {
-    let typed = line.trim();
+    let number: String = line.trim().chars().map(ascii_number).collect();
+    let typed = number.as_str();
     if typed.is_empty() {
         return match question.required {
             true => Err(format!(
@@ -123,7 +124,9 @@ pub fn read(question: &Question, line: &str, words: &Words) -> Result<Option<Ans
 
 /// The options with the typed numbers, in the order of the list.
 fn chosen(typed: &str, options: &[String]) -> Option<Vec<String>> {
-    let numbers = typed.split([' ', ',', ';']).filter(|n| !n.is_empty());
+    let numbers = typed
+        .split(|c: char| c.is_whitespace() || ",;".contains(c))
+        .filter(|n| !n.is_empty());
     let mut numbers: Vec<usize> = numbers.map(str::parse).collect::<Result<_, _>>().ok()?;
     numbers.sort_unstable();
     numbers.dedup();

@@ -6,7 +6,7 @@ use crate::tui::views::prose::Stopped;
 use study_base::text::{QuestionId, Untrusted};
 use study_core::outcome::{Author, Choice};
 use study_core::protocol::Answer;
-use study_core::protocol::phrases::Phrase;
+use study_core::protocol::phrases::{Phrase, Words};
 use study_core::session::view::{Correctable, DeviceState, Mirror, Telemetry};
 use study_core::session::{Input, Roster, Screen, View};
 
@@ -16,13 +16,13 @@ const COMMANDS: [(&str, Phrase); 11] = [
     ("/back", Phrase::CommandBack),
     ("/replay", Phrase::CommandReplay),
     ("/again", Phrase::CommandAgain),
-    ("/decline REASON", Phrase::CommandDecline),
-    ("/says TEXT", Phrase::CommandSays),
+    ("/decline …", Phrase::CommandDecline),
+    ("/says …", Phrase::CommandSays),
     ("/pause", Phrase::CommandPause),
     ("/quit", Phrase::CommandQuit),
-    ("/remark TEXT", Phrase::CommandRemark),
+    ("/remark …", Phrase::CommandRemark),
     ("/correct", Phrase::CommandCorrect),
-    ("/bad REASON", Phrase::CommandBad),
+    ("/bad …", Phrase::CommandBad),
 ];
 
 /// Inputs, or what to say instead.
@@ -190,7 +190,7 @@ impl Dialogue {
             && let Some(banner) = pages::banner(view)
         {
             self.banner = true;
-            lines.push(banner.to_owned());
+            lines.push(banner);
         }
         if self.notice != view.notice {
             self.notice.clone_from(&view.notice);
@@ -250,13 +250,15 @@ impl Dialogue {
 
     fn command(&mut self, command: &str, rest: &str, view: &View) -> Reply {
         let begun = !matches!(view.screen, Screen::Who { .. });
-        let needs = |what: &str| match (begun, rest.is_empty()) {
+        let text = || match (begun, rest.is_empty()) {
             (false, _) => say("That is possible once the session has begun."),
-            (true, true) => say(&format!("Type {command} and {what} in one line.")),
+            (true, true) => say(&view
+                .words
+                .fill(Phrase::PlainOneLine, &[("command", &command)])),
             (true, false) => Ok(rest.to_owned()),
         };
         let remark = |by| {
-            let text = needs("the remark")?;
+            let text = text()?;
             Ok(vec![Input::Remark { by, text }])
         };
         match command {
@@ -268,8 +270,10 @@ impl Dialogue {
             }
             "/correct" => {
                 let items = view.correctable.clone();
-                let mut lines: Vec<String> =
-                    (1..).zip(&items).map(|(n, item)| listed(n, item)).collect();
+                let mut lines: Vec<String> = (1..)
+                    .zip(&items)
+                    .map(|(n, item)| listed(n, item, &view.words))
+                    .collect();
                 lines.push(
                     "Type the number of the answer to correct. Enter alone: none.".to_owned(),
                 );
@@ -282,7 +286,7 @@ impl Dialogue {
                     say("Type the reason, then press Enter.")
                 }
                 (_, Screen::Form { questions, .. }) => {
-                    let reason = needs("the reason")?;
+                    let reason = text()?;
                     let answer = Answer::Declined { reason };
                     let Some(question) = questions.get(self.at) else {
                         return Ok(Vec::new());
@@ -290,11 +294,11 @@ impl Dialogue {
                     self.entered.push((question.id.clone(), answer));
                     self.next_question(view)
                 }
-                _ => say("There is no question to decline."),
+                _ => say(view.words.get(Phrase::PlainNoQuestion)),
             },
             "/bad" if view.can_mark_bad.is_none() => say("There is no trial to mark as bad."),
             "/bad" => {
-                let reason = needs("the reason")?;
+                let reason = text()?;
                 Ok(vec![Input::MarkBad { reason }])
             }
             "/pause" => Ok(vec![Input::Pause]),
@@ -460,7 +464,7 @@ impl Dialogue {
                     Some(n) => {
                         let item = Box::new(items.swap_remove(n));
                         let (mut lines, prompt) = answers::ask(&item.question, &view.words);
-                        lines.insert(0, listed(n + 1, &item));
+                        lines.insert(0, listed(n + 1, &item, &view.words));
                         lines.push(format!("{prompt} Type /decline to decline it."));
                         self.asking = Some(Asking::NewAnswer(item));
                         Err(lines)
@@ -508,12 +512,12 @@ fn say<T>(words: &str) -> Result<T, Vec<String>> {
     Err(vec![words.to_owned()])
 }
 
-fn listed(number: usize, item: &Correctable) -> String {
+fn listed(number: usize, item: &Correctable, words: &Words) -> String {
     let prompt = item.question.prompt.lines().next().unwrap_or_default();
     format!(
         "{number}: {}, {}: {}",
         Untrusted(&item.title),
         Untrusted(prompt),
-        answers::in_words(&item.answer)
+        answers::in_words(&item.answer, words)
     )
 }

@@ -3,6 +3,7 @@
 use super::answers;
 use crate::tui::theme::{Colour, Theme};
 use crate::tui::views::prose::{attending, prose};
+use crate::tui::views::status::of_banner;
 use crate::tui::views::trouble::Trouble;
 use crate::tui::widgets::clock;
 use std::fmt::Display;
@@ -10,7 +11,6 @@ use study_base::text::sentence;
 use study_core::outcome::FormId;
 use study_core::protocol::phrases::{Phrase, Words};
 use study_core::protocol::{Entry, Question};
-use study_core::session::view::Banner;
 use study_core::session::{Screen, View};
 
 /// A page in words.
@@ -36,7 +36,9 @@ pub fn page(view: &View, at: usize, keys: bool) -> Page {
         ..Page::default()
     };
     match &view.screen {
-        Screen::Who { claiming: true, .. } => page.lines.push("One moment.".to_owned()),
+        Screen::Who { claiming: true, .. } => {
+            page.lines.push(words.get(Phrase::OneMoment).to_owned())
+        }
         Screen::Who { .. } => {}
         Screen::Form {
             form,
@@ -105,11 +107,9 @@ fn top(view: &View) -> Vec<String> {
 }
 
 /// Whose data these are, if not those of a real participant.
-pub fn banner(view: &View) -> Option<&'static str> {
-    view.banner.map(|banner| match banner {
-        Banner::Pilot => "PILOT: not analyzed with real data.",
-        Banner::Simulated => "SIMULATED: not analyzed with real data.",
-    })
+pub fn banner(view: &View) -> Option<String> {
+    let banner = view.words.get(of_banner(view.banner?));
+    Some(sentence(banner))
 }
 
 impl Page {
@@ -135,7 +135,7 @@ impl Page {
         let (lines, prompt) = answers::ask(question, &view.words);
         self.lines.extend(lines);
         if let Some(given) = view.given(form, &question.id) {
-            let answer = answers::in_words(given);
+            let answer = answers::in_words(given, &view.words);
             let kept = view.words.fill(Phrase::PlainKept, &[("answer", &answer)]);
             self.lines.push(kept);
         }

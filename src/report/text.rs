@@ -241,7 +241,8 @@ fn table(
     if hist.is_some() {
         head.push(&scale);
     }
-    head.push("VAF");
+    let vaf: Vec<f64> = a.realizations.iter().filter_map(|m| m.vaf).collect();
+    head.extend((!vaf.is_empty()).then_some("VAF"));
     if let Some(h) = &at_least {
         head.push(h);
     }
@@ -254,7 +255,6 @@ fn table(
         .flatten()
         .collect();
     let mut grid = Grid::new(&head, counts_at, &dropped);
-    let vaf: Vec<f64> = a.realizations.iter().filter_map(|m| m.vaf).collect();
     let digits = apa::distinguishing_decimals(&vaf);
     for m in tests.iter().chain(others) {
         let get = |s: &str| a.described(&m.id, s);
@@ -272,7 +272,7 @@ fn table(
                 .unwrap_or(&[]);
             row.push(bars(counts, most, gap));
         }
-        row.push(show(m.vaf, digits));
+        row.extend((!vaf.is_empty()).then(|| show(m.vaf, digits)));
         if at_least.is_some() {
             let share = a.about("realistic", &[&m.id], "share");
             row.push(apa::or_dash(share, apa::percent));

@@ -5,13 +5,13 @@
 //! view, which identifies no realization.
 
 use crate::tui::views::prose::{Stopped, attending};
+use crate::tui::views::status::of_banner;
 use crate::tui::widgets::clock;
 use serde::{Deserialize, Serialize};
 use std::fmt::Display;
 use study_base::text::{Untrusted, capital};
 use study_core::protocol::phrases::{Phrase, Words};
 use study_core::protocol::{Answer, Question, QuestionKind};
-use study_core::session::view::Banner;
 use study_core::session::{Screen, View};
 
 /// A rating scale with more points is answered by typing.
@@ -23,7 +23,7 @@ pub struct Page {
     /// Where in the session it is.
     pub progress: Option<Progress>,
     /// Whose data these are, if not those of a real participant.
-    pub banner: Option<&'static str>,
+    pub banner: Option<String>,
     /// The heading; empty if the first question is it.
     pub title: String,
     /// The text below the heading.
@@ -347,9 +347,11 @@ impl Page {
                     of: p.total,
                 }
             }),
-            banner: view.banner.map(|banner| match banner {
-                Banner::Pilot => "PILOT",
-                Banner::Simulated => "SIMULATED",
+            // In a word: a phone is narrow.
+            banner: view.banner.map(|banner| {
+                let words = words.get(of_banner(banner));
+                let short = words.split_once(" — ").map_or(words, |(short, _)| short);
+                short.to_owned()
             }),
             title: String::new(),
             text: String::new(),

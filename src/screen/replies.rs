@@ -5,6 +5,7 @@ use crate::tui::editor::Editor;
 use crate::tui::ui_state::field;
 use serde::Deserialize;
 use std::collections::BTreeMap;
+use study_base::text::ascii_number;
 use study_core::protocol::phrases::{Phrase, Words};
 use study_core::protocol::{Answer, AnswerError, Question, QuestionKind};
 use study_core::session::{Input, Screen, View};
@@ -96,7 +97,8 @@ fn read(
     };
     let answer = match (&question.kind, given) {
         (QuestionKind::Rating { .. }, Given::Typed(text)) => {
-            Answer::Rating(text.trim().parse().map_err(|_| no_answer())?)
+            let number: String = text.trim().chars().map(ascii_number).collect();
+            Answer::Rating(number.parse().map_err(|_| no_answer())?)
         }
         (QuestionKind::Slider { .. } | QuestionKind::Number { .. }, Given::Typed(text)) => {
             let number = field::parse(text);

@@ -19,6 +19,8 @@ use dialog::Dialog;
 use field::Field;
 use study_base::text::QuestionId;
 use study_core::outcome::FormId;
+use study_core::protocol::phrases::{Phrase, Words};
+use study_core::protocol::question::MAX_TEXT_BYTES;
 use study_core::session::{Input, Screen, View};
 
 /// The state of the interface.
@@ -214,7 +216,7 @@ impl UiState {
                     Some(editor) => editor.insert(text),
                     None => Handled::Notice("There is no text field to paste into.".to_owned()),
                 };
-                self.show_notice(handled);
+                self.show_notice(handled, &view.words);
                 Vec::new()
             }
             _ => Vec::new(),
@@ -255,9 +257,14 @@ impl UiState {
         };
     }
 
-    fn show_notice(&mut self, handled: Handled) {
-        if let Handled::Notice(what) = handled {
-            self.notice = Some(what);
+    fn show_notice(&mut self, handled: Handled, words: &Words) {
+        match handled {
+            Handled::Notice(what) => self.notice = Some(what),
+            Handled::Cut => {
+                let kib = MAX_TEXT_BYTES / 1024;
+                self.notice = Some(words.fill(Phrase::TextCut, &[("kib", &kib)]));
+            }
+            Handled::No | Handled::Yes => {}
         }
     }
 

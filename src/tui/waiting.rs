@@ -74,6 +74,6 @@ fn draw(frame: &mut Frame<'_>, prose: &Prose, theme: Theme) {
     };
     let buf = frame.buffer_mut();
     view.render(rows(area, 1, area.height.saturating_sub(5)), buf);
-    let keys = hints(theme, &[("Esc", "quit")]);
+    let keys = hints(theme, &[("Esc", "quit")], area.width);
     centre(buf, row(area, area.height.saturating_sub(3)), &keys);
 }

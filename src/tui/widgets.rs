@@ -86,16 +86,37 @@ pub fn left_all(buf: &mut Buffer, area: Rect, lines: &[String], style: Style) {
 }
 
 /// Keys and their actions: `Enter: save   ·   Tab: comment`.
-pub fn hints(theme: Theme, keys: &[(&str, &str)]) -> Line<'static> {
+pub fn hints(theme: Theme, keys: &[(&str, &str)], columns: u16) -> Line<'static> {
+    let side = " ".repeat(usize::from(hint_gap(keys, columns) / 2));
     let mut spans = Vec::new();
     for (key, what) in keys {
         if !spans.is_empty() {
-            spans.push(Span::styled("   ·   ", theme.quiet()));
+            spans.push(Span::styled(format!("{side}·{side}"), theme.quiet()));
         }
         spans.push(Span::styled((*key).to_owned(), theme.key()));
         spans.push(Span::styled(format!(": {what}"), theme.quiet()));
     }
     Line::from(spans)
+}
+
+/// The width of hints with `gap` cells between them.
+fn hints_width(keys: &[(&str, &str)], gap: u16) -> usize {
+    let wide = |(key, what): &(&str, &str)| wrap::width(key) + 2 + wrap::width(what);
+    let gaps = usize::from(gap) * keys.len().saturating_sub(1);
+    keys.iter().map(wide).sum::<usize>() + gaps
+}
+
+/// The cells between two hints: 7, or 3 where they would not fit into `columns`.
+pub fn hint_gap(keys: &[(&str, &str)], columns: u16) -> u16 {
+    match hints_width(keys, 7) <= usize::from(columns) {
+        true => 7,
+        false => 3,
+    }
+}
+
+/// Whether hints fit into `columns`.
+pub fn hints_fit(keys: &[(&str, &str)], columns: u16) -> bool {
+    hints_width(keys, 3) <= usize::from(columns)
 }
 
 /// A duration in s as `m:ss` or `h:mm:ss`; `0:00` if it is not finite.

@@ -208,6 +208,8 @@ fn the_shipped_protocols_are_valid_and_broken_ones_are_not() {
         "protocols/turn-signal-extended/protocol.toml",
         "protocols/turn-signal-passive/protocol.toml",
         "protocols/knob/protocol.toml",
+        "protocols/cloth/protocol.toml",
+        "protocols/sounds/protocol.toml",
         "src/cli/new/protocol.toml",
     ] {
         let text = std::fs::read_to_string(root.join(file)).unwrap();

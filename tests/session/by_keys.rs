@@ -40,8 +40,15 @@ fn eventful(protocol: &Path, id: &str, trials: usize) {
     play_until(&mut terminal, "trial 3 of");
     // a correction: the newest answer
     correct_newest(&mut terminal, "3", "mistyped");
+    let (_, out, _) = study(&["status", "results"], folder.path());
+    assert!(out.contains("running now"), "{out}");
     // quit in the middle, and resume
     quit(&mut terminal);
+    let (_, out, _) = study(&["status", "results"], folder.path());
+    assert!(
+        out.contains("unfinished") && !out.contains("running now"),
+        "{out}"
+    );
     assert!(!terminal.alternate());
     assert!(
         terminal.screen().contains("not finished"),

@@ -4,7 +4,7 @@
 use crate::plain::{Lines, events, last_answers};
 use crate::screen::Session;
 use crate::support::player::{F7, play_to_end, play_until};
-use crate::support::{PATIENT, Terminal, changed_protocol, study};
+use crate::support::{PATIENT, Terminal, changed_protocol, repository, study};
 use serde_json::{Value, json};
 use std::path::Path;
 use std::sync::OnceLock;
@@ -38,7 +38,7 @@ impl Channel {
                 terminal.wait_until("the replay", |s| !s.contains("F7: feel it again"));
                 play_until(&mut terminal, "P01", "trial 3 of 5");
                 terminal.keys("\u{11}");
-                terminal.wait_for("Quit the session?");
+                terminal.wait_for("Leave the session?");
                 terminal.keys("y");
                 assert_eq!(terminal.exit_code(), 0, "{}", terminal.screen());
             }
@@ -71,21 +71,22 @@ impl Channel {
         }
     }
 
-    /// Resumes and plays to the end.
-    fn end(self, folder: &Path, protocol: &Path) {
-        let path = protocol.to_str().unwrap();
+    /// Begins or resumes a session and plays to the end.
+    fn end(self, folder: &Path, protocol: &Path, more: &[&str]) {
+        let run = [&["run", protocol.to_str().unwrap()], more].concat();
         match self {
             Self::Terminal => {
-                let run = ["run", path, "--operator", "lw"];
+                let run = [&run[..], &["--operator", "lw"]].concat();
                 play_to_end(&mut Terminal::start(&run, folder, 24, 80), "P01");
             }
             Self::Plain => {
-                let mut lines = Lines::start(folder, &["run", path, "--plain"], None);
+                let run = [&run[..], &["--plain"]].concat();
+                let mut lines = Lines::start(folder, &run, None);
                 let end = lines.play(None);
                 assert!(end.starts_with("The session is finished"), "{end}");
                 lines.child.wait().unwrap();
             }
-            Self::Page => Session::opened(folder, protocol, &[]).finish(),
+            Self::Page => Session::opened(folder, protocol, more).finish(),
         }
     }
 }
@@ -101,7 +102,7 @@ fn session(begin: Channel, end: Channel) -> (Vec<Value>, Vec<String>) {
     ];
     changed_protocol("turn-signal", &protocol, &changes);
     begin.begin(folder.path(), &protocol);
-    end.end(folder.path(), &protocol);
+    end.end(folder.path(), &protocol, &[]);
     let (code, out, err) = study(&["verify", "results"], folder.path());
     assert_eq!(code, 0, "{out}{err}");
     let mut journals = Vec::new();
@@ -164,4 +165,106 @@ fn begun_on_the_page_and_ended_by_keys() {
 #[test]
 fn begun_on_the_page_and_ended_in_lines() {
     same_journal(Channel::Page, Channel::Plain);
+}
+
+/// Plays a protocol by keys, in lines and on the page, each in a folder of its own. The
+/// answers are the same: their number.
+fn on_every_channel(
+    name: &str,
+    changes: &[(&str, &str)],
+    more: &[&str],
+    channels: &[Channel],
+) -> usize {
+    let mut journals = Vec::new();
+    for channel in channels {
+        let folder = tempfile::tempdir().unwrap();
+        let protocol = folder.path().join("protocol");
+        changed_protocol(name, &protocol, changes);
+        channel.end(folder.path(), &protocol, more);
+        let (code, out, err) = study(&["verify", "results"], folder.path());
+        assert_eq!(code, 0, "{out}{err}");
+        let (code, _, err) = study(&["analyze", "results", "--include", "pilot"], folder.path());
+        assert_eq!(code, 0, "{channel:?}: {err}");
+        let mut answers = last_answers(&crate::plain::events_of(folder.path(), name));
+        // The players type different texts.
+        answers.retain(|_, answer| answer.get("text").is_none());
+        journals.push(answers);
+    }
+    for (journal, channel) in journals.iter().zip(channels) {
+        assert_eq!(*journal, journals[0], "{name} {channel:?}");
+    }
+    journals[0].len()
+}
+
+const EVERY: [Channel; 3] = [Channel::Terminal, Channel::Plain, Channel::Page];
+
+#[test]
+#[ignore = "twelve sessions, some minutes: cargo test --test session -- --ignored every_shipped"]
+fn every_shipped_protocol_on_every_channel() {
+    let short = [
+        PATIENT,
+        ("max_attempts = 3", "max_attempts = 50"),
+        ("repetitions = 3", "repetitions = 1"),
+        ("at_least_s = 60", "at_least_s = 1"),
+        ("reference_min_s = 3", "reference_min_s = 0"),
+        ("minimum_strokes = 2", "minimum_strokes = 1"),
+    ];
+    for (name, least) in [
+        ("turn-signal", 5),
+        ("turn-signal-extended", 30),
+        ("turn-signal-passive", 30),
+        ("knob", 12),
+    ] {
+        let text = repository(&format!("protocols/{name}/protocol.toml"));
+        let text = std::fs::read_to_string(text).unwrap();
+        let own: Vec<_> = (short.into_iter())
+            .filter(|(old, _)| text.contains(old))
+            .collect();
+        assert!(on_every_channel(name, &own, &[], &EVERY) >= least, "{name}");
+    }
+}
+
+/// A program that plays tones, with a player that makes no sound.
+#[test]
+fn tones_are_rated_on_every_channel() {
+    if !crate::devices::has_python() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let player = folder.path().join("aplay");
+    std::fs::write(&player, "#!/bin/sh\nexec cat > /dev/null\n").unwrap();
+    let status = std::process::Command::new("chmod")
+        .arg("+x")
+        .arg(&player)
+        .status();
+    assert!(status.unwrap().success());
+    let command = format!(
+        "env PATH={}:{} python3 {}",
+        folder.path().display(),
+        std::env::var("PATH").unwrap(),
+        repository("protocols/sounds/play.py")
+    );
+    let changes = [
+        ("repetitions = 3", "repetitions = 1\nmax_attempts = 50"),
+        ("min_s = 2, max_s = 2", "min_s = 0.5, max_s = 0.5"),
+    ];
+    let more = ["--pilot", "--command", &command];
+    assert_eq!(on_every_channel("sounds", &changes, &more, &EVERY), 6);
+}
+
+/// The experimenter lays the samples, asks and enters the answers: there is no page.
+#[test]
+fn cloths_are_rated_by_keys_and_in_lines() {
+    let changes = [
+        ("repetitions = 2", "repetitions = 1"),
+        ("min_s = 4", "min_s = 0.2"),
+    ];
+    let channels = [Channel::Terminal, Channel::Plain];
+    let answers = on_every_channel("cloth", &changes, &["--pilot"], &channels);
+    assert_eq!(answers, 6);
+    let folder = tempfile::tempdir().unwrap();
+    let cloth = repository("protocols/cloth");
+    let (code, _, err) = study(&["run", &cloth, "--screen"], folder.path());
+    assert_ne!(code, 0);
+    assert!(err.contains("entry"), "{err}");
 }

@@ -143,7 +143,7 @@ fn a_mechanism_on_a_device_for_tables_is_refused_before_the_session() {
 }
 
 /// Whether there is a Python for the example controller.
-fn has_python() -> bool {
+pub(crate) fn has_python() -> bool {
     let found = std::process::Command::new("python3")
         .arg("--version")
         .output()

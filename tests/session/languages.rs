@@ -2,15 +2,19 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use crate::views::{form, picture, realism, screens, view};
+use crate::views::{
+    choice, form, number, picture, question, rating, realism, screens, slider, view,
+};
 use crossterm::event::{Event, KeyCode, KeyEvent, KeyModifiers};
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use study::plain::pages;
+use study::plain::dialogue::Dialogue;
+use study::screen;
 use study::tui::{Colour, Surface};
 use study_core::protocol::phrases::{Phrase, Words, languages};
+use study_core::protocol::{Question, QuestionKind};
 use study_core::session::Screen;
-use study_core::session::view::View;
+use study_core::session::view::{Banner, View};
 
 /// What a participant sees of a session.
 fn pages_of_a_session(words: &Arc<Words>) -> Vec<(&'static str, View)> {
@@ -94,25 +98,161 @@ fn pages_in_every_language() {
     }
 }
 
+/// Pages of questions and of a pilot, without a word of a language.
+fn questions_of_a_pilot(words: &Arc<Words>) -> Vec<(&'static str, View)> {
+    let kinds = [
+        ("a rating", rating(1, 7, &[(1, "◇"), (7, "◆")])),
+        ("a slider", slider().kind),
+        ("a choice", choice(false).kind),
+        ("several", choice(true).kind),
+        ("a number", number().kind),
+        ("a text", QuestionKind::Text),
+    ];
+    let shown = |(name, kind): (&'static str, QuestionKind)| {
+        let kind = match kind {
+            QuestionKind::Slider { from, to, step, .. } => QuestionKind::Slider {
+                from,
+                to,
+                step,
+                labels: BTreeMap::from(
+                    [("0", "◇"), ("100", "◆")].map(|(n, l)| (n.into(), l.into())),
+                ),
+            },
+            QuestionKind::Choice { multiple, .. } => QuestionKind::Choice {
+                options: ["◇", "◆", "○"].map(str::to_owned).to_vec(),
+                multiple,
+            },
+            QuestionKind::Number {
+                min, max, above, ..
+            } => QuestionKind::Number {
+                unit: None,
+                min,
+                max,
+                above,
+            },
+            kind => kind,
+        };
+        let mut asked = question("asked", "？", kind);
+        asked.required = name != "a text";
+        let text = Question {
+            required: false,
+            ..question("comment", "？", QuestionKind::Text)
+        };
+        let mut view = view(form(vec![asked, text]));
+        view.words = words.clone();
+        view.banner = Some(Banner::Pilot);
+        view.can_go_back = true;
+        view.can_replay = true;
+        if name == "a number" {
+            view.line.all_saved = false;
+        }
+        (name, view)
+    };
+    kinds.into_iter().map(shown).collect()
+}
+
+/// The words of a text in Latin letters that are not keys or commands.
+fn latin(text: &str) -> Vec<String> {
+    const KEYS: [&str; 9] = [
+        "Enter", "Esc", "Tab", "Shift", "Alt", "Ctrl", "Space", "PgUp", "KiB",
+    ];
+    let words = text
+        .split_whitespace()
+        .filter(|word| !word.starts_with('/'));
+    words
+        .flat_map(|word| word.split(|c: char| !c.is_ascii_alphabetic()))
+        .filter(|word| word.len() > 1 && !KEYS.contains(word))
+        .map(str::to_owned)
+        .collect()
+}
+
+/// The texts of a page, without its ids and words of the format.
+fn texts(page: &serde_json::Value, all: &mut Vec<String>) {
+    match page {
+        serde_json::Value::String(text) => all.push(text.clone()),
+        serde_json::Value::Array(items) => items.iter().for_each(|item| texts(item, all)),
+        serde_json::Value::Object(fields) => {
+            let told = |key: &&String| !["does", "id", "kind", "scales"].contains(&key.as_str());
+            for key in fields.keys().filter(told) {
+                texts(&fields[key], all);
+            }
+        }
+        _ => {}
+    }
+}
+
+/// In languages that are not written in Latin letters, every Latin word is English.
 #[test]
 fn nothing_of_a_participants_page_stays_english() {
-    let german = Arc::new(Words::new(Some("de"), &BTreeMap::new()));
-    for (name, view) in pages_of_a_session(&german) {
-        let keys: &[KeyCode] = match name {
-            "rating" => &[KeyCode::Enter],
-            _ => &[],
-        };
-        let full = page(&view, keys);
-        let lines = pages::page(&view, 0, true);
-        let plain = [lines.top, lines.lines, vec![lines.prompt]]
-            .concat()
-            .join("\n");
-        for phrase in Phrase::ALL {
-            let english = phrase.english();
-            let told = english.split('{').next().unwrap().trim();
-            if told.split(' ').count() > 1 {
-                assert!(!full.contains(told), "{name}: {told}\n{full}");
-                assert!(!plain.contains(told), "{name}: {told}\n{plain}");
+    let f = KeyCode::F;
+    let dialogs: [&[KeyCode]; 7] = [
+        &[],
+        &[KeyCode::Enter],
+        &[f(1)],
+        &[f(6)],
+        &[f(6), KeyCode::Enter],
+        &[f(10)],
+        &[f(10), KeyCode::Char('x')],
+    ];
+    for lang in ["ja", "zh-Hans", "ar"] {
+        let words = Arc::new(Words::new(Some(lang), &BTreeMap::new()));
+        let mut all = pages_of_a_session(&words);
+        all.retain(|(name, _)| *name != "rating");
+        all.extend(questions_of_a_pilot(&words));
+        for (name, view) in all {
+            for keys in dialogs {
+                let full = page(&view, keys);
+                assert_eq!(latin(&full), [""; 0], "{lang} {name} {keys:?}\n{full}");
+            }
+            let mut dialogue = Dialogue::new(true, false);
+            let mut plain = dialogue.follow(&view).lines;
+            for typed in [
+                "", "?", "99", "/help", "/back", "/decline", "/says", "/what", "/quit", "x",
+            ] {
+                plain.extend(dialogue.line(typed, &view).1);
+            }
+            let plain = plain.join("\n");
+            assert_eq!(latin(&plain), [""; 0], "{lang} {name}\n{plain}");
+            let mut shown = Vec::new();
+            let of_page = screen::pages::page(&view);
+            texts(&serde_json::to_value(of_page).unwrap(), &mut shown);
+            let shown = shown.join("\n");
+            assert_eq!(latin(&shown), [""; 0], "{lang} {name}\n{shown}");
+        }
+    }
+}
+
+/// The help of the keys is not cut in any language.
+#[test]
+fn the_help_fits_in_every_language() {
+    for lang in languages() {
+        let words = Arc::new(Words::new(Some(lang), &BTreeMap::new()));
+        let (_, view) = pages_of_a_session(&words).swap_remove(0);
+        let help = page(&view, &[KeyCode::F(1)]);
+        assert_eq!(help.matches('…').count(), 0, "{lang}\n{help}");
+        for phrase in [
+            Phrase::CommandBad,
+            Phrase::CommandReplay,
+            Phrase::CommandQuit,
+        ] {
+            assert!(help.contains(words.get(phrase)), "{lang}\n{help}");
+        }
+    }
+}
+
+/// Where the keys do not fit, Enter and F7 stay.
+#[test]
+fn enter_is_offered_on_every_page_in_every_language() {
+    for lang in languages() {
+        let words = Arc::new(Words::new(Some(lang), &BTreeMap::new()));
+        for (name, view) in questions_of_a_pilot(&words) {
+            for columns in [60, 80, 200] {
+                let mut surface = Surface::new(Colour::None);
+                let shown = picture(&crate::views::drawn(&mut surface, &view, columns, 24));
+                for (key, what) in [("Enter", Phrase::Save), ("F7", Phrase::FeelAgain)] {
+                    let hint = format!("{key}: {}", words.get(what));
+                    assert!(shown.contains(&hint), "{lang} {name} {columns}\n{shown}");
+                }
             }
         }
     }

@@ -75,7 +75,8 @@ impl Lines {
             while let Some((line, _)) = self.seen[self.read..].split_once('\n') {
                 let line = line.trim_end().to_owned();
                 self.read += self.seen[self.read..].find('\n').unwrap() + 1;
-                if let Some(rest) = line.strip_prefix("Trial ") {
+                let counted = line.strip_prefix("Trial ");
+                if let Some(rest) = counted.or_else(|| line.strip_prefix("Practice ")) {
                     self.trial = rest.split(' ').next().unwrap().parse().unwrap();
                 }
                 if starts.iter().any(|start| line.starts_with(start)) {
@@ -103,12 +104,11 @@ impl Lines {
 
     /// Types what each page asks for, until a line starts with `stop`, or to the end.
     pub(crate) fn play(&mut self, stop: Option<&str>) -> String {
-        const ASKS: [&str; 9] = [
+        const ASKS: [&str; 8] = [
             "Type the participant",
             "Type the operator",
             "Type y",
             "Press Enter",
-            "Type a number from 1 to 7",
             "Type a number",
             "Type the number",
             "Type your answer",
@@ -125,7 +125,12 @@ impl Lines {
                 l if l.starts_with("Type the participant") => "P01\n".to_owned(),
                 l if l.starts_with("Type the operator") => "lw\n".to_owned(),
                 l if l.starts_with("Type y:") || l.starts_with("Type y ") => "y\n".to_owned(),
-                l if l.starts_with("Type a number from 1 to 7") => format!("{rating}\n"),
+                l if ["1 to 7", "1 to 9"]
+                    .iter()
+                    .any(|s| l[13..].starts_with(&format!(" from {s}"))) =>
+                {
+                    format!("{rating}\n")
+                }
                 l if l.starts_with("Type a number") => "33\n".to_owned(),
                 l if l.starts_with("Type the number") => "1\n".to_owned(),
                 l if l.starts_with("The session is") => return line,
@@ -161,7 +166,12 @@ const NOT_COMPARED: [&str; 11] = [
 
 /// The events of a journal without what differs from session to session.
 pub(crate) fn events(folder: &Path) -> Vec<Value> {
-    let sessions = folder.join("results/turn-signal/sessions");
+    events_of(folder, "turn-signal")
+}
+
+/// The same of another study.
+pub(crate) fn events_of(folder: &Path, study: &str) -> Vec<Value> {
+    let sessions = folder.join("results").join(study).join("sessions");
     let mut journals = Vec::new();
     find(&sessions, &mut journals);
     assert_eq!(journals.len(), 1, "{journals:?}");

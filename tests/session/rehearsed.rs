@@ -35,19 +35,60 @@ fn a_study_of_samples_can_be_rehearsed() {
         out.starts_with("2 simulated participants, 8 rated trials"),
         "{out}"
     );
+    // So are the presentations of a program that plays no tables, unless others have one.
     let process = text.replace(
         "kind = \"manual\"",
         "kind = \"process\"\nlimits = { force_n = 9.0, velocity_mm_s = 500.0 }",
     );
-    fs::write(&protocol, process).unwrap();
-    let arguments = [&arguments[..], &["--out", "other"]].concat();
+    fs::write(&protocol, &process).unwrap();
+    let arguments = [&arguments[..], &["--out", "sounds"]].concat();
+    let (code, out, err) = study(&arguments, folder.path());
+    assert_eq!(code, 0, "{err}");
+    assert!(
+        out.starts_with("2 simulated participants, 8 rated trials"),
+        "{out}"
+    );
+    let simulated = text.replace(
+        "kind = \"manual\"",
+        "kind = \"simulated\"\nlimits = { force_n = 9.0, velocity_mm_s = 500.0 }",
+    );
+    fs::write(&protocol, simulated).unwrap();
+    let arguments = [&arguments[..4], &["--out", "other"]].concat();
     let (code, _, err) = study(&arguments, folder.path());
     assert_eq!(code, 1, "{err}");
-    assert!(
-        err.contains("realization `soft` has no table for a simulated device"),
-        "{err}"
-    );
+    assert!(err.contains("model `soft` has no `file`"), "{err}");
     assert!(!folder.path().join("other").exists());
+}
+
+/// What only a study of forces has.
+const FORCE: [&str; 9] = [
+    "VAF", "λ", "lambda", "alistic", "alism", "force", "Force", "haptic", "switch",
+];
+
+#[test]
+fn studies_of_cloths_and_of_sounds_are_rehearsed_and_analyzed_in_their_own_words() {
+    for (name, word) in [("cloth", "pleasantness"), ("sounds", "loudness")] {
+        let folder = tempfile::tempdir().unwrap();
+        let folder = folder.path();
+        let path = format!("protocols/{name}");
+        let (code, out, err) = study(&["check", &repository(&path)], folder);
+        assert_eq!(code, 0, "{out}{err}");
+        rehearse(folder, &path, &["--participants", "6"]);
+        let (code, out, err) = study(&["analyze", "r", "--include", "simulated"], folder);
+        assert_eq!(code, 0, "{err}");
+        assert!(out.contains(word), "{out}");
+        let report = fs::read_to_string(folder.join(format!("r/{name}/analysis/report.html")));
+        // What is undefined is listed at the end, with its reasons.
+        let report = report.unwrap();
+        let report = report.split("All statistics").next().unwrap();
+        for word in FORCE {
+            assert!(!out.contains(word), "{name}: {word}\n{out}");
+            let at = report.find(word).unwrap_or(0);
+            let around: String = report[..at].chars().rev().take(200).collect();
+            let around: String = around.chars().rev().collect();
+            assert!(!report.contains(word), "{name}: {word} after {around}");
+        }
+    }
 }
 
 #[test]

@@ -142,7 +142,7 @@ fn act(terminal: &mut Terminal, participant: &str, page: &Shown, until: Option<I
         return Did::Waited;
     } else if shows("Are you sure?") {
         (String::new(), String::new(), "n", Did::WentOn)
-    } else if shows("1–7: choose") {
+    } else if ["1–7: choose", "1–9: choose"].into_iter().any(shows) {
         let look = format!("┃  {answer}  ┃");
         (answer.to_string(), look, "\r", Did::Answered)
     } else if shows("↑ ↓: choose") {
@@ -238,7 +238,10 @@ fn without_clocks(page: &Shown) -> String {
 /// A rating that changes from trial to trial: a constant rater may be excluded from an
 /// analysis.
 fn rating(screen: &str) -> u32 {
-    let (_, after) = screen.split_once("trial ").unwrap_or_default();
+    let counted = screen.split_once("trial ");
+    let (_, after) = counted
+        .or_else(|| screen.split_once("practice "))
+        .unwrap_or_default();
     let trial: String = after.chars().take_while(char::is_ascii_digit).collect();
     2 + trial.parse::<u32>().unwrap_or(3) % 5
 }

@@ -109,6 +109,22 @@ pub fn escaped_json(document: &str) -> String {
     out
 }
 
+/// A typed number with the digits and signs of ASCII: keyboards of other scripts have their
+/// own. `٥` and `５` are 5, `٫` and `．` the decimal point; other characters stay.
+pub fn ascii_number(c: char) -> char {
+    let digit = |zero: char| (c as u32).checked_sub(zero as u32).filter(|n| *n < 10);
+    // Arabic, Persian and full-width digits.
+    if let Some(n) = ['٠', '۰', '０'].into_iter().find_map(digit) {
+        return char::from_digit(n, 10).unwrap_or(c);
+    }
+    match c {
+        '٫' | '．' => '.',
+        '،' | '，' | '、' => ',',
+        '−' | '－' => '-',
+        c => c,
+    }
+}
+
 /// Whether a character can control a terminal or disguise the text around it: C0,
 /// DEL, C1, line and paragraph separators, bidirectional controls, interlinear
 /// annotations, tags and invisible characters. The zero-width joiner and non-joiner
@@ -242,6 +258,16 @@ identifier!(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_of_other_keyboards_are_read() {
+        let read = |text: &str| text.chars().map(ascii_number).collect::<String>();
+        assert_eq!(read("٠١٢٣٤٥٦٧٨٩"), "0123456789");
+        assert_eq!(read("۰۱۲۳۴۵۶۷۸۹"), "0123456789");
+        assert_eq!(read("０１２３４５６７８９"), "0123456789");
+        assert_eq!(read("−１２．５ ٣٫٥ 1、2،3"), "-12.5 3.5 1,2,3");
+        assert_eq!(read("五 x٪½"), "五 x٪½");
+    }
 
     #[test]
     fn escape_sequences_do_not_reach_the_terminal() {

@@ -261,7 +261,10 @@ pub(super) fn covariates(a: &Analysis) -> Option<Answer> {
                 .to_owned(),
         );
     }
-    answer.more.extend(others);
+    match a.finding(&Question::Memory) {
+        Some(_) => answer.more.extend(others),
+        None => answer.main.extend(others),
+    }
     if get("r").is_some() {
         answer.more.push(
             "The memory is the length over which the identification averages: the closer the \

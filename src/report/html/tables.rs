@@ -470,8 +470,9 @@ fn subjects(a: &Analysis) -> Markup {
         "longest run",
         "SD within cells",
         "r with the others",
-        "r with VAF",
     ];
+    let has_vaf = a.realizations.iter().any(|m| m.vaf.is_some());
+    head.extend(has_vaf.then_some("r with VAF"));
     // Columns of designs with a reference, an anchor or a repeat.
     let extra: Vec<(&str, &str)> = [
         ("hidden_reference_mean", "mean of the references"),
@@ -503,8 +504,8 @@ fn subjects(a: &Analysis) -> Markup {
             show(get("longest_run"), 0),
             show(get("within_cell_sd"), 2),
             r(get("leave_one_out_r")),
-            r(a.about("subject_corr", &[s], "r")),
         ];
+        row.extend(has_vaf.then(|| r(a.about("subject_corr", &[s], "r"))));
         row.extend(extra.iter().map(|(id, _)| show(get(id), 2)));
         table.row(row);
     }

@@ -6,7 +6,7 @@ use crate::tui::editor::{Editor, Handled};
 use crate::tui::keys::Key;
 use study_core::outcome::{Author, Choice};
 use study_core::protocol::Answer;
-use study_core::protocol::phrases::Words;
+use study_core::protocol::phrases::{Phrase, Words};
 use study_core::session::view::{Correctable, View};
 use study_core::session::{Input, Screen};
 
@@ -186,18 +186,19 @@ impl Dialog {
                 key => DialogResult::Open(reason.key(key)),
             },
             Self::Decline { reason } => match key {
-                Key::Enter if reason.is_blank() => missing("Type a reason first, or press Esc."),
+                Key::Enter if reason.is_blank() => missing(view.words.get(Phrase::DeclineWhy)),
                 Key::Enter => DialogResult::Declined(reason.text().to_owned()),
                 key => DialogResult::Open(reason.key(key)),
             },
-            Self::Confirm(confirm) => confirm.key(key, &view.screen),
+            Self::Confirm(confirm) => confirm.key(key, view),
             Self::Correct(correct) => correct.key(key, &view.words),
         }
     }
 }
 
 impl Confirm {
-    fn key(self, key: Key, screen: &Screen) -> DialogResult {
+    fn key(self, key: Key, view: &View) -> DialogResult {
+        let (screen, words) = (&view.screen, &view.words);
         // The keys of the page keep their meaning: y is not the answer to a refusal.
         if self == Self::Refuse {
             return match (key, screen) {
@@ -205,7 +206,11 @@ impl Confirm {
                     DialogResult::Done(vec![Input::Consent(false)])
                 }
                 (Key::Enter | Key::Char('y' | 'Y'), _) => DialogResult::Closed,
-                _ => missing("Press Enter, or y to go back."),
+                _ => missing(&format!(
+                    "Enter: {}  ·  y: {}",
+                    words.get(Phrase::RefuseConfirm),
+                    words.get(Phrase::Back)
+                )),
             };
         }
         match key {
@@ -218,7 +223,7 @@ impl Confirm {
                 _ => Vec::new(),
             }),
             Key::Char('n' | 'N') => DialogResult::Closed,
-            _ => missing("Press y or n."),
+            _ => missing(words.get(Phrase::ChooseYesOrNo)),
         }
     }
 }

@@ -3,7 +3,7 @@
 use crate::tui::editor::{Editor, Handled};
 use crate::tui::keys::Key;
 use std::collections::BTreeSet;
-use study_base::text::sentence;
+use study_base::text::{ascii_number, sentence};
 use study_core::protocol::phrases::{Phrase, Words};
 use study_core::protocol::{Answer, AnswerError, Question, QuestionKind};
 
@@ -149,6 +149,7 @@ impl Field {
         let key = match key {
             Key::Left if on_scale && words.scales_from_right() => Key::Right,
             Key::Right if on_scale && words.scales_from_right() => Key::Left,
+            Key::Char(c) if !matches!(self, Self::Text(_)) => Key::Char(ascii_number(c)),
             key => key,
         };
         match (self, &question.kind) {
@@ -200,9 +201,10 @@ impl Field {
     }
 }
 
-/// Parses a number; a comma is accepted as decimal separator.
+/// Parses a number, in the digits of any keyboard; a comma is accepted as decimal separator.
 pub fn parse(text: &str) -> Option<f64> {
-    let number: f64 = text.trim().replace(',', ".").parse().ok()?;
+    let text: String = text.trim().chars().map(ascii_number).collect();
+    let number: f64 = text.replace(',', ".").parse().ok()?;
     number.is_finite().then_some(number)
 }
 

@@ -103,7 +103,7 @@ impl UiState {
                 Screen::Form { .. } => Ok(Dialog::Decline {
                     reason: Editor::new(""),
                 }),
-                _ => Err("There is no question to decline.".to_owned()),
+                _ => Err(view.words.get(Phrase::PlainNoQuestion).to_owned()),
             },
             _ => return None,
         })
@@ -115,7 +115,7 @@ impl UiState {
         };
         match dialog.key(key, view) {
             DialogResult::Open(handled) => {
-                self.show_notice(handled);
+                self.show_notice(handled, &view.words);
                 Vec::new()
             }
             DialogResult::Done(inputs) => {
@@ -142,7 +142,7 @@ impl UiState {
         match &view.screen {
             Screen::Who {
                 claiming, roster, ..
-            } => self.press_who(key, *claiming, roster.as_deref()),
+            } => self.press_who(key, *claiming, roster.as_deref(), &view.words),
             Screen::ResumeChoice { .. } => match key {
                 Key::Char('b' | 'B') => vec![Input::Resume(Choice::RestartBlock)],
                 Key::Char('c' | 'C') => vec![Input::Resume(Choice::Continue)],
@@ -184,7 +184,13 @@ impl UiState {
         }
     }
 
-    fn press_who(&mut self, key: Key, claiming: bool, roster: Option<&Roster>) -> Vec<Input> {
+    fn press_who(
+        &mut self,
+        key: Key,
+        claiming: bool,
+        roster: Option<&Roster>,
+        words: &Words,
+    ) -> Vec<Input> {
         let Some((_, who)) = &mut self.who else {
             return Vec::new();
         };
@@ -212,7 +218,7 @@ impl UiState {
             }
             key => {
                 let handled = who.focused().key(key);
-                self.show_notice(handled);
+                self.show_notice(handled, words);
             }
         }
         Vec::new()
@@ -241,7 +247,7 @@ impl UiState {
                     }
                     Handled::No if key == Key::Down => form.focus = (at + 1).min(count - 1),
                     Handled::No if key == Key::Up => form.focus = at.saturating_sub(1),
-                    handled => self.show_notice(handled),
+                    handled => self.show_notice(handled, words),
                 }
             }
         }

@@ -9,6 +9,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::{Margin, Position, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
+use study_base::text::capital;
 use study_core::outcome::Author;
 use study_core::protocol::Answer;
 use study_core::protocol::phrases::{Phrase, Words};
@@ -29,23 +30,30 @@ pub struct DialogView<'a> {
 }
 
 /// The keys listed by the help dialog: key, alternative, action.
-pub const KEYS: [(&str, &str, &str); 15] = [
-    ("Enter", "", "continue, confirm, save"),
-    ("Esc", "", "stop the device, always; close a dialog"),
-    ("Space", "", "stop the device while it is loaded or playing"),
-    ("1–9  ← →  mouse", "", "choose"),
-    ("Tab", "", "switch between rating and comment"),
-    ("Shift-Tab", "PgUp", "back to the question before"),
-    ("F7", "Ctrl-F", "feel it again, where that is possible"),
-    ("Alt-Enter", "Ctrl-J", "new line in a text"),
-    ("F2", "Ctrl-R", "add a remark, at any time"),
-    ("F3", "Ctrl-E", "correct an earlier answer"),
-    ("F4", "Ctrl-B", "mark the trial as bad"),
-    ("F5", "Ctrl-P", "pause"),
-    ("F6", "Ctrl-D", "decline the question, with a reason"),
-    ("F10", "Ctrl-Q", "quit; the session can be resumed later"),
-    ("F1", "?", "show this help"),
-];
+fn keys(words: &Words) -> Vec<(&'static str, &'static str, String)> {
+    let save = format!(
+        "{}, {}",
+        words.get(Phrase::Continue),
+        words.get(Phrase::Save)
+    );
+    let keys = [
+        ("Esc", "Space", Phrase::CommandStop),
+        ("1–9", "← →  ↑ ↓", Phrase::Choose),
+        ("Tab", "", Phrase::OtherField),
+        ("Shift-Tab", "PgUp", Phrase::CommandBack),
+        ("F7", "Ctrl-F", Phrase::CommandReplay),
+        ("Alt-Enter", "Ctrl-J", Phrase::NewLine),
+        ("F2", "Ctrl-R", Phrase::CommandRemark),
+        ("F3", "Ctrl-E", Phrase::CommandCorrect),
+        ("F4", "Ctrl-B", Phrase::CommandBad),
+        ("F5", "Ctrl-P", Phrase::CommandPause),
+        ("F6", "Ctrl-D", Phrase::CommandDecline),
+        ("F10", "Ctrl-Q", Phrase::CommandQuit),
+        ("F1", "?", Phrase::Help),
+    ];
+    let keys = keys.map(|(key, other, what)| (key, other, words.get(what).to_owned()));
+    [vec![("Enter", "", save)], keys.to_vec()].concat()
+}
 
 /// An answer as one line of safe text, at most `columns` cells wide.
 pub fn answer_words(answer: &Answer, columns: usize) -> String {
@@ -76,9 +84,9 @@ pub fn unsaved_lines(names: &[String], most: usize, columns: usize) -> Vec<Strin
 
 impl DialogView<'_> {
     /// The title and the area of the dialog.
-    fn place(&self, area: Rect) -> (&str, Rect) {
+    fn place(&self, area: Rect) -> (String, Rect) {
         let (title, width, height) = match self.dialog {
-            Dialog::Help => ("Keys", 72, 19),
+            Dialog::Help => (self.words.get(Phrase::Help), 76, 18),
             Dialog::Remark { .. } => ("Remark", 68, 11),
             Dialog::Correct(correct) => match &correct.step {
                 Step::List => ("Correct an answer", 76, 16),
@@ -88,10 +96,9 @@ impl DialogView<'_> {
             Dialog::MarkBad { .. } => ("Mark as bad", 68, 10),
             Dialog::Decline { .. } => (self.words.get(Phrase::DeclineTitle), 68, 10),
             Dialog::Confirm(Confirm::Quit) if !self.unsaved.is_empty() => ("NOT SAVED", 72, 15),
-            Dialog::Confirm(Confirm::Refuse) => (self.words.get(Phrase::Sure), 60, 8),
-            Dialog::Confirm(_) => ("Are you sure?", 60, 8),
+            Dialog::Confirm(_) => (self.words.get(Phrase::Sure), 60, 8),
         };
-        (title, middle(area, width, height.min(area.height)))
+        (capital(title), middle(area, width, height.min(area.height)))
     }
 
     fn inside(&self, area: Rect) -> Rect {
@@ -159,18 +166,20 @@ impl DialogView<'_> {
 
     fn keys(&self, buf: &mut Buffer, inside: Rect, keys: &[(&str, &str)]) {
         let last = row(inside, inside.height.saturating_sub(1));
-        let esc = if self.armed {
-            ("Esc", "close and STOP")
-        } else {
-            ("Esc", "close")
+        let close = self.words.get(Phrase::Close);
+        let stop = self.words.get(Phrase::Stop).to_uppercase();
+        let stop = match self.armed {
+            true => format!("{close}, {stop}"),
+            false => close.to_owned(),
         };
+        let esc = ("Esc", stop.as_str());
         let mut keys = keys.to_vec();
         match self.dialog {
             Dialog::Confirm(_) => {}
             Dialog::Help if !self.armed => {}
             _ => keys.push(esc),
         }
-        left(buf, last, &hints(self.theme, &keys));
+        left(buf, last, &hints(self.theme, &keys, inside.width));
     }
 
     fn by(&self, by: Author) -> Line<'static> {
@@ -192,19 +201,19 @@ impl DialogView<'_> {
     }
 
     fn help(&self, buf: &mut Buffer, inside: Rect) {
-        for (y, (key, other, what)) in (1u16..).zip(KEYS) {
+        for (y, (key, other, what)) in (1u16..).zip(keys(self.words)) {
             let both = if other.is_empty() {
                 key.to_owned()
             } else {
                 format!("{key}  {other}")
             };
             let line = Line::from(vec![
-                Span::styled(format!("{both:<20}"), self.theme.key()),
+                Span::styled(format!("{both:<17}"), self.theme.key()),
                 Span::styled(what, self.theme.text()),
             ]);
             left(buf, row(inside, y), &line);
         }
-        self.keys(buf, inside, &[("Enter", "close")]);
+        self.keys(buf, inside, &[("Enter", self.words.get(Phrase::Close))]);
     }
 
     fn correct(&self, buf: &mut Buffer, inside: Rect, correct: &Correct) {
@@ -306,7 +315,7 @@ impl DialogView<'_> {
 impl Widget for &DialogView<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
         let (title, place) = self.place(area);
-        let inside = dialog(buf, place, title, self.theme);
+        let inside = dialog(buf, place, &title, self.theme);
         match self.dialog {
             Dialog::Help => self.help(buf, inside),
             Dialog::Remark { by, .. } => {
@@ -329,20 +338,24 @@ impl Widget for &DialogView<'_> {
                 self.leave_unsaved(buf, inside);
             }
             Dialog::Confirm(confirm) => {
+                let back = self.words.get(Phrase::Back);
                 let (words, yes) = match confirm {
-                    Confirm::Quit => ("Quit the session? It can be resumed later.", "quit"),
+                    Confirm::Quit => (
+                        self.words.get(Phrase::PlainLeave),
+                        self.words.get(Phrase::Quit),
+                    ),
                     Confirm::DropOut => (
                         "Does the participant drop out? This ends their part in the study.",
                         "drop out",
                     ),
                     Confirm::Refuse => {
                         let refuse = self.words.get(Phrase::RefuseConfirm);
-                        let keys = [("Enter", refuse), ("y", self.words.get(Phrase::Back))];
+                        let keys = [("Enter", refuse), ("y", back)];
                         self.ask(buf, inside, self.words.get(Phrase::RefuseSure), &keys);
                         return;
                     }
                 };
-                self.ask(buf, inside, words, &[("y", yes), ("n", "back")]);
+                self.ask(buf, inside, words, &[("y", yes), ("n", back)]);
             }
         }
         if let Some((field, at)) = self.field(area) {

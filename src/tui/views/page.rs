@@ -12,7 +12,7 @@ use super::who::WhoView;
 use crate::tui::theme::Theme;
 use crate::tui::ui_state::dialog::{Confirm, Dialog};
 use crate::tui::ui_state::{Target, UiState};
-use crate::tui::widgets::{cap, centre, hints, middle, row, rows, styled};
+use crate::tui::widgets::{cap, centre, hint_gap, hints, hints_fit, middle, row, rows, styled};
 use crate::tui::wrap;
 use crossterm::event::KeyCode;
 use ratatui::buffer::Buffer;
@@ -108,11 +108,21 @@ impl<'a> Page<'a> {
         })
     }
 
-    /// The keys that have an effect now.
-    fn offered(&self) -> Vec<(String, Phrase)> {
+    /// The keys that have an effect now; where the line is too narrow for all, the first
+    /// ones are left to the help.
+    fn offered(&self, columns: u16) -> Vec<(String, Phrase)> {
         let mut keys = self.keys();
         keys.retain(|(key, _)| !(self.waits && key == "Enter"));
+        while keys.len() > 1 && !hints_fit(&self.in_words(&keys), columns) {
+            keys.remove(0);
+        }
         keys
+    }
+
+    fn in_words<'k>(&'k self, keys: &'k [(String, Phrase)]) -> Vec<(&'k str, &'k str)> {
+        let words = &self.view.words;
+        let words = keys.iter().map(|(key, what)| (&**key, words.get(*what)));
+        words.collect()
     }
 
     /// The key whose hint is at a position.
@@ -121,13 +131,16 @@ impl<'a> Page<'a> {
         if Self::too_small(area) || self.state.dialog().is_some() || place.y != line.y {
             return None;
         }
-        let (keys, words) = (self.offered(), &self.view.words);
+        let (keys, words) = (self.offered(area.width), &self.view.words);
         let wide = |(key, what): &(String, Phrase)| {
             let cells = wrap::width(key) + 2 + wrap::width(words.get(*what));
             u16::try_from(cells).unwrap_or(u16::MAX)
         };
         // As `hints` and `caps` place them.
-        let (edge, gap) = if self.has_caps() { (4, 3) } else { (0, 7) };
+        let (edge, gap) = match self.has_caps() {
+            true => (4, 3),
+            false => (0, hint_gap(&self.in_words(&keys), area.width)),
+        };
         let count = u16::try_from(keys.len()).unwrap_or(u16::MAX);
         let wide = |key: &(String, Phrase)| wide(key).saturating_add(2 * edge);
         let all = keys.iter().map(wide).sum::<u16>() + gap * count.saturating_sub(1);
@@ -355,17 +368,13 @@ impl Widget for &Page<'_> {
         top.render(row(area, 0), buf);
         let body = Page::body(area);
         self.screen(body, buf);
-        let keys = self.offered();
-        let words = &self.view.words;
-        let keys: Vec<(&str, &str)> = keys
-            .iter()
-            .map(|(key, what)| (key.as_str(), words.get(*what)))
-            .collect();
+        let keys = self.offered(area.width);
+        let keys = self.in_words(&keys);
         if self.state.dialog().is_none() {
             if self.has_caps() {
                 self.caps(rows(area, area.height - 4, 3), &keys, buf);
             } else {
-                let line = hints(self.theme, &keys);
+                let line = hints(self.theme, &keys, area.width);
                 centre(buf, row(area, area.height - 3), &line);
             }
             if self.view.entry == Entry::Experimenter

@@ -379,14 +379,10 @@ impl ProseView<'_> {
         }
         let arrow = |text: &'static str| styled(text, self.theme.key());
         if from > 0 {
-            right(buf, row(area, 0), &arrow("↑ more  "));
+            right(buf, row(area, 0), &arrow("↑  "));
         }
         if more {
-            right(
-                buf,
-                row(area, area.height.saturating_sub(1)),
-                &arrow("↓ more  "),
-            );
+            right(buf, row(area, area.height.saturating_sub(1)), &arrow("↓  "));
         }
     }
 }

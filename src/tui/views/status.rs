@@ -79,22 +79,23 @@ impl Widget for &Status<'_> {
                 spans.push(Span::styled(format!(" · {}", clock(line.elapsed_s)), quiet));
             }
             let (saved, answered) = (line.trials_saved, line.trials_answered);
+            let values = [("n", &saved as &dyn Display), ("total", &answered)];
             if self.unsaved {
                 let words = format!(" · NOT SAVED {saved} of {answered}");
                 spans.push(Span::styled(words, self.theme.trouble_frame()));
             } else if !line.all_saved {
-                spans.push(Span::styled(
-                    format!(" · saving … {saved} of {answered}"),
-                    quiet,
-                ));
+                let words = self.words.fill(Phrase::SavingCount, &values);
+                spans.push(Span::styled(format!(" · {words}"), quiet));
             } else if answered > 0 {
-                spans.push(Span::styled(" · saved ", quiet));
+                let words = self.words.fill(Phrase::SavedCount, &values);
+                let (before, after) = words.split_once("{mark}").unwrap_or((&words, ""));
+                spans.push(Span::styled(format!(" · {before}"), quiet));
                 let mark = match line.mirror {
                     Some(Mirror::InStep) => "✓✓",
                     _ => "✓",
                 };
                 spans.push(Span::styled(mark, self.theme.saved()));
-                spans.push(Span::styled(format!(" {saved} of {answered}"), quiet));
+                spans.push(Span::styled(after.to_owned(), quiet));
             }
         }
         // Nothing stands before the first part.
@@ -115,6 +116,14 @@ impl Widget for &Status<'_> {
             Span::styled(format!(" {}", self.words.get(Phrase::Help)), quiet),
         ];
         right(buf, inside, &Line::from(help));
+    }
+}
+
+/// The words of a banner.
+pub fn of_banner(banner: Banner) -> Phrase {
+    match banner {
+        Banner::Pilot => Phrase::Pilot,
+        Banner::Simulated => Phrase::Simulated,
     }
 }
 
@@ -161,11 +170,10 @@ impl Top<'_> {
 
 impl Widget for &Top<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
+        let mut taken_left = 3;
         if let Some(banner) = self.view.banner {
-            let words = match banner {
-                Banner::Pilot => " PILOT — not analyzed with real data ",
-                Banner::Simulated => " SIMULATED — not analyzed with real data ",
-            };
+            let words = format!(" {} ", self.view.words.get(of_banner(banner)));
+            taken_left += wrap::width(&words);
             let at = area.inner(Margin::new(1, 0));
             left(buf, at, &styled(words, self.theme.banner()));
         }
@@ -198,7 +206,7 @@ impl Widget for &Top<'_> {
                 let taken = cells(&words) + 2;
                 let wide = u16::try_from(total).unwrap_or(u16::MAX).clamp(10, 30);
                 let room = at.width.saturating_sub(taken);
-                if room >= wide + 42 {
+                if usize::from(room) >= usize::from(wide) + taken_left {
                     let place = Rect {
                         x: at.right() - taken - wide,
                         width: wide,

@@ -3,7 +3,7 @@
 //! λ itself is a poor scale: from .9991 to .9999 the memory grows ninefold. It
 //! enters as log₁₀ of the memory, in mm where all realizations give it
 //! (`memory_mm`), else in samples, 1/(1 − λ). Only tested realizations with a VAF,
-//! so that each covariate can be compared with VAF.
+//! so that each covariate can be compared with VAF; all of them where none has one.
 
 use super::cells::Cells;
 use super::identifiers::group_id;
@@ -18,7 +18,7 @@ use study_stats::regression::{line, parabola};
 /// Index, VAF and mean rating of a realization.
 struct Point {
     model: usize,
-    vaf: f64,
+    vaf: Option<f64>,
     mean: f64,
 }
 
@@ -36,9 +36,12 @@ pub(super) fn memory(cells: &Cells<'_>, values: &mut Values) {
         return;
     }
     let means = cells.subject_means();
-    let points: Vec<Point> = (cells.tested().into_iter())
+    let tested = cells.tested();
+    let any_vaf = tested.iter().any(|&m| cells.vaf[m].is_some());
+    let points: Vec<Point> = (tested.into_iter())
+        .filter(|&m| cells.vaf[m].is_some() || !any_vaf)
         .filter_map(|model| {
-            let (vaf, mean) = (cells.vaf[model]?, mean(&means[model])?);
+            let (vaf, mean) = (cells.vaf[model], mean(&means[model])?);
             Some(Point { model, vaf, mean })
         })
         .collect();
@@ -48,7 +51,10 @@ pub(super) fn memory(cells: &Cells<'_>, values: &mut Values) {
     };
     for name in &names {
         let x = of(name);
-        let mut g = values.group(group_id("covariate", &[name]), reason(x.as_deref()));
+        let mut g = values.group(
+            group_id("covariate", &[name]),
+            reason(x.as_deref(), any_vaf),
+        );
         linear(&mut g, x.as_deref(), &points);
     }
     let in_mm = of("memory_mm").filter(|x| x.iter().all(|v| *v > 0.0));
@@ -59,7 +65,7 @@ pub(super) fn memory(cells: &Cells<'_>, values: &mut Values) {
         return;
     };
     let x: Vec<f64> = x.iter().map(|v: &f64| v.log10()).collect();
-    let mut g = values.group("covariate/log10_memory", reason(Some(&x)));
+    let mut g = values.group("covariate/log10_memory", reason(Some(&x), any_vaf));
     g.put("in_mm", f64::from(u8::from(of_mm)));
     linear(&mut g, Some(&x), &points);
     let y: Vec<f64> = points.iter().map(|p| p.mean).collect();
@@ -82,10 +88,12 @@ pub(super) fn memory(cells: &Cells<'_>, values: &mut Values) {
 }
 
 /// Why the regression on a covariate is undefined.
-fn reason(x: Option<&[f64]>) -> &'static str {
+fn reason(x: Option<&[f64]>, any_vaf: bool) -> &'static str {
     match x {
-        None => "not every test realization with a VAF has it",
-        Some(x) if x.len() < 3 => "fewer than three realizations with a VAF",
+        None if any_vaf => "not every test realization with a VAF has it",
+        None => "not every test realization has it",
+        Some(x) if x.len() < 3 && any_vaf => "fewer than three realizations with a VAF",
+        Some(x) if x.len() < 3 => "fewer than three realizations",
         Some(x) if is_constant(x) => "all realizations have the same value",
         Some(_) => "all realizations have the same mean rating",
     }
@@ -93,7 +101,7 @@ fn reason(x: Option<&[f64]>) -> &'static str {
 
 fn linear(g: &mut Group<'_>, x: Option<&[f64]>, points: &[Point]) {
     let y: Vec<f64> = points.iter().map(|p| p.mean).collect();
-    let vaf: Vec<f64> = points.iter().map(|p| p.vaf).collect();
+    let vaf: Option<Vec<f64>> = points.iter().map(|p| p.vaf).collect();
     let found = x.and_then(|x| line(x, &y));
     let df = points.len() as f64 - 2.0;
     let t = found
@@ -112,8 +120,12 @@ fn linear(g: &mut Group<'_>, x: Option<&[f64]>, points: &[Point]) {
         }
         None => g.none(&["t", "p"]),
     }
-    let with_vaf = x.and_then(|x| pearson(x, &vaf).filter(|_| x.len() > 2));
+    let with_vaf = x.zip(vaf.as_deref());
+    let with_vaf = with_vaf.and_then(|(x, vaf)| pearson(x, vaf).filter(|_| x.len() > 2));
     match (found, with_vaf) {
+        (Some(_), None) if vaf.is_none() => {
+            g.put_or("r_with_vaf", None, "no realization has a VAF");
+        }
         (Some(_), None) => g.put_or("r_with_vaf", None, "all realizations have the same VAF"),
         (_, r) => g.maybe("r_with_vaf", r),
     }

@@ -13,9 +13,12 @@ use crate::outcome::Verdict;
 use crate::outcome::ratings::{Felt, Ratings};
 use study_stats::describe::{mean, sd};
 
-/// Whether any trial says what was felt.
+/// Whether any trial says what was felt. Samples, sounds and other presentations without
+/// tables have no VAF, and nothing of them can be verified: the question is not asked.
 pub(super) fn is_known(ratings: &Ratings) -> bool {
-    (0..ratings.len()).any(|i| ratings.felt(i).is_some())
+    let mut felt = (0..ratings.len()).filter_map(|i| ratings.felt(i));
+    let has_vaf = ratings.vaf.iter().any(Option::is_some);
+    felt.any(|felt| has_vaf || felt.verdict != Verdict::Unverified)
 }
 
 /// Number of trials with each verdict, and of failed attempts.

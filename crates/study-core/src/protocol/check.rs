@@ -242,13 +242,20 @@ fn realizations(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
     if n >= ENOUGH_REALIZATIONS {
         return;
     }
+    // What ratings are correlated with.
+    let of_forces = tests(protocol).any(|m| m.file.is_some() || m.vaf.is_some());
+    let with = match of_forces {
+        true => "VAF",
+        false if tests(protocol).any(|m| !m.covariates.is_empty()) => "a covariate",
+        false => return,
+    };
     let alpha = protocol.analysis.alpha();
     let so = match critical_r(n, alpha) {
-        None => "no correlation of ratings with VAF can be tested".to_owned(),
+        None => format!("no correlation of ratings with {with} can be tested"),
         Some(r) => {
             let level = alpha.to_string();
             let level = level.trim_start_matches('0');
-            format!("|r| with VAF has to exceed {r:.3} for p < {level}")
+            format!("|r| with {with} has to exceed {r:.3} for p < {level}")
         }
     };
     let count = counted(n, "test realization", "test realizations");
@@ -418,13 +425,24 @@ mod tests {
 
     #[test]
     fn few_realizations_give_a_warning_with_the_critical_correlation() {
-        let found = messages(&example::protocol(5, 3));
+        let mut protocol = example::protocol(5, 3);
+        // without numbers that could explain the ratings nothing is correlated
+        assert_eq!(messages(&protocol), Vec::<String>::new());
+        for (i, model) in (1u8..).zip(&mut protocol.models) {
+            model.covariates = [("roughness".to_owned(), f64::from(i))].into();
+        }
         assert_eq!(
-            found,
+            messages(&protocol),
+            ["5 test realizations: |r| with a covariate has to exceed 0.878 for p < .05"]
+        );
+        for (i, model) in (1u8..).zip(&mut protocol.models) {
+            model.vaf = Some(0.9 - 0.1 * f64::from(i));
+        }
+        assert_eq!(
+            messages(&protocol),
             ["5 test realizations: |r| with VAF has to exceed 0.878 for p < .05"]
         );
         // by the level of the protocol; R: qt(.995, 3) / sqrt(qt(.995, 3)^2 + 3)
-        let mut protocol = example::protocol(5, 3);
         protocol.analysis.alpha = Some(0.01);
         assert_eq!(
             messages(&protocol),

@@ -171,6 +171,15 @@ phrases! {
     CommandReplay "command-replay" "presents the trial again, where that is possible";
     CommandBack "command-back" "goes back to the question before";
     CommandQuit "command-quit" "leaves; the session can be resumed";
+    SavedCount "saved-count" "saved {mark} {n} of {total}";
+    SavingCount "saving-count" "saving … {n} of {total}";
+    Pilot "pilot" "PILOT — not analyzed with real data";
+    Simulated "simulated" "SIMULATED — not analyzed with real data";
+    Declined "declined" "declined";
+    Empty "empty" "empty";
+    PlainOneLine "plain-one-line" "Type {command} and your text in one line.";
+    PlainNoQuestion "plain-no-question" "There is no question here.";
+    TextCut "text-cut" "The text is too long: at most {kib} KiB are stored, the rest was removed.";
     PageLost "page-lost" "The connection is lost. Trying again …";
     PageClosed "page-closed" "This page is closed. Please tell the experimenter.";
 }

@@ -254,6 +254,13 @@ impl StudyFolder {
         disk.sync_folder(&participant).at(&participant)
     }
 
+    /// Whether a program has a session open at this moment.
+    pub fn is_open(&self, session: &SessionData) -> bool {
+        // Nobody claims a session meanwhile, who would find it locked.
+        let claims = super::lock_study(self.disk.as_ref(), &self.path);
+        claims.is_ok_and(|_claims| matches!(self.disk.lock(&session.path), Ok(None)))
+    }
+
     /// Locks a session's folder and makes its name durable: the process that created it
     /// may have died before its syncs.
     ///

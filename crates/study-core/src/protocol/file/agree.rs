@@ -209,6 +209,19 @@ impl Sections<'_> {
                 );
             }
         }
+        let plays = self.models.iter().any(|m| m.file.is_some())
+            || document.span_of("families").is_some()
+            || document.span_of("families[0]").is_some();
+        if device.kind == DeviceKind::Process
+            && plays
+            && document.span_of("device.limits").is_none()
+        {
+            document.fault(
+                Fault::error("[device] has no `limits`")
+                    .at(document.span_of("device"))
+                    .hint("such as limits = { force_n = 12.0, velocity_mm_s = 1000.0 }: its program plays tables of force"),
+            );
+        }
         if self.minimum_strokes == 0 {
             return;
         }

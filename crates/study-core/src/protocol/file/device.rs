@@ -12,7 +12,7 @@ pub(super) const DEVICE: &[Key] = keys! {
     /// to the laboratory, not to the study: they are arguments of `study run`.
     "kind": Kind::Word(DeviceKind::WORDS), r#""simulated""#, required;
     /// Limits that no playback exceeds. The lower of these and the device's own apply.
-    "limits": Kind::Table(LIMITS), "{ force_n = 12.0, velocity_mm_s = 1000.0 }", derived("required, unless `kind` is `manual`");
+    "limits": Kind::Table(LIMITS), "{ force_n = 12.0, velocity_mm_s = 1000.0 }", derived("required, unless `kind` is `manual`, or `process` without model files");
     /// Permission to play tables that fail their passivity certificate, which could put
     /// energy into the hand. Without it such a table is refused.
     "uncertified": Kind::Table(UNCERTIFIED), r#"{ play = true, force_n = 9.0, reason = "the paper's own realizations" }"#;
@@ -69,7 +69,9 @@ pub(super) fn read(mut section: Section<'_, '_>) -> Option<DeviceRules> {
     let uncertified = section.section("uncertified").and_then(uncertified);
     let lever_mm = section.number("lever_mm");
     let rendering = section.section("rendering").and_then(rendering);
-    if !given && kind != Some(DeviceKind::Manual) {
+    // Whether a program plays tables is known with the realizations.
+    let perhaps = matches!(kind, Some(DeviceKind::Manual | DeviceKind::Process));
+    if !given && !perhaps {
         section.report_missing("limits", section.key("limits").such_as());
     }
     if let (Some(uncertified), Some(limits)) = (&uncertified, limits)
@@ -89,7 +91,7 @@ pub(super) fn read(mut section: Section<'_, '_>) -> Option<DeviceRules> {
         kind: kind?,
         limits: match limits {
             Some(limits) => limits,
-            // A sample mounted by hand plays no table: these limits are never used.
+            // Without tables these limits are never used.
             None if !given => Limits::new(12.0, 1000.0).ok()?,
             None => return None,
         },

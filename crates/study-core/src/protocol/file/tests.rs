@@ -412,6 +412,12 @@ fn a_device_that_plays_tables_needs_files() {
         .replace("\"simulated\"", "\"manual\"")
         .replace("limits = { force_n = 12.0, velocity_mm_s = 1000.0 }\n", "");
     assert!(messages(&manual).is_empty());
+    // A program without tables needs no limits of force; with one it does.
+    let process = manual.replace("\"manual\"", "\"process\"");
+    assert!(messages(&process).is_empty());
+    let plays = process.replacen("id = \"a\"\n", "id = \"a\"\nfile = \"a.toml\"\n", 1);
+    assert_ne!(plays, process);
+    assert_eq!(messages(&plays), ["[device] has no `limits`"]);
 }
 
 #[test]
