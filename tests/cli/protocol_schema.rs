@@ -210,6 +210,7 @@ fn the_shipped_protocols_are_valid_and_broken_ones_are_not() {
         "protocols/knob/protocol.toml",
         "protocols/cloth/protocol.toml",
         "protocols/sounds/protocol.toml",
+        "protocols/yes-no/protocol.toml",
         "src/cli/new/protocol.toml",
     ] {
         let text = std::fs::read_to_string(root.join(file)).unwrap();

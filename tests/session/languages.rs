@@ -156,11 +156,14 @@ fn latin(text: &str) -> Vec<String> {
     const KEYS: [&str; 9] = [
         "Enter", "Esc", "Tab", "Shift", "Alt", "Ctrl", "Space", "PgUp", "KiB",
     ];
-    let words = text
-        .split_whitespace()
-        .filter(|word| !word.starts_with('/'));
+    let mut command = false;
+    let kept = |c: &char| {
+        command = *c == '/' || (command && c.is_ascii_lowercase());
+        !command
+    };
+    let text: String = text.chars().filter(kept).collect();
+    let words = text.split(|c: char| !c.is_ascii_alphabetic());
     words
-        .flat_map(|word| word.split(|c: char| !c.is_ascii_alphabetic()))
         .filter(|word| word.len() > 1 && !KEYS.contains(word))
         .map(str::to_owned)
         .collect()
@@ -231,9 +234,12 @@ fn the_help_fits_in_every_language() {
         let help = page(&view, &[KeyCode::F(1)]);
         assert_eq!(help.matches('…').count(), 0, "{lang}\n{help}");
         for phrase in [
+            Phrase::CommandBack,
             Phrase::CommandBad,
-            Phrase::CommandReplay,
+            Phrase::CommandCorrect,
             Phrase::CommandQuit,
+            Phrase::CommandRemark,
+            Phrase::CommandStop,
         ] {
             assert!(help.contains(words.get(phrase)), "{lang}\n{help}");
         }
@@ -246,7 +252,7 @@ fn enter_is_offered_on_every_page_in_every_language() {
     for lang in languages() {
         let words = Arc::new(Words::new(Some(lang), &BTreeMap::new()));
         for (name, view) in questions_of_a_pilot(&words) {
-            for columns in [60, 80, 200] {
+            for columns in [80, 100, 200] {
                 let mut surface = Surface::new(Colour::None);
                 let shown = picture(&crate::views::drawn(&mut surface, &view, columns, 24));
                 for (key, what) in [("Enter", Phrase::Save), ("F7", Phrase::FeelAgain)] {

@@ -131,6 +131,7 @@ impl Lines {
                 {
                     format!("{rating}\n")
                 }
+                l if l.starts_with("Type a number") && self.trial > 0 => format!("3{rating}\n"),
                 l if l.starts_with("Type a number") => "33\n".to_owned(),
                 l if l.starts_with("Type the number") => "1\n".to_owned(),
                 l if l.starts_with("The session is") => return line,

@@ -92,6 +92,21 @@ fn studies_of_cloths_and_of_sounds_are_rehearsed_and_analyzed_in_their_own_words
 }
 
 #[test]
+fn a_study_of_yes_and_no_is_rehearsed_and_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let (code, out, err) = study(&["check", &repository("protocols/yes-no")], folder);
+    assert_eq!((code, err.as_str()), (0, ""), "{out}");
+    rehearse(folder, "protocols/yes-no", &["--participants", "2"]);
+    let (code, out, err) = study(&["analyze", "r", "--include", "simulated"], folder);
+    assert_eq!(code, 0, "{err}");
+    // more force, more yes: a threshold for each participant
+    assert!(out.contains("yes-no") && out.contains("threshold"), "{out}");
+    assert!(out.matches("friction-yes").count() >= 2, "{out}");
+    assert!(!out.contains("VAF"), "{out}");
+}
+
+#[test]
 fn a_study_with_a_failing_device_ends_and_is_whole() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();

@@ -547,7 +547,7 @@ fn pasting_where_there_is_no_text_does_nothing() {
 fn a_question_mark_is_help_or_text() {
     let mut desk = Desk::with(rate());
     desk.types("?");
-    assert!(desk.look().contains("stop the device, always"));
+    assert!(desk.look().contains("stops the device at once"));
     desk.enter();
     desk.press(KeyCode::Tab);
     desk.types("why?");

@@ -41,7 +41,7 @@ fn keys(words: &Words) -> Vec<(&'static str, &'static str, String)> {
         ("1–9", "← →  ↑ ↓", Phrase::Choose),
         ("Tab", "", Phrase::OtherField),
         ("Shift-Tab", "PgUp", Phrase::CommandBack),
-        ("F7", "Ctrl-F", Phrase::CommandReplay),
+        ("F7", "Ctrl-F", Phrase::FeelAgain),
         ("Alt-Enter", "Ctrl-J", Phrase::NewLine),
         ("F2", "Ctrl-R", Phrase::CommandRemark),
         ("F3", "Ctrl-E", Phrase::CommandCorrect),
@@ -208,7 +208,7 @@ impl DialogView<'_> {
                 format!("{key}  {other}")
             };
             let line = Line::from(vec![
-                Span::styled(format!("{both:<17}"), self.theme.key()),
+                Span::styled(format!("{both:<19}"), self.theme.key()),
                 Span::styled(what, self.theme.text()),
             ]);
             left(buf, row(inside, y), &line);
