@@ -67,7 +67,10 @@ const FORCE: [&str; 9] = [
 
 #[test]
 fn studies_of_cloths_and_of_sounds_are_rehearsed_and_analyzed_in_their_own_words() {
-    for (name, word) in [("cloth", "pleasantness"), ("sounds", "loudness")] {
+    for (name, word, covariate) in [
+        ("cloth", "pleasantness", "roughness_um"),
+        ("sounds", "loudness", "frequency_hz"),
+    ] {
         let folder = tempfile::tempdir().unwrap();
         let folder = folder.path();
         let path = format!("protocols/{name}");
@@ -77,6 +80,8 @@ fn studies_of_cloths_and_of_sounds_are_rehearsed_and_analyzed_in_their_own_words
         let (code, out, err) = study(&["analyze", "r", "--include", "simulated"], folder);
         assert_eq!(code, 0, "{err}");
         assert!(out.contains(word), "{out}");
+        let against = format!("Mean rating against {covariate}: r = ");
+        assert!(out.contains(&against), "{out}");
         let report = fs::read_to_string(folder.join(format!("r/{name}/analysis/report.html")));
         // What is undefined is listed at the end, with its reasons.
         let report = report.unwrap();
