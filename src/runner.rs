@@ -9,11 +9,13 @@
 //! [`rehearsal`] runs the same loop on a virtual clock.
 
 pub mod clock;
+mod loading;
 pub mod rehearsal;
 pub mod saver;
 
 use crate::device::{Device, Report, Stimulus, manual, rendering_of};
 use clock::Clock;
+use loading::end_of_slot;
 use saver::{Job, SaveEvent, Saver};
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::RangeInclusive;
@@ -120,10 +122,6 @@ pub struct Ended {
     pub receipt: Option<Receipt>,
 }
 
-/// Loads of tables of different sizes take a multiple of this time, so that their
-/// duration tells nothing about the realization.
-const LOAD_SLOT: Duration = Duration::from_millis(500);
-
 /// A running session with its device and its folder.
 pub struct Runner {
     setup: Setup,
@@ -134,8 +132,6 @@ pub struct Runner {
     receipt: Option<Receipt>,
     /// What the session knows of results folder and mirror.
     copies: Option<Copies>,
-    /// Whether the time of a load depends on the realization.
-    uneven_loads: bool,
     /// When the load under way was requested.
     load_began: Duration,
     /// When the session is told that the table is loaded.
@@ -158,7 +154,6 @@ impl Runner {
         let at = setup.clock.now();
         let (session, effects) =
             Session::new(setup.protocol.clone(), setup.orders.clone(), config, at);
-        let uneven_loads = uneven_loads(&setup.protocol, &setup.models);
         let codes = sample_codes(&setup.protocol);
         let only_flags = !setup.study.manifest().judges_rendering;
         let mut runner = Self {
@@ -169,7 +164,6 @@ impl Runner {
             ended: None,
             receipt: None,
             copies: None,
-            uneven_loads,
             load_began: Duration::ZERO,
             loaded_due: None,
             last_report: None,
@@ -413,11 +407,10 @@ impl Runner {
                 self.feed(Input::DeviceJudged(fidelity));
             }
             let input = match report {
-                Report::Loaded if self.uneven_loads => {
+                Report::Loaded => {
                     self.loaded_due = Some(end_of_slot(self.load_began, at));
                     continue;
                 }
-                Report::Loaded => Input::DeviceLoaded,
                 Report::Mount(code) => Input::DeviceMount(code),
                 Report::Started => Input::DeviceStarted,
                 Report::Telemetry(samples) => {
@@ -580,21 +573,4 @@ pub fn playback_limits(protocol: &Protocol, table: Option<&Realization>) -> Limi
         limits.force_n = limits.force_n.capped_at(uncertified.force_n);
     }
     limits
-}
-
-/// Whether the tables of a study differ in size, or are not known.
-fn uneven_loads(protocol: &Protocol, models: &BTreeMap<ModelId, Realization>) -> bool {
-    let unknown = (protocol.models.iter()).any(|entry| !models.contains_key(&entry.id));
-    let mut sizes = models.values().map(|table| table.x_mm.len());
-    let first = sizes.next();
-    unknown || first.is_none() || sizes.any(|size| Some(size) != first)
-}
-
-/// The first multiple of [`LOAD_SLOT`] after `began` that is not before `now`.
-fn end_of_slot(began: Duration, now: Duration) -> Duration {
-    let slots = now
-        .saturating_sub(began)
-        .as_nanos()
-        .div_ceil(LOAD_SLOT.as_nanos());
-    began + LOAD_SLOT * u32::try_from(slots.max(1)).unwrap_or(u32::MAX)
 }

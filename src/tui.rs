@@ -122,13 +122,13 @@ impl Tui {
 
     /// Draws the view if anything visible has changed.
     fn draw(&mut self, view: &View) -> Result<(), OperatorError> {
-        let waits = self.pace.waits(Instant::now());
+        let surface = &mut self.surface;
+        let turns = surface.turns(view);
+        let waits = turns || self.pace.waits(Instant::now());
         let now = (as_shown(view), waits);
         if self.drawn.as_ref() == Some(&now) {
             return Ok(());
         }
-        let surface = &mut self.surface;
-        let turns = surface.turns(view);
         surface.set_waits(waits);
         let drawn = self.terminal.draw(|frame| {
             let area = frame.area();

@@ -224,7 +224,9 @@ impl Firmware {
             self.ticks = due - idle;
         }
         while self.ticks < due {
-            let at = Duration::from_nanos((self.ticks as f64 * self.period_ns).round() as u64);
+            let begins = Duration::from_nanos((self.ticks as f64 * self.period_ns).round() as u64);
+            // Bytes may have been handled since: the device's clock never goes back.
+            let at = begins.max(self.now);
             while let Some(late) = self.injector.as_mut().and_then(|t| t.overdue(at)) {
                 self.handle(&late, at);
             }

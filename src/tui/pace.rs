@@ -1,8 +1,9 @@
 //! Which keys are meant for the page on the screen.
 //!
-//! A key that was pressed before a page appeared does not act on it, and an Enter right
-//! after another one does not advance: the key is held, or was pressed twice. In a dialog
-//! every key counts. Keys that stop, leave or open a dialog always count.
+//! A key that was pressed before a page appeared does not act on it, nor does an Enter so
+//! soon after that nobody can have seen the page. An Enter right after another one does not
+//! advance: the key is held, or was pressed twice. In a dialog every key counts. Keys that
+//! stop, leave or open a dialog always count.
 
 use super::keys::{self, Key};
 use crossterm::event::{Event, KeyEventKind};
@@ -12,11 +13,18 @@ use std::time::{Duration, Instant};
 /// key sooner, and repeat it much faster.
 pub const QUIET: Duration = Duration::from_millis(700);
 
+/// Time that a page has to be on the screen before an Enter can be meant for it, unless
+/// another key came before. Simple reactions to what is seen take 180 ms or more (Luce 1986,
+/// Response Times).
+pub const SEEN: Duration = Duration::from_millis(150);
+
 /// Decides by the time of each event whether it is meant for the page.
 #[derive(Debug, Clone)]
 pub struct Pace {
     /// Since when the page is on the screen.
     shown: Instant,
+    /// Whether a key was meant for it.
+    used: bool,
     /// The last Enter, if no other key came after it.
     entered: Option<Instant>,
 }
@@ -26,6 +34,7 @@ impl Pace {
     pub fn new(shown: Instant) -> Self {
         Self {
             shown,
+            used: false,
             entered: None,
         }
     }
@@ -33,12 +42,14 @@ impl Pace {
     /// Another page is on the screen since a moment.
     pub fn turned(&mut self, shown: Instant) {
         self.shown = shown;
+        self.used = false;
     }
 
     /// Whether an Enter at a moment would not advance.
     pub fn waits(&self, at: Instant) -> bool {
         let since = |before: Instant| at.saturating_duration_since(before);
-        self.entered.is_some_and(|before| since(before) < QUIET)
+        let unseen = !self.used && since(self.shown) < SEEN;
+        unseen || self.entered.is_some_and(|before| since(before) < QUIET)
     }
 
     /// Whether an event is meant for what is on the screen. `dialog`: a dialog is open;
@@ -57,6 +68,7 @@ impl Pace {
         }
         if key.is_some() && on_time {
             self.entered = None;
+            self.used = true;
         }
         on_time
     }
@@ -103,13 +115,13 @@ mod tests {
 
     #[test]
     fn of_quick_or_held_enters_only_the_first_advances() {
-        let quick = [110, 200, 300, 400];
+        let quick = [250, 300, 400, 500];
         assert_eq!(
             accepted(KeyCode::Enter, &quick, false),
             [true, false, false, false]
         );
         // the first repeat comes late, the others every 33 ms, for longer than the pause
-        let held = [110, 770, 803, 836, 869, 902, 1602];
+        let held = [250, 910, 943, 976, 1009, 1042, 1742];
         let expected = [true, false, false, false, false, false, true];
         assert_eq!(accepted(KeyCode::Enter, &held, false), expected);
         assert_eq!(accepted(KeyCode::Enter, &quick, true), [true; 4]);
@@ -125,7 +137,7 @@ mod tests {
         assert_eq!(accepted(KeyCode::Esc, &[99], false), [true]);
         // it is forgotten, but one that follows at once is still its repetition
         assert_eq!(
-            accepted(KeyCode::Enter, &[99, 150, 900], false),
+            accepted(KeyCode::Enter, &[99, 350, 1050], false),
             [false, false, true]
         );
         let mut pace = Pace::new(Instant::now());
@@ -136,9 +148,29 @@ mod tests {
     }
 
     #[test]
-    fn a_choice_between_two_enters_makes_the_second_deliberate() {
+    fn an_enter_before_the_page_can_have_been_seen_does_not_advance() {
+        assert_eq!(accepted(KeyCode::Enter, &[249], false), [false]);
+        assert_eq!(accepted(KeyCode::Enter, &[250], false), [true]);
+        assert_eq!(accepted(KeyCode::Enter, &[101], true), [true]);
+        // after a choice on the page it is meant
         let start = Instant::now();
         let mut pace = Pace::new(start);
+        assert!(pace.waits(start));
+        assert!(pace.accepts(&key(KeyCode::Char('5')), start, false, false));
+        assert!(pace.accepts(&key(KeyCode::Enter), start, false, false));
+        // but not on the next one
+        let next = start + QUIET * 2;
+        pace.turned(next);
+        assert!(!pace.accepts(&key(KeyCode::Enter), next, false, false));
+        assert!(pace.waits(next + SEEN));
+        assert!(!pace.waits(next + QUIET));
+    }
+
+    #[test]
+    fn a_choice_between_two_enters_makes_the_second_deliberate() {
+        let shown = Instant::now();
+        let mut pace = Pace::new(shown);
+        let start = shown + SEEN;
         assert!(pace.accepts(&key(KeyCode::Enter), start, false, false));
         assert!(pace.waits(start));
         assert!(pace.accepts(&key(KeyCode::Char('5')), start, false, false));

@@ -12,10 +12,12 @@ use std::time::Duration;
 use study::cli::load::{Loaded, load};
 use study::device::faults::{FaultPlan, InjectedFault};
 use study::device::virtual_device::{Options, VirtualDevice};
+use study::device::{Device, DeviceError, Identity, Report, Stimulus};
 use study::runner::clock::VirtualClock;
 use study::runner::rehearsal::first_day;
 use study::runner::{Runner, Setup};
 use study::tui::{Colour, Surface};
+use study_base::limits::Limits;
 use study_base::text::ModelId;
 use study_core::protocol::{Answer, Entry, FileOrders, Order, Protocol, QuestionKind, Role};
 use study_core::session::{Config, Input, Screen, View};
@@ -52,11 +54,17 @@ fn inputs(view: &View) -> Vec<Input> {
     }
 }
 
+/// The simulated device on which a session is played, with its own faults or another one.
+fn device(options: Options) -> Box<dyn Device> {
+    Box::new(VirtualDevice::new(options))
+}
+
 /// A session of P01 on a simulated device and a virtual clock.
 fn session(
     loaded: Loaded,
     orders: Option<FileOrders>,
     fault: Option<InjectedFault>,
+    device: fn(Options) -> Box<dyn Device>,
 ) -> (Runner, VirtualClock) {
     let clock = VirtualClock::starting_at(first_day());
     let frozen = Frozen {
@@ -84,7 +92,7 @@ fn session(
         rows: None,
         group: None,
         device_kind: study_core::protocol::DeviceKind::Simulated,
-        device: Box::new(VirtualDevice::new(options)),
+        device: device(options),
         device_check: None,
         deliveries: Default::default(),
         clock: Box::new(clock.clone()),
@@ -99,7 +107,8 @@ fn session(
     (Runner::new(setup, config), clock)
 }
 
-/// The pages of a session, one for each look, up to the trial after `first`.
+/// The pages of a session, one for each look, up to the trial after `first`; without a fault
+/// until it is felt, since how long it takes to load may tell what came before it.
 fn pages(
     name: &str,
     first: &ModelId,
@@ -123,22 +132,24 @@ fn pages(
     order.retain(|id| id != first);
     order.insert(0, first.clone());
     let orders = BTreeMap::from([(1, order)]);
-    let (mut runner, clock) = session(loaded, Some(orders), fault);
+    let (mut runner, clock) = session(loaded, Some(orders), fault, device);
     let mut surface = Surface::new(Colour::None).with_live(true);
     let mut pages = Vec::new();
-    let mut played = false;
+    let (mut played, mut over) = (false, false);
     for _ in 0..20_000 {
         let view = runner.view();
         // What the participant's own page shows has to be as blind.
         let own = serde_json::to_string(&study::screen::pages::page(&view)).unwrap();
         pages.push(picture(&drawn(&mut surface, &view, 80, 24)) + &own);
         match &view.screen {
+            Screen::Playing { .. } if over => return pages,
             Screen::Playing { .. } => {
                 assert_eq!(runner.felt(), Some(first));
                 played = true;
             }
             Screen::DeviceTrouble { .. } => played = true,
-            Screen::Reference { .. } if played => return pages,
+            Screen::Reference { .. } if played && fault.is_some() => return pages,
+            Screen::Reference { .. } => over = played,
             _ => {}
         }
         if runner.step(inputs(&view)).is_some() {
@@ -261,9 +272,26 @@ fn a_fault_does_not_tell_realizations_apart() {
 /// Levels of the ladder of the track below.
 const LEVELS: [f64; 6] = [0.1, 0.2, 0.4, 0.8, 1.4, 2.0];
 
-/// The pages of two trials of a track with one level: the seed decides which interval has
-/// it, and the participant gives the answer number `answer`.
-fn pages_of_a_track(folder: &Path, level: f64, seed: u64, answer: usize) -> (Vec<String>, String) {
+/// A folder with a static table, for [`looks_at_a_track`].
+fn folder_of_a_track() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let models = folder.path().join("models");
+    std::fs::create_dir(&models).unwrap();
+    let table = repository("protocols/turn-signal-extended/models/static.toml");
+    std::fs::copy(table, models.join("static.toml")).unwrap();
+    folder
+}
+
+/// The pages of a session with two trials of a track at one level, one for each look, and the
+/// order of the intervals. The seed decides which of them has the level; the participant gives the
+/// answer number `answer`.
+fn looks_at_a_track(
+    folder: &Path,
+    level: f64,
+    seed: u64,
+    answer: usize,
+    device: fn(Options) -> Box<dyn Device>,
+) -> (Vec<String>, String) {
     let template = std::fs::read_to_string(repository("src/cli/new/constant.toml")).unwrap();
     let text = template
         .replace("range = [0.02, 0.6] ", &format!("levels = {LEVELS:?} #"))
@@ -276,7 +304,7 @@ fn pages_of_a_track(folder: &Path, level: f64, seed: u64, answer: usize) -> (Vec
         .replace("easy = 0.1", "easy = 0.0");
     std::fs::write(folder.join("protocol.toml"), text).unwrap();
     let loaded = load(folder).unwrap();
-    let (mut runner, clock) = session(loaded, None, None);
+    let (mut runner, clock) = session(loaded, None, None, device);
     let mut surface = Surface::new(Colour::None).with_live(true);
     let (mut pages, mut felt) = (Vec::new(), String::new());
     for _ in 0..20_000 {
@@ -313,35 +341,114 @@ fn pages_of_a_track(folder: &Path, level: f64, seed: u64, answer: usize) -> (Vec
     panic!("no end:\n{}", pages.last().unwrap())
 }
 
-/// The pages of the participant one after the other, whatever the time that each is shown.
-fn without_times(pages: &[String]) -> Vec<String> {
-    let own = pages.iter().filter_map(|page| page.lines().last());
-    let is_digit = |c: char| c.is_ascii_digit();
-    let mut own: Vec<String> = own.map(|page| page.replace(is_digit, "0")).collect();
-    own.dedup();
-    own
-}
-
-/// No level, no order of the intervals and no answer changes what the participant's page
-/// shows. How long it is shown is not compared here.
+/// No level, no order of the intervals and no answer changes what a screen shows or for how long,
+/// for participant and experimenter: at each look the pages are the same.
 #[test]
-fn levels_orders_and_answers_leave_nothing_on_a_screen() {
-    let folder = tempfile::tempdir().unwrap();
-    let models = folder.path().join("models");
-    std::fs::create_dir(&models).unwrap();
-    let table = repository("protocols/turn-signal-extended/models/static.toml");
-    std::fs::copy(table, models.join("static.toml")).unwrap();
-    let (expected, first) = pages_of_a_track(folder.path(), LEVELS[0], 1, 0);
+fn levels_orders_and_answers_leave_nothing_on_a_screen_and_take_the_same_time() {
+    let folder = folder_of_a_track();
+    let (expected, first) = looks_at_a_track(folder.path(), LEVELS[0], 1, 0, device);
     assert!(expected.iter().any(|page| page.contains("Second")));
     let mut orders = std::collections::BTreeSet::from([first]);
     for (n, level) in LEVELS.iter().enumerate() {
-        for answer in 0..2 {
-            let seed = 1 + n as u64;
-            let (shown, order) = pages_of_a_track(folder.path(), *level, seed, answer);
-            orders.insert(order.clone());
-            let [one, other] = [&expected, &shown].map(|pages| without_times(pages));
-            assert_eq!(one, other, "level {level}, {order}, answer {answer}");
+        for (seed, answer) in [(1, 0), (1 + n as u64, 1)] {
+            let (shown, order) = looks_at_a_track(folder.path(), *level, seed, answer, device);
+            let what = format!("level {level}, {order}, answer {answer}");
+            orders.insert(order);
+            for (n, (one, other)) in expected.iter().zip(&shown).enumerate() {
+                assert_eq!(one, other, "{what}: look {n}");
+            }
+            assert_eq!(expected.len(), shown.len(), "{what}");
         }
     }
     assert!(orders.len() > 1, "{orders:?}");
+}
+
+/// A device whose reports of one kind come later the more friction it renders.
+struct Late {
+    device: VirtualDevice,
+    /// Which reports, and how late they are at 2 N.
+    late: fn(&Report) -> Duration,
+    /// Friction of the table that is loaded, as a share of 2 N.
+    share: f64,
+    waiting: Vec<(Duration, Report)>,
+}
+
+impl Late {
+    fn new(options: Options, late: fn(&Report) -> Duration) -> Box<dyn Device> {
+        Box::new(Self {
+            device: VirtualDevice::new(options),
+            late,
+            share: 0.0,
+            waiting: Vec::new(),
+        })
+    }
+}
+
+impl Device for Late {
+    fn identity(&self) -> Identity {
+        self.device.identity()
+    }
+
+    fn load(
+        &mut self,
+        what: &Stimulus<'_>,
+        limits: Limits,
+        at: Duration,
+    ) -> Result<(), DeviceError> {
+        let level = what
+            .model
+            .rsplit('.')
+            .next()
+            .and_then(|index| index.parse::<usize>().ok());
+        self.share = level.map_or(0.0, |index| LEVELS[index - 1] / 2.0);
+        self.device.load(what, limits, at)
+    }
+
+    fn start(&mut self, at: Duration) -> Result<(), DeviceError> {
+        self.device.start(at)
+    }
+
+    fn stop(&mut self, at: Duration) -> Result<(), DeviceError> {
+        self.device.stop(at)
+    }
+
+    fn limp(&mut self, at: Duration) {
+        self.device.limp(at);
+    }
+
+    fn poll(&mut self, at: Duration) -> Vec<Report> {
+        for report in self.device.poll(at) {
+            let due = at + (self.late)(&report).mul_f64(self.share);
+            self.waiting.push((due, report));
+        }
+        let (due, waiting) = self.waiting.drain(..).partition(|(due, _)| *due <= at);
+        self.waiting = waiting;
+        let due: Vec<(Duration, Report)> = due;
+        due.into_iter().map(|(_, report)| report).collect()
+    }
+}
+
+/// The comparison above finds a delay of 0.1 s that depends on the level, and a load that takes
+/// that much longer does not show.
+#[test]
+fn a_planted_delay_of_a_level_is_found_and_that_of_a_load_is_hidden() {
+    let folder = folder_of_a_track();
+    let looks = |device| {
+        [LEVELS[0], LEVELS[5]].map(|level| looks_at_a_track(folder.path(), level, 1, 0, device).0)
+    };
+    for late in [
+        |options| Late::new(options, |r| ms_if(matches!(r, Report::Stopped(_)))),
+        |options| Late::new(options, |r| ms_if(matches!(r, Report::Started))),
+    ] as [fn(Options) -> Box<dyn Device>; 2]
+    {
+        let [least, most] = looks(late);
+        assert_ne!(least, most, "not noticed");
+    }
+    let [least, most] = looks(|options| Late::new(options, |r| ms_if(matches!(r, Report::Loaded))));
+    assert_eq!(least, most, "a load");
+}
+
+/// The planted delay, or none.
+fn ms_if(late: bool) -> Duration {
+    Duration::from_millis(if late { 105 } else { 0 })
 }

@@ -252,6 +252,8 @@ fn a_failure_restores_the_terminal_and_ends_the_program() {
     for (signal, variables) in [
         (Some(Signal::ABORT), &[][..]),
         (Some(Signal::BUS), &[]),
+        (Some(Signal::FPE), &[]),
+        (Some(Signal::ILL), &[]),
         (Some(Signal::TRAP), &[]),
         (Some(Signal::SYS), &[]),
         (Some(Signal::XCPU), &[]),

@@ -259,6 +259,42 @@ fn a_torn_tail_is_set_apart_and_the_session_goes_on() {
     }
 }
 
+/// Somebody removes the journal, or cuts it, while its session goes on: the next segment has what
+/// was acknowledged, by this process or by one before it.
+#[test]
+fn what_was_acknowledged_and_is_gone_is_written_again() {
+    for (resumed, left) in [
+        (false, None),
+        (false, Some(700)),
+        (true, None),
+        (true, Some(0)),
+    ] {
+        let disk = unfinished(if resumed { 6 } else { 0 });
+        let study = StudyFolder::open_on(Arc::new(disk.clone()), small()).unwrap();
+        let mut claimed = study.claim(&real("P01")).unwrap();
+        let mut journal = claimed.folder.journal().unwrap();
+        let events = session("P01", 1, Seat::Row(1));
+        for (event, n) in events.iter().zip(0..).take(8).skip(claimed.entries.len()) {
+            journal.append(at(n), event).unwrap();
+        }
+        match left {
+            None => disk.remove_file(&journal_path()).unwrap(),
+            Some(bytes) => disk.truncate(&journal_path(), bytes).unwrap(),
+        }
+        journal.new_segment().unwrap();
+        journal.append(at(50), &Event::Paused).unwrap();
+        drop((journal, claimed));
+        let read = study.sessions().unwrap().remove(0);
+        let entries: Vec<&Event> = read.entries.iter().map(|e| &e.event).collect();
+        let expected: Vec<&Event> = events[..8].iter().chain([&Event::Paused]).collect();
+        assert_eq!(entries, expected, "resumed: {resumed}, left: {left:?}");
+        let disk = disk.after(Crash::OnlySynced);
+        let study = StudyFolder::open_on(Arc::new(disk), small()).unwrap();
+        assert_eq!(study.sessions().unwrap()[0].entries.len(), 9);
+        assert!(!study.sessions().unwrap()[0].truncated);
+    }
+}
+
 #[test]
 fn a_damaged_line_in_the_middle_stays_and_the_session_goes_on() {
     for damaged in [0, 1, 6, 12] {

@@ -9,8 +9,8 @@ use rustix::process::{Signal, getpid, kill_process};
 use rustix::termios::{OptionalActions, Termios, tcgetattr, tcsetattr};
 use signal_hook::SigId;
 use signal_hook::consts::{
-    SIGABRT, SIGALRM, SIGBUS, SIGCONT, SIGHUP, SIGINT, SIGPROF, SIGQUIT, SIGSYS, SIGTERM, SIGTRAP,
-    SIGUSR1, SIGUSR2, SIGVTALRM, SIGXCPU,
+    SIGABRT, SIGALRM, SIGBUS, SIGCONT, SIGFPE, SIGHUP, SIGILL, SIGINT, SIGPROF, SIGQUIT, SIGSYS,
+    SIGTERM, SIGTRAP, SIGUSR1, SIGUSR2, SIGVTALRM, SIGXCPU,
 };
 use signal_hook::low_level::{emulate_default_handler, signal_name};
 use std::io;
@@ -24,8 +24,9 @@ pub(super) const SUPPORTED: bool = true;
 const ENDING: [i32; 9] = [
     SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF,
 ];
-/// Signals of a failure in the program, or of the end of its time.
-const FAILING: [i32; 5] = [SIGABRT, SIGBUS, SIGTRAP, SIGSYS, SIGXCPU];
+/// Signals of a failure in the program, or of the end of its time. SIGSEGV is left to the
+/// runtime library, which reports a stack overflow and then aborts.
+const FAILING: [i32; 7] = [SIGABRT, SIGBUS, SIGFPE, SIGILL, SIGTRAP, SIGSYS, SIGXCPU];
 
 /// What restores the screen: end of an update, mouse and paste off, colours reset, main
 /// screen, cursor shown.
@@ -117,10 +118,12 @@ fn on_failure(signal: i32, taken: &'static AtomicBool) -> io::Result<()> {
         }
         // The signal has its default effect: it ends the program.
         let _ = emulate_default_handler(signal);
+        signal_hook::low_level::abort();
     };
     // SAFETY: the handler only uses atomics and system calls that are safe in a handler
-    // (tcsetattr, poll, write, sigaction, raise); it neither allocates nor locks.
-    unsafe { signal_hook::low_level::register(signal, handler) }?;
+    // (tcsetattr, poll, write, sigaction, raise); it neither allocates nor locks. It never
+    // returns to an instruction that has failed, which SIGFPE and SIGILL require.
+    unsafe { signal_hook_registry::register_signal_unchecked(signal, handler) }?;
     Ok(())
 }
 

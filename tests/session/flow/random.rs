@@ -122,6 +122,39 @@ fn assert_unloaded(input: &Input, effects: &[Effect]) {
     }
 }
 
+/// What the device reports by itself opens no rating, except that a playback has ended: without a
+/// key nobody gets from "device ready" to a question about what was not felt.
+fn assert_not_asked(before: &Screen, input: &Input, after: &Screen) {
+    let waits = matches!(
+        before,
+        Screen::Reference { .. }
+            | Screen::Loading { .. }
+            | Screen::Playing { .. }
+            | Screen::Stopped { .. }
+            | Screen::DeviceTrouble { .. }
+    );
+    let report = matches!(
+        input,
+        Input::DeviceLoaded
+            | Input::DeviceStarted
+            | Input::DeviceReady
+            | Input::DeviceProgress { .. }
+            | Input::DeviceFault(_)
+            | Input::DeviceLost(_)
+    );
+    let asked = matches!(
+        after,
+        Screen::Form {
+            form: FormId::Trial { .. },
+            ..
+        }
+    );
+    assert!(
+        !(waits && report && asked),
+        "{input:?}: {before:?} to {after:?}"
+    );
+}
+
 pub(super) fn perform(mut rig: Rig, act: Act) -> Rig {
     match act {
         Act::Step => {
@@ -134,8 +167,10 @@ pub(super) fn perform(mut rig: Rig, act: Act) -> Rig {
         }
         Act::Send(input) => {
             rig.effects.clear();
+            let before = rig.view().screen;
             rig.send(input.clone());
             assert_unloaded(&input, &rig.effects);
+            assert_not_asked(&before, &input, &rig.view().screen);
         }
         Act::Device(mood) => rig.device = mood,
         Act::Store(mood) => rig.store = mood,

@@ -18,6 +18,7 @@ use super::receipt::Receipt;
 use super::replay::{Replay, Segment, lines_after, replay};
 use super::session_lock::SessionLock;
 use crate::outcome::{Event, Moment};
+use std::collections::BTreeSet;
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -31,6 +32,8 @@ pub struct Journal {
     segment: u32,
     next_seq: u64,
     prev: String,
+    /// The lines that are acknowledged.
+    acknowledged: Vec<Vec<u8>>,
     /// Why the current segment must not be written to any more.
     failed: Option<SegmentFailure>,
 }
@@ -64,15 +67,18 @@ impl Journal {
             segment: from.segment,
             next_seq: from.replay.next_seq,
             prev: from.replay.prev,
+            acknowledged: Vec::new(),
             failed: None,
         };
         if !from.is_new {
             journal.new_segment()?;
         }
+        journal.acknowledged = from.acknowledged;
         if !from.in_doubt.is_empty() {
             journal.write(&from.in_doubt)?;
             let last = journal.next_seq - 1;
             journal.write_head(last, &journal.prev)?;
+            journal.acknowledged.extend(from.in_doubt);
         }
         Ok(journal)
     }
@@ -130,17 +136,13 @@ impl Journal {
             return Err(e);
         }
         (self.next_seq, self.prev) = (next, prev);
+        self.acknowledged.extend(lines);
         Ok(last)
     }
 
     /// Writes lines without their line ends and returns when they are on the medium.
     fn write(&mut self, lines: &[Vec<u8>]) -> Result<(), StoreError> {
-        let written = lines.iter().try_for_each(|line| {
-            let mut line = line.clone();
-            line.push(b'\n');
-            self.file.write_all(&line)
-        });
-        written.and_then(|()| self.file.sync()).at(&self.path)
+        write_lines(self.file.as_mut(), lines).at(&self.path)
     }
 
     fn write_head(&self, seq: u64, hash: &str) -> Result<(), StoreError> {
@@ -149,7 +151,9 @@ impl Journal {
 
     /// Continues in a new file (`journal-2.jsonl`, …) of the same folder; on a full
     /// disk it first frees the reserve. The failed records must be appended again. They
-    /// keep their sequence numbers, and a reader takes two equal lines as one.
+    /// keep their sequence numbers, and a reader takes two equal lines as one. What was
+    /// acknowledged and is not there any more, because somebody removed or changed a file, is
+    /// written again.
     ///
     /// # Errors
     /// [`StoreError`]; the call can be repeated.
@@ -158,7 +162,7 @@ impl Journal {
             self.lock.free_reserve();
         }
         let mut number = self.segment + 1;
-        let (path, file) = loop {
+        let (path, mut file) = loop {
             let path = self.lock.path.join(layout::segment(number));
             match self.lock.disk.create(&path) {
                 Ok(file) => break (path, file),
@@ -170,11 +174,29 @@ impl Journal {
             .disk
             .sync_folder(&self.lock.path)
             .at(&self.lock.path)?;
+        let lost = self.lost()?;
+        if !lost.is_empty() {
+            write_lines(file.as_mut(), &lost).at(&path)?;
+        }
         self.file = file;
         self.path = path;
         self.segment = number;
         self.failed = None;
         Ok(())
+    }
+
+    /// The acknowledged lines that are in no segment.
+    fn lost(&self) -> Result<Vec<Vec<u8>>, StoreError> {
+        if self.acknowledged.is_empty() {
+            return Ok(Vec::new());
+        }
+        let segments = segments(self.lock.disk.as_ref(), &self.lock.path)?;
+        let there: BTreeSet<Vec<u8>> = lines_after(&segments, None).into_iter().collect();
+        let lost = self.acknowledged.iter();
+        Ok(lost
+            .filter(|line| !there.contains(*line))
+            .cloned()
+            .collect())
     }
 
     /// Writes `receipt.json`: what this journal contains now that the session is left.
@@ -190,6 +212,14 @@ impl Journal {
         receipt.write(self.lock.disk.as_ref(), &self.lock.path)?;
         Ok(Some(receipt))
     }
+}
+
+/// Writes lines without their line ends and returns when they are on the medium.
+fn write_lines(file: &mut dyn Appender, lines: &[Vec<u8>]) -> io::Result<()> {
+    for line in lines {
+        file.write_all(&[line, &b"\n"[..]].concat())?;
+    }
+    file.sync()
 }
 
 /// The segments of a journal, in order; none if there is no journal.
@@ -222,7 +252,8 @@ pub(super) struct Recovered {
     segment: u32,
     /// Whether this process created it.
     is_new: bool,
-    /// The lines that were not acknowledged.
+    /// The lines that were acknowledged, and those that were not.
+    acknowledged: Vec<Vec<u8>>,
     in_doubt: Vec<Vec<u8>>,
     pub(super) replay: Replay,
     /// Messages to the operator about repairs and damage.
@@ -285,12 +316,16 @@ pub(super) fn recover(lock: &SessionLock) -> Result<Recovered, StoreError> {
     }
     notices.extend(replay.damage.iter().map(ToString::to_string));
     let last = segments.last();
+    let in_doubt = lines_after(&segments, head.head().map(|head| head.seq));
+    let mut acknowledged = lines_after(&segments, None);
+    acknowledged.truncate(acknowledged.len() - in_doubt.len());
     Ok(Recovered {
         segment: last
             .and_then(|s| layout::segment_number(&s.name))
             .unwrap_or(1),
         is_new,
-        in_doubt: lines_after(&segments, head.head().map(|head| head.seq)),
+        acknowledged,
+        in_doubt,
         replay,
         notices,
     })
