@@ -25,7 +25,8 @@ mod tests {
 
     #[test]
     fn a_load_ends_with_its_slot_and_before_the_session_gives_up() {
-        let ends = |took| end_of_slot(Duration::from_secs(7), Duration::from_millis(7000 + took));
+        let ends =
+            |took: u64| end_of_slot(Duration::from_secs(7), Duration::from_millis(7000 + took));
         let slots = [
             (0, 500),
             (1, 500),
