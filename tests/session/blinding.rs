@@ -374,7 +374,7 @@ struct Late {
 }
 
 impl Late {
-    fn new(options: Options, late: fn(&Report) -> Duration) -> Box<dyn Device> {
+    fn of(options: Options, late: fn(&Report) -> Duration) -> Box<dyn Device> {
         Box::new(Self {
             device: VirtualDevice::new(options),
             late,
@@ -437,14 +437,14 @@ fn a_planted_delay_of_a_level_is_found_and_that_of_a_load_is_hidden() {
         [LEVELS[0], LEVELS[5]].map(|level| looks_at_a_track(folder.path(), level, 1, 0, device).0)
     };
     for late in [
-        |options| Late::new(options, |r| ms_if(matches!(r, Report::Stopped(_)))),
-        |options| Late::new(options, |r| ms_if(matches!(r, Report::Started))),
+        |options| Late::of(options, |r| ms_if(matches!(r, Report::Stopped(_)))),
+        |options| Late::of(options, |r| ms_if(matches!(r, Report::Started))),
     ] as [fn(Options) -> Box<dyn Device>; 2]
     {
         let [least, most] = looks(late);
         assert_ne!(least, most, "not noticed");
     }
-    let [least, most] = looks(|options| Late::new(options, |r| ms_if(matches!(r, Report::Loaded))));
+    let [least, most] = looks(|options| Late::of(options, |r| ms_if(matches!(r, Report::Loaded))));
     assert_eq!(least, most, "a load");
 }
 
