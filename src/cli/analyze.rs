@@ -382,7 +382,15 @@ fn of_study(
         ..Rules::of(protocol, question.as_str(), include(args))
     };
     let source = source_of(study, protocol);
-    let analysis = progress::analyze(&ratings, &rules);
+    let mut analysis = progress::analyze(&ratings, &rules);
+    let shares = protocol.analysis.share_of(&question).map(|option| Warning {
+        code: "shares",
+        text: format!(
+            "numbers are shares: 1 for the answer “{option}”, and 0 for any other; t tests of shares are \
+             approximate, and the ordinal model is a logistic one"
+        ),
+    });
+    analysis.warnings.splice(0..0, shares);
     let written = !args.json || args.out.is_some();
     Ok(Analysed {
         source,
@@ -400,7 +408,8 @@ fn of_study(
 /// The answers to a question, with what the protocol and the model files say of the
 /// realizations.
 fn ratings(loaded: &Loaded, derived: &Derived, question: &QuestionId) -> Ratings {
-    let mut ratings = Ratings::from_rows(&derived.rows, question);
+    let share_of = loaded.protocol.analysis.share_of(question);
+    let mut ratings = Ratings::from_rows(&derived.rows, question, share_of);
     ratings.set_states(&derived.participants);
     ratings.set_failed(&derived.rows, &derived.attempts);
     describe_realizations(&mut ratings, loaded);
@@ -438,7 +447,7 @@ fn question(protocol: &Protocol, asked: Option<&str>) -> Result<QuestionId, Fail
     let numeric: Vec<&str> = protocol
         .questions
         .iter()
-        .filter(|q| q.kind.is_number())
+        .filter(|q| q.kind.is_number() || protocol.analysis.share_of(&q.id).is_some())
         .map(|q| q.id.as_str())
         .collect();
     if numeric.contains(&id.as_str()) {

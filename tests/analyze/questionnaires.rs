@@ -116,3 +116,46 @@ fn magnitudes_of_realizations_are_estimated_and_compared() {
         "{out}"
     );
 }
+
+/// A question of yes and no as the primary one: means are shares of the stated answer.
+#[test]
+fn the_share_of_an_answer_is_analyzed() {
+    let folder = tempfile::tempdir().unwrap();
+    let (code, _, err) = study(&["new", "s"], folder.path());
+    assert_eq!(code, 0, "{err}");
+    let path = folder.path().join("s/protocol.toml");
+    let text = fs::read_to_string(&path).unwrap();
+    let (head, rest) = text.split_once("kind = \"rating\"").unwrap();
+    let (_, rest) = rest.split_once("very realistic\" }\n").unwrap();
+    let choice =
+        "kind = \"choice\"\nprompt = \"Was it the switch?\"\noptions = [\"yes\", \"no\"]\n";
+    let text = format!("{head}{choice}{rest}")
+        .replace(
+            "primary = \"realism\"",
+            "primary = \"realism\"\nshare_of = \"yes\"",
+        )
+        .replace("realistic_from", "# realistic_from");
+    fs::write(&path, text).unwrap();
+    let arguments = ["rehearse", "s", "--participants", "5", "--out", "out"];
+    let (code, _, err) = study(&arguments, folder.path());
+    assert_eq!(code, 0, "{err}");
+    let document = document(folder.path());
+    let given = cells(
+        &folder.path().join("out/s/ratings.csv"),
+        &["model", "realism"],
+    );
+    for model in ["lambda-0.9991", "lambda-0.9995", "lambda-0.9999"] {
+        let own: Vec<bool> = (given.iter().filter(|row| row[0] == model))
+            .map(|row| row[1] == "yes")
+            .collect();
+        assert_eq!(own.len(), 15);
+        let share = own.iter().filter(|yes| **yes).count() as f64 / 15.0;
+        let mean = document["values"][format!("desc/{model}/mean")]
+            .as_f64()
+            .unwrap();
+        assert!((mean - share).abs() < 1e-12, "{model}: {mean} {share}");
+    }
+    let (code, out, err) = study(&["analyze", "out"], folder.path());
+    assert_eq!(code, 0, "{err}");
+    assert!(out.contains("1 for the answer “yes”"), "{out}");
+}

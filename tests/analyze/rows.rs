@@ -106,7 +106,7 @@ fn two() -> Vec<RatingRow> {
 }
 
 fn ratings(rows: &[RatingRow], participants: &[ParticipantRow]) -> Ratings {
-    let mut ratings = Ratings::from_rows(rows, &id("realism"));
+    let mut ratings = Ratings::from_rows(rows, &id("realism"), None);
     ratings.set_states(participants);
     ratings
 }

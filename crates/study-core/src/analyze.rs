@@ -137,9 +137,11 @@ impl Rules {
             scale: asked.and_then(|q| match &q.kind {
                 QuestionKind::Rating { from, to, .. } => Some((*from as f64, *to as f64)),
                 QuestionKind::Slider { from, to, .. } => Some((*from, *to)),
-                QuestionKind::Choice { .. } | QuestionKind::Number { .. } | QuestionKind::Text => {
-                    None
+                // The share of an answer.
+                QuestionKind::Choice { .. } => {
+                    protocol.analysis.share_of(&q.id).map(|_| (0.0, 1.0))
                 }
+                QuestionKind::Number { .. } | QuestionKind::Text => None,
             }),
             unfinished: protocol.analysis.unfinished,
             include,

@@ -408,6 +408,10 @@ pub struct AnalysisRules {
     pub primary: QuestionId,
     /// The recording whose VAF counts, by its name in the model files.
     pub vaf: Option<String>,
+    /// The option of a primary question of choice whose share is analyzed. Not part of the
+    /// fingerprint if absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub share_of: Option<String>,
     /// Least rating that counts as realistic.
     pub realistic_from: Option<f64>,
     /// Margin of the equivalence test against a hidden reference, in points of the
@@ -433,6 +437,13 @@ pub struct AnalysisRules {
 }
 
 impl AnalysisRules {
+    /// The option whose share is analyzed, for the primary question only.
+    pub fn share_of(&self, question: &QuestionId) -> Option<&str> {
+        self.share_of
+            .as_deref()
+            .filter(|_| *question == self.primary)
+    }
+
     /// The level of significance.
     pub fn alpha(&self) -> f64 {
         self.alpha.unwrap_or(ALPHA)

@@ -336,7 +336,8 @@ fn pilot(
         let loaded = study_folder::frozen(&study)?;
         let derived = Derived::of(&study.sessions()?, &loaded.protocol);
         let question = loaded.protocol.analysis.primary.clone();
-        let mut ratings = Ratings::from_rows(&derived.rows, &question);
+        let share_of = loaded.protocol.analysis.share_of(&question);
+        let mut ratings = Ratings::from_rows(&derived.rows, &question, share_of);
         ratings.set_states(&derived.participants);
         let rules = Rules::of(&loaded.protocol, question.as_str(), include);
         (ratings, rules)

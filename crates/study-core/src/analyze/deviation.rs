@@ -34,6 +34,7 @@ pub fn deviations(before: &Protocol, after: &Protocol) -> Vec<Deviation> {
     let AnalysisRules {
         primary,
         vaf,
+        share_of,
         realistic_from,
         equivalence_margin,
         equivalence_r,
@@ -64,6 +65,12 @@ pub fn deviations(before: &Protocol, after: &Protocol) -> Vec<Deviation> {
         primary.to_string(),
     );
     compare("vaf", &[], shown(&b.vaf), shown(vaf));
+    compare(
+        "share_of",
+        &PreregisteredRule::ALL,
+        shown(&b.share_of),
+        shown(share_of),
+    );
     compare(
         "realistic_from",
         &[PreregisteredRule::RealisticFrom],

@@ -116,7 +116,7 @@ fn sha256(bytes: &[u8]) -> String {
 fn analysis(job: &Job<'_>) -> Option<Analysis> {
     let protocol = job.source.protocol;
     let question = protocol.primary().filter(|q| q.kind.is_number())?;
-    let mut ratings = Ratings::from_rows(&job.selected.rows, &question.id);
+    let mut ratings = Ratings::from_rows(&job.selected.rows, &question.id, None);
     ratings.set_states(&job.selected.participants);
     ratings.set_duplicates(protocol.models.iter().filter_map(|m| {
         let original = m.duplicate_of.as_ref()?;

@@ -228,8 +228,14 @@ impl Practice {
 impl Ratings {
     /// The ratings in the rows of a study: the answers to one question. Trials of tracks
     /// and of several intervals are no ratings of a realization.
-    pub fn from_rows(rows: &[RatingRow], question: &QuestionId) -> Self {
+    pub fn from_rows(rows: &[RatingRow], question: &QuestionId, share_of: Option<&str>) -> Self {
         let mut builder = Builder::new(question.to_string());
+        let number = |answer: &Answer| match (answer, share_of) {
+            (Answer::Choice(chosen), Some(option)) => {
+                Some(f64::from(u8::from(chosen.iter().any(|c| c == option))))
+            }
+            _ => answer.number(),
+        };
         for (i, r) in rows.iter().enumerate() {
             let Some(rated) = r.model.as_ref().filter(|_| r.track.is_none()) else {
                 continue;
@@ -240,7 +246,7 @@ impl Ratings {
                 subject: 0,
                 model: None,
                 repetition: Some(r.repetition),
-                rating: answer.and_then(Answer::number).filter(|v| v.is_finite()),
+                rating: answer.and_then(number).filter(|v| v.is_finite()),
                 vaf: r.vaf.filter(|v| v.is_finite()),
                 trial_index: r.position,
                 origin,

@@ -358,7 +358,7 @@ mod tests {
             let table = csv(&columns, &rows).unwrap();
             for asked in [None, Some("realism"), Some("effort")] {
                 let read = Ratings::read_csv("ratings.csv", &table[..], asked).unwrap();
-                let wanted = Ratings::from_rows(&rows, &question(asked.unwrap_or("realism")));
+                let wanted = Ratings::from_rows(&rows, &question(asked.unwrap_or("realism")), None);
                 prop_assert_eq!(read, wanted);
             }
         }

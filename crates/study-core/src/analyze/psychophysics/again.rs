@@ -64,58 +64,79 @@ fn complete<'a>(
         .collect()
 }
 
+/// What the groups have in common, and who has all of it.
+struct Common<'a> {
+    cells: BTreeSet<Cell<'a>>,
+    /// Of each group the numbers of its participants in these cells, in their order.
+    groups: BTreeMap<&'a str, Vec<Vec<f64>>>,
+}
+
+impl<'a> Common<'a> {
+    fn of(measured: &'a [Measured]) -> Self {
+        let names: BTreeSet<&str> = measured.iter().filter_map(|m| m.group.as_deref()).collect();
+        // What somebody of every group has.
+        let has = |group: &&'a str| -> BTreeSet<Cell<'a>> {
+            let own = measured
+                .iter()
+                .filter(|m| m.group.as_deref() == Some(group));
+            own.map(|m| (m.condition.as_str(), m.session.as_deref()))
+                .collect()
+        };
+        let all = names.iter().map(has).reduce(|a, b| &a & &b);
+        let cells = all.unwrap_or_default();
+        let group_of: BTreeMap<&str, &str> = (measured.iter())
+            .filter_map(|m| Some((m.participant.as_str(), m.group.as_deref()?)))
+            .collect();
+        let mut groups: BTreeMap<&str, Vec<Vec<f64>>> =
+            names.iter().map(|g| (*g, Vec::new())).collect();
+        if !cells.is_empty() {
+            for (who, row) in complete(measured, &cells) {
+                if let Some(own) = group_of.get(who).and_then(|g| groups.get_mut(g)) {
+                    own.push(row);
+                }
+            }
+        }
+        Self { cells, groups }
+    }
+}
+
+/// Groups by conditions only, of numbers whose mean over the conditions says nothing of a
+/// participant.
+pub(super) fn by_condition(measured: &[Measured], values: &mut Values) {
+    if measured.iter().any(|m| m.group.is_some()) {
+        profiles(&Common::of(measured), values);
+    }
+}
+
 fn between_groups(measured: &[Measured], ratios: bool, usable: bool, values: &mut Values) {
     let shown = |x: f64| if ratios { libm::exp(x) } else { x };
-    let names: BTreeSet<&str> = measured.iter().filter_map(|m| m.group.as_deref()).collect();
-    // What somebody of every group has.
-    let has = |group: &str| -> BTreeSet<Cell<'_>> {
-        let own = measured
-            .iter()
-            .filter(|m| m.group.as_deref() == Some(group));
-        own.map(|m| (m.condition.as_str(), m.session.as_deref()))
-            .collect()
+    let all = Common::of(measured);
+    if usable {
+        profiles(&all, values);
+    }
+    let means = |rows: &Vec<Vec<f64>>| -> Vec<f64> {
+        let rows = rows.iter().filter(|_| usable);
+        rows.filter_map(|row| mean(row)).collect()
     };
-    let common = names
-        .iter()
-        .map(|g| has(g))
-        .reduce(|a, b| &a & &b)
-        .unwrap_or_default();
-    let group_of: BTreeMap<&str, &str> = (measured.iter())
-        .filter_map(|m| Some((m.participant.as_str(), m.group.as_deref()?)))
-        .collect();
-    let mut groups: BTreeMap<&str, Vec<f64>> = names.iter().map(|g| (*g, Vec::new())).collect();
-    let mut rows: BTreeMap<&str, Vec<Vec<f64>>> = BTreeMap::new();
-    if usable && !common.is_empty() {
-        for (who, own) in complete(measured, &common) {
-            let Some(group) = group_of.get(who) else {
-                continue;
-            };
-            groups.entry(group).or_default().extend(mean(&own));
-            rows.entry(group).or_default().push(own);
-        }
-    }
-    let conditions: BTreeSet<&str> = common.iter().map(|(condition, _)| *condition).collect();
-    if conditions.len() > 1 && names.len() > 1 {
-        let rows: Vec<Vec<Vec<f64>>> = rows.into_values().collect();
-        profiles(&rows, (&common, &conditions), names.len(), values);
-    }
+    let groups = all.groups.iter().map(|(group, rows)| (*group, means(rows)));
+    let groups: BTreeMap<&str, Vec<f64>> = groups.collect();
     let x: Vec<&Vec<f64>> = groups.values().collect();
     let test = welch::one_way(&x);
     let why = if !usable {
         NOT_POSITIVE
-    } else if names.len() < 2 {
+    } else if groups.len() < 2 {
         "there is only one group"
-    } else if common.is_empty() {
+    } else if all.cells.is_empty() {
         "the groups have no condition in common"
     } else {
         "a group has fewer than two participants, or they are all alike"
     };
-    let mut all = values.group("groups", why);
-    all.put("n_cells", common.len() as f64);
-    all.maybe("F", test.map(|t| t.f));
-    all.maybe("df1", test.map(|t| t.df1));
-    all.maybe("df2", test.map(|t| t.df2));
-    all.maybe("p", test.and_then(|t| t.p));
+    let mut group = values.group("groups", why);
+    group.put("n_cells", all.cells.len() as f64);
+    group.maybe("F", test.map(|t| t.f));
+    group.maybe("df1", test.map(|t| t.df1));
+    group.maybe("df2", test.map(|t| t.df2));
+    group.maybe("p", test.and_then(|t| t.p));
     let (centre, difference) = match ratios {
         true => ("geometric_mean", "ratio"),
         false => ("mean", "difference"),
@@ -147,34 +168,36 @@ fn between_groups(measured: &[Measured], ratios: bool, usable: bool, values: &mu
 }
 
 /// Whether what the conditions do depends on the group: the interaction of both, of each
-/// participant's means over the sessions.
-fn profiles(
-    groups: &[Vec<Vec<f64>>],
-    (cells, conditions): (&BTreeSet<Cell<'_>>, &BTreeSet<&str>),
-    n_groups: usize,
-    values: &mut Values,
-) {
+/// participant's means over the sessions. Nothing of one group or one condition.
+fn profiles(common: &Common<'_>, values: &mut Values) {
+    let conditions: BTreeSet<&str> = common.cells.iter().map(|(c, _)| *c).collect();
+    if conditions.len() < 2 || common.groups.len() < 2 {
+        return;
+    }
     let of_conditions = |row: &Vec<f64>| -> Vec<f64> {
         let of = |condition: &&str| {
-            let own = cells.iter().zip(row).filter(|((c, _), _)| c == condition);
+            let own = common
+                .cells
+                .iter()
+                .zip(row)
+                .filter(|((c, _), _)| c == condition);
             mean(&own.map(|(_, x)| *x).collect::<Vec<_>>())
         };
         conditions.iter().filter_map(of).collect()
     };
-    let rows: Vec<Vec<Vec<f64>>> = (groups.iter())
+    let rows: Vec<Vec<Vec<f64>>> = (common.groups.values())
         .map(|group| group.iter().map(of_conditions).collect())
         .collect();
-    let all_groups = rows.len() == n_groups;
-    let found = if all_groups {
-        between::profiles(&rows)
-    } else {
-        None
+    // A group without anybody has no profile.
+    let found = match rows.iter().any(Vec::is_empty) {
+        true => None,
+        false => between::profiles(&rows),
     };
+    let found = found.as_ref();
     let why = "too few participants have all conditions that the groups have in common";
     let mut group = values.group("groups_conditions", why);
     group.put("n_conditions", conditions.len() as f64);
     group.put("n", rows.iter().map(Vec::len).sum::<usize>() as f64);
-    let found = found.as_ref();
     group.maybe("F", found.and_then(|f| f.f));
     group.maybe("df1", found.map(|f| f.df1));
     group.maybe("df2", found.map(|f| f.df2));
@@ -388,6 +411,44 @@ mod tests {
         let mut values = Values::default();
         again(&rows[..1], &[], false, &mut values);
         assert_eq!(values.get("groups_conditions/F"), None);
+    }
+
+    /// By condition, what the participants differ by in all conditions does not matter.
+    #[test]
+    fn groups_by_conditions_do_not_depend_on_the_level_of_a_participant() {
+        let row = |who: &str, group: &str, condition: &str, value| Measured {
+            participant: who.to_owned(),
+            group: Some(group.to_owned()),
+            session: None,
+            condition: condition.to_owned(),
+            value,
+        };
+        let own = [
+            ("A", "x", [0.2, 0.8]),
+            ("B", "x", [0.3, 0.7]),
+            ("C", "y", [0.6, 0.4]),
+            ("D", "y", [0.9, 0.1]),
+        ];
+        let of = |shift: f64| {
+            let rows = own.iter().enumerate().flat_map(|(i, (who, group, x))| {
+                let up = shift * i as f64;
+                [
+                    row(who, group, "a", x[0] + up),
+                    row(who, group, "b", x[1] + up),
+                ]
+            });
+            let mut values = Values::default();
+            by_condition(&rows.collect::<Vec<_>>(), &mut values);
+            assert!(
+                values
+                    .iter()
+                    .all(|(id, _)| id.starts_with("groups_conditions/"))
+            );
+            values.number("groups_conditions/F").unwrap()
+        };
+        // t² of the differences -.6, -.4 against .2, .8 with 2 degrees of freedom.
+        assert!((of(0.0) - 10.0).abs() < 1e-9, "{}", of(0.0));
+        assert!((of(5.0) - 10.0).abs() < 1e-9);
     }
 
     #[test]

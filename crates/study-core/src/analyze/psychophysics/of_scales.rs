@@ -1,6 +1,7 @@
 //! Magnitude estimation and MUSHRA of a study.
 
-use super::part_data::{Found, PartData};
+use super::again::{Measured, by_condition};
+use super::part_data::{Found, PartData, groups};
 use super::scales::{
     MagnitudeRow, MushraRoles, MushraRow, RealizationRow, magnitude, mushra, realizations,
 };
@@ -9,8 +10,9 @@ use crate::analyze::{Rules, vaf};
 use crate::outcome::RatingRow;
 use crate::protocol::parts::{Part, Presentations};
 use crate::protocol::{Protocol, Role};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use study_base::text::ModelId;
+use study_stats::describe::mean;
 use study_stats::mushra::Screening;
 
 /// The estimates of a part: of levels, or of realizations.
@@ -58,6 +60,22 @@ fn of_realizations(protocol: &Protocol, part: &Part, rows: &[&RatingRow], rules:
     };
     let estimates: Vec<RealizationRow> = rows.iter().filter_map(estimate).collect();
     let mut values = realizations(&estimates);
+    let groups = groups(rows);
+    let mut logs: BTreeMap<(&str, &str), Vec<f64>> = BTreeMap::new();
+    for e in estimates.iter().filter(|e| e.estimate > 0.0) {
+        let cell = (e.participant.as_str(), e.realization.as_str());
+        logs.entry(cell).or_default().push(libm::log(e.estimate));
+    }
+    let measured = logs.iter().filter_map(|((who, realization), logs)| {
+        Some(Measured {
+            participant: (*who).to_owned(),
+            group: groups.get(*who).cloned(),
+            session: None,
+            condition: (*realization).to_owned(),
+            value: mean(logs)?,
+        })
+    });
+    by_condition(&measured.collect::<Vec<_>>(), &mut values);
     let felt: BTreeSet<&str> = estimates.iter().map(|e| e.realization.as_str()).collect();
     let with_vaf = protocol.models.iter().filter_map(|m| {
         let id = m.id.as_str();

@@ -1,6 +1,6 @@
 //! The tracks and pairs of a study.
 
-use super::again::{Measured, again};
+use super::again::{Measured, again, by_condition};
 use super::discriminations::of_tracks;
 use super::excluded;
 use super::findings::{
@@ -82,16 +82,25 @@ pub fn parts(study: &StudyData<'_>, include: Include) -> Vec<PartAnalysis> {
         findings.extend(of_sensitivities(&facts, &told));
         findings.extend(of_groups_and_sessions(&facts));
         let uncompared = match part.task {
-            Task::Pairs(_) => Some("its abilities are those of all participants together"),
-            Task::Magnitude(_) => Some("each participant has numbers of their own"),
-            Task::Mushra(_) => Some("its means are those of all participants together"),
+            Task::Pairs(_) => Some(
+                "groups are compared by what they prefer, and sessions are not compared: abilities are those of \
+                 all participants and sessions together",
+            ),
+            Task::Magnitude(_) => Some(
+                "groups are compared by condition only, and sessions are not compared: each participant has \
+                 numbers of their own",
+            ),
+            Task::Mushra(_) => Some(
+                "groups and sessions are not compared in this part: its means are those of all participants \
+                 together",
+            ),
             Task::Rating(_) | Task::Discrimination { .. } => None,
         };
         let several = protocol.groups.is_some() || sessions_of(protocol, part).len() > 1;
-        if let Some(why) = uncompared.filter(|_| several) {
+        if let Some(text) = uncompared.filter(|_| several) {
             own.warnings.push(Warning {
                 code: "groups-not-compared",
-                text: format!("groups and sessions are not compared in this part: {why}"),
+                text: text.to_owned(),
             });
         }
         Some(PartAnalysis {
@@ -230,6 +239,7 @@ fn of_pairs(
     let chosen = |row: &&RatingRow| preference(part, row, intervals);
     let chosen: Vec<Preference> = rows.iter().filter_map(chosen).collect();
     let mut values = preferences(&chosen, pairs.tie, in_both_orders(&chosen));
+    by_condition(&shares(&chosen, &groups(rows)), &mut values);
     let names: BTreeSet<&String> = chosen.iter().flat_map(|p| [&p.first, &p.second]).collect();
     let models = study.protocol.models.iter();
     let vaf: BTreeMap<String, f64> = models
@@ -250,6 +260,31 @@ fn of_pairs(
             ..PartData::default()
         },
     }
+}
+
+/// How large a share of their comparisons each participant's realizations win; a tie is half a
+/// win.
+fn shares(chosen: &[Preference], groups: &BTreeMap<String, String>) -> Vec<Measured> {
+    let mut won: BTreeMap<(&str, &str), (f64, f64)> = BTreeMap::new();
+    for p in chosen {
+        let first = match p.choice {
+            Choice::First(_) => 1.0,
+            Choice::Second(_) => 0.0,
+            Choice::Tie(_) => 0.5,
+        };
+        for (item, share) in [(&p.first, first), (&p.second, 1.0 - first)] {
+            let cell = won.entry((&p.participant, item)).or_default();
+            *cell = (cell.0 + share, cell.1 + 1.0);
+        }
+    }
+    let one = |((who, item), (won, of)): ((&str, &str), (f64, f64))| Measured {
+        participant: who.to_owned(),
+        group: groups.get(who).cloned(),
+        session: None,
+        condition: item.to_owned(),
+        value: won / of,
+    };
+    won.into_iter().map(one).collect()
 }
 
 /// The correlation of abilities with VAF over realizations, as that of mean ratings.

@@ -302,6 +302,19 @@ impl Sections<'_> {
             let fault = unknown("question", primary.as_str(), ids.map(QuestionId::as_str));
             return document.fault(fault.at(place));
         };
+        let no_effect = |key: &str, why: &str| {
+            let what = format!("`analysis.{key}` has no effect: `{primary}` is {why}");
+            let place = document.span_of(&format!("analysis.{key}"));
+            document.fault(Fault::error(what).at(place));
+        };
+        let of_part = question.path.starts_with("parts[");
+        let is_choice = matches!(question.kind, Some(QuestionKind::Choice { .. }));
+        if analysis.share_of.is_some() && (of_part || !is_choice) && question.kind.is_some() {
+            no_effect("share_of", "no choice of [[questions]]");
+        }
+        if analysis.realistic_from.is_some() && is_choice {
+            no_effect("realistic_from", "a choice");
+        }
         let (from, to) = match &question.kind {
             Some(QuestionKind::Rating { from, to, .. }) => (*from as f64, *to as f64),
             Some(QuestionKind::Slider { from, to, .. }) => (*from, *to),
@@ -310,21 +323,31 @@ impl Sections<'_> {
                 max.unwrap_or(f64::INFINITY),
             ),
             // Of pairs and of discrimination, which have analyses of their own.
-            Some(QuestionKind::Choice { .. }) if question.path.starts_with("parts[") => {
-                if analysis.realistic_from.is_some() {
-                    let what =
-                        format!("`analysis.realistic_from` has no effect: `{primary}` is a choice");
-                    let place = document.span_of("analysis.realistic_from");
-                    document.fault(Fault::error(what).at(place));
-                }
-                return;
+            Some(QuestionKind::Choice { .. }) if of_part => return,
+            Some(QuestionKind::Choice {
+                options,
+                multiple: false,
+            }) => {
+                let (given, fault) = match &analysis.share_of {
+                    Some(given) if options.contains(given) => return,
+                    Some(given) => {
+                        let known = options.iter().map(String::as_str);
+                        ("analysis.share_of", unknown("option", given, known))
+                    }
+                    None => {
+                        let what = format!("`{primary}` is a choice: the share of which answer?");
+                        ("analysis.primary", Fault::error(what))
+                    }
+                };
+                let options: Vec<String> = options.iter().map(|o| format!("{o:?}")).collect();
+                let hint = format!("share_of in [analysis] is one of {}", options.join(", "));
+                return document.fault(fault.at(document.span_of(given)).hint(hint));
             }
             Some(QuestionKind::Choice { .. } | QuestionKind::Text) => {
                 let what = "cannot be the primary question: its answers are not numbers";
                 let fault = Fault::error(format!("`{primary}` {what}")).at(place);
-                let hint = "a rating, a slider or a number can, and a part of kind \"pairs\" or \
-                            \"discrimination\", such as one of yes-no trials";
-                return document.fault(fault.hint(hint));
+                return document
+                    .fault(fault.hint("a rating, a slider, a number or a choice of one can"));
             }
             None => return,
         };

@@ -7,11 +7,14 @@ use std::ops::Bound;
 
 pub(super) const ANALYSIS: &[Key] = keys! {
     /// The id of the question that the analysis is about: a rating, a slider or a number
-    /// of `[[questions]]`.
+    /// of `[[questions]]`, a choice with `share_of`, or a part that has an answer of its own.
     "primary": Kind::Id(Id::Question), r#""realism""#, required;
     /// The recording whose VAF counts, by its name in the model files; the same for all
     /// realizations. Needed if a model file has several.
     "vaf": Kind::Text, r#""validation-1.5hz""#;
+    /// The option whose share is analyzed, where the primary question is a choice: this answer
+    /// is 1, and every other is 0.
+    "share_of": Kind::Text, r#""yes""#;
     /// The least rating that counts as realistic. It has to be on the primary scale.
     "realistic_from": Kind::ANY_NUMBER, "5";
     /// The margin of the tests of equivalence, between realizations, against a hidden
@@ -98,6 +101,7 @@ const RULES: [Variant<Exclusion>; 6] = [
 pub(super) fn read(mut section: Section<'_, '_>) -> Option<AnalysisRules> {
     let primary = section.question_id("primary");
     let vaf = section.text("vaf");
+    let share_of = section.text("share_of");
     let realistic_from = section.number("realistic_from");
     let equivalence_margin = section.number("equivalence_margin");
     let equivalence_r = section.number("equivalence_r");
@@ -110,6 +114,7 @@ pub(super) fn read(mut section: Section<'_, '_>) -> Option<AnalysisRules> {
     Some(AnalysisRules {
         primary: primary?,
         vaf,
+        share_of,
         realistic_from,
         equivalence_margin,
         equivalence_r,

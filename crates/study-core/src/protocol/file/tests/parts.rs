@@ -479,7 +479,7 @@ fn a_staircase_begins_above_its_standard() {
 }
 
 #[test]
-fn a_choice_of_a_rating_part_is_no_primary_question() {
+fn a_choice_is_the_primary_question_by_the_share_of_an_answer() {
     let choice = "id = \"sure\"\nkind = \"choice\"\noptions = [\"yes\", \"no\"]\nprompt = \"?\"\n";
     let text = PARTS
         .replace(
@@ -487,13 +487,31 @@ fn a_choice_of_a_rating_part_is_no_primary_question() {
             choice,
         )
         .replace("primary = \"pairs\"", "primary = \"sure\"");
-    let parsed = parse("p", &text);
-    let messages: Vec<&str> = (parsed.findings.faults.iter())
-        .map(|f| f.message.as_str())
-        .collect();
+    let messages = |text: &str| -> Vec<String> {
+        let faults = parse("p", text).findings.faults;
+        faults.into_iter().map(|f| f.message).collect()
+    };
+    let primary =
+        |more: &str| text.replace("primary = \"sure\"", &format!("primary = \"sure\", {more}"));
     assert_eq!(
-        messages,
-        ["`sure` cannot be the primary question: its answers are not numbers"]
+        messages(&text),
+        ["`sure` is a choice: the share of which answer?"]
+    );
+    assert_eq!(
+        messages(&primary("share_of = \"yess\"")),
+        ["there is no option `yess`"]
+    );
+    assert!(messages(&primary("share_of = \"yes\"")).is_empty());
+    assert_eq!(
+        messages(&primary("share_of = \"yes\", realistic_from = 1")),
+        ["`analysis.realistic_from` has no effect: `sure` is a choice"]
+    );
+    assert_eq!(
+        messages(&text.replace(
+            "primary = \"sure\"",
+            "primary = \"realism\", share_of = \"yes\""
+        )),
+        ["`analysis.share_of` has no effect: `realism` is no choice of [[questions]]"]
     );
     let found = changed(
         "primary = \"pairs\"",
