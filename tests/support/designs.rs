@@ -74,6 +74,7 @@ pub(crate) fn design(models: usize, repetitions: u32, order: Order) -> Protocol 
         analysis: AnalysisRules {
             primary: QuestionId::new("realism").expect("an identifier"),
             vaf: None,
+            share_of: None,
             realistic_from: None,
             equivalence_margin: None,
             equivalence_r: None,
