@@ -242,7 +242,7 @@ fn write(out: &Path, report: &Report) -> Result<(), Failure> {
     let mut files = vec![("power.json", text.into_bytes())];
     if let Some(figure) = figure(report) {
         let picture = figure.picture();
-        let png = Painter::default().png(picture);
+        let png = Painter::default().png(&picture);
         files.push(("power.svg", picture.to_svg().into_bytes()));
         files.push(("power.pdf", picture.to_pdf()));
         files.push((

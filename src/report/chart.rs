@@ -24,7 +24,6 @@ pub(in crate::report) use frame::{for_names, widest};
 pub use look::{Dash, Look, PALETTE, Scale, Shape};
 
 use super::picture::Picture;
-use std::sync::OnceLock;
 use study_base::text::{Untrusted, cut_middle};
 
 /// Size of tick labels and notes, px: 8 pt on paper.
@@ -40,9 +39,6 @@ pub struct Figure {
     pub id: String,
     /// Text alternative for screen readers. Untrusted.
     pub title: String,
-    /// What a reader of the file must know, such as that the data are simulated.
-    /// Untrusted.
-    pub note: Option<String>,
     /// Width, px.
     pub width: f64,
     /// Height, px.
@@ -51,8 +47,6 @@ pub struct Figure {
     pub columns: usize,
     /// Panels, row by row.
     pub panels: Vec<Panel>,
-    /// Drawn once, for the report and for all files.
-    picture: OnceLock<Picture>,
 }
 
 /// Axes and the marks on them.
@@ -176,19 +170,16 @@ impl Figure {
         Self {
             id: id.to_owned(),
             title: title.to_owned(),
-            note: None,
             width,
             height,
             columns: 1,
             panels: Vec::new(),
-            picture: OnceLock::new(),
         }
     }
 
     /// Adds a panel.
     #[must_use]
     pub fn with(mut self, panel: Panel) -> Self {
-        self.picture.take();
         self.panels.push(panel);
         self
     }
@@ -199,23 +190,13 @@ impl Figure {
             .all(|(panel, frame)| labels::places(panel, &frame).iter().all(|p| p.is_free))
     }
 
-    /// The picture, drawn at the first call: the figure is complete then.
-    pub fn picture(&self) -> &Picture {
-        self.picture.get_or_init(|| {
-            let mut out = Picture::new(&self.id, &self.title, self.width, self.height);
-            if let Some(note) = &self.note {
-                out.set_note(note);
-            }
-            for (panel, frame) in self.panels.iter().zip(frame::frames(self)) {
-                draw::panel(&mut out, panel, &frame);
-            }
-            out
-        })
-    }
-
-    /// The SVG document, which can also be embedded in HTML.
-    pub fn to_svg(&self) -> String {
-        self.picture().to_svg()
+    /// Draws the figure.
+    pub fn picture(&self) -> Picture {
+        let mut out = Picture::new(&self.id, &self.title, self.width, self.height);
+        for (panel, frame) in self.panels.iter().zip(frame::frames(self)) {
+            draw::panel(&mut out, panel, &frame);
+        }
+        out
     }
 }
 

@@ -18,7 +18,7 @@ mod vaf;
 pub use parts::{PREFIX as PARTS_PREFIX, of_part};
 
 use super::chart::{Axis, Figure, Look, Mark, Panel, for_names};
-use super::picture::POINTS;
+use super::picture::{POINTS, Picture};
 use std::collections::BTreeMap;
 use study_core::analyze::{Analysis, RealizationSummary};
 use study_core::outcome::Role;
@@ -64,11 +64,23 @@ pub struct Drawn {
     /// Caption. Untrusted.
     pub caption: String,
     /// Version of two columns' width, for paper and screens.
-    pub wide: Figure,
+    pub wide: Picture,
     /// Version of one column's width, for paper and phones.
-    pub narrow: Figure,
+    pub narrow: Picture,
     /// The data of the figure, as CSV.
     pub data: String,
+}
+
+impl Drawn {
+    /// States in the files what their readers must know about the data.
+    fn noted(mut self, note: Option<&str>) -> Self {
+        for picture in [&mut self.wide, &mut self.narrow] {
+            if let Some(note) = note {
+                picture.set_note(note);
+            }
+        }
+        self
+    }
 }
 
 /// The page that a version of a figure is for.
@@ -123,26 +135,20 @@ pub fn all(a: &Analysis, traces: &[Trace]) -> Vec<Drawn> {
     ]
     .into_iter()
     .flatten();
-    all.map(|mut drawn| {
-        drawn.wide.note.clone_from(&note);
-        drawn.narrow.note.clone_from(&note);
-        drawn
-    })
-    .collect()
+    all.map(|drawn| drawn.noted(note)).collect()
 }
 
 /// What the files of the figures say about data that are not all from participants.
-fn note(a: &Analysis) -> Option<String> {
+fn note(a: &Analysis) -> Option<&'static str> {
     let c = &a.counts;
     let real = c.participants > c.pilots + c.simulated;
-    let text = match (real, c.pilots, c.simulated) {
+    Some(match (real, c.pilots, c.simulated) {
         (_, 0, 0) => return None,
         (true, _, _) => "includes pilot or simulated data",
         (false, 0, _) => "simulated data, no participants",
         (false, _, 0) => "pilot data, no participants",
         (false, _, _) => "pilot and simulated data, no participants",
-    };
-    Some(text.to_owned())
+    })
 }
 
 /// Data that several figures use.
@@ -353,8 +359,8 @@ fn drawn(
     Drawn {
         name: name.to_owned(),
         caption,
-        wide: draw(WIDE),
-        narrow: draw(NARROW),
+        wide: draw(WIDE).picture(),
+        narrow: draw(NARROW).picture(),
         data: super::csv::text(&data),
     }
 }

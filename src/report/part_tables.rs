@@ -236,23 +236,27 @@ fn of_model(
         notes: Vec::new(),
     };
     for cell in cells(values, model, 1) {
-        let id = |statistic: &str| format!("{model}/{}/{statistic}", cell[0]);
-        let number = |statistic: &str| values.number(&id(statistic));
-        let (ratio, difference) = (number("ratio"), number("difference"));
-        let Some(estimate) = ratio.or(difference) else {
-            continue;
-        };
-        let sign = if ratio.is_some() { " / " } else { " − " };
-        table.rows.push(vec![
-            PartCell::Name(cell[0].replace('|', sign)),
-            PartCell::Number(Some(estimate), plain),
-            PartCell::Interval(values.interval(&id("ci95")), plain),
-            PartCell::Number(number("t"), two),
-            PartCell::Number(number("df"), two),
-            PartCell::Number(number("p_holm"), plain),
-        ]);
+        table.rows.extend(contrast(values, model, cell[0]));
     }
     table
+}
+
+/// The columns of a contrast that all tables have; `None` if this is no contrast.
+fn contrast(values: &Values, group: &str, pair: &str) -> Option<Vec<PartCell>> {
+    let id = |statistic: &str| format!("{group}/{pair}/{statistic}");
+    let number = |statistic: &str| values.number(&id(statistic));
+    let (estimate, sign) = match number("ratio") {
+        Some(ratio) => (ratio, " / "),
+        None => (number("difference")?, " − "),
+    };
+    Some(vec![
+        PartCell::Name(pair.replace('|', sign)),
+        PartCell::Number(Some(estimate), plain),
+        PartCell::Interval(values.interval(&id("ci95")), plain),
+        PartCell::Number(number("t"), two),
+        PartCell::Number(number("df"), two),
+        PartCell::Number(number("p_holm"), plain),
+    ])
 }
 
 /// Means of groups and of sessions.
@@ -316,22 +320,11 @@ fn group_pairs(values: &Values) -> PartTable {
     };
     for kind in ["groups", "sessions"] {
         for cell in cells(values, kind, 1) {
-            let number =
-                |statistic: &str| values.number(&format!("{kind}/{}/{statistic}", cell[0]));
-            let (ratio, difference) = (number("ratio"), number("difference"));
-            let Some(estimate) = ratio.or(difference) else {
-                continue;
-            };
-            let sign = if ratio.is_some() { " / " } else { " − " };
-            table.rows.push(vec![
-                PartCell::Name(cell[0].replace('|', sign)),
-                PartCell::Number(Some(estimate), plain),
-                PartCell::Interval(values.interval(&format!("{kind}/{}/ci95", cell[0])), plain),
-                PartCell::Number(number("t"), two),
-                PartCell::Number(number("df"), two),
-                PartCell::Number(number("p_holm"), plain),
-                PartCell::Number(number("hedges_g"), two),
-            ]);
+            if let Some(mut row) = contrast(values, kind, cell[0]) {
+                let g = values.number(&format!("{kind}/{}/hedges_g", cell[0]));
+                row.push(PartCell::Number(g, two));
+                table.rows.push(row);
+            }
         }
     }
     table

@@ -192,6 +192,11 @@ impl Picture {
         self.note = Some(Untrusted(note).to_string());
     }
 
+    /// What a reader of the file must know, escaped.
+    pub fn note(&self) -> Option<&str> {
+        self.note.as_deref()
+    }
+
     /// Adds a path, unless it is empty.
     pub fn path(&mut self, path: Path) {
         if !path.steps.is_empty() {

@@ -96,7 +96,11 @@ fn every_name_is_whole_in_every_figure() {
             assert!(!svg.contains('…'), "{}: a name is cut", drawn.name);
             let named = a.realizations.iter().filter(|m| svg.contains(&m.id));
             assert_eq!(named.count(), 30, "{}", drawn.name);
-            assert!(figure.labels_fit(), "{}", drawn.name);
+            if drawn.name == "rating-against-vaf" {
+                // A label without a free place is not drawn.
+                let labels = svg.matches("paint-order=\"stroke\"").count();
+                assert_eq!(labels, 30, "{}", drawn.name);
+            }
         }
     }
 }
@@ -160,7 +164,7 @@ fn files_of_figures_say_what_the_data_are() {
     let mut a = analysis_of(&ratings(4, &FIVE, |s, m, _| (1 + (s + m) % 5) as f64));
     let said = |a: &Analysis| {
         let all: BTreeSet<Option<String>> = (figures::all(a, &[]).into_iter())
-            .flat_map(|f| [f.wide.note, f.narrow.note])
+            .flat_map(|f| [&f.wide, &f.narrow].map(|p| p.note().map(str::to_owned)))
             .collect();
         assert_eq!(all.len(), 1);
         all.into_iter().next().unwrap().unwrap_or_default()

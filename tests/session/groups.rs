@@ -157,7 +157,7 @@ fn analyzed(folder: &Path) {
         own.map(|x| x.iter().sum::<f64>() / x.len() as f64)
             .collect()
     };
-    let test = study_stats::welch::difference(&of("all"), &of("few")).unwrap();
+    let test = study_stats::between::welch::difference(&of("all"), &of("few")).unwrap();
     assert!((number("groups/all|few/difference") - test.difference).abs() < 1e-9);
     assert!((number("groups/p") - test.p.unwrap()).abs() < 1e-9);
     assert_eq!(number("retest/n"), 6.0);

@@ -26,9 +26,9 @@ pub fn share(x: f64, decimals: usize) -> String {
     }
 }
 
-/// A correlation, with three decimals.
+/// A correlation, with three decimals; what rounding left of 0 is .000.
 pub fn r(x: f64) -> String {
-    share(x, 3)
+    share(if x.abs() < 5e-4 { 0.0 } else { x }, 3)
 }
 
 /// A p with its sign: `= .023`, `< .001`, `> .999`. [`p_beside`] the level .05.
@@ -134,7 +134,7 @@ mod tests {
     fn numbers_read_as_in_print() {
         assert_eq!(r(0.97436), ".974");
         assert_eq!(r(-0.5), "−.500");
-        assert_eq!(r(-0.0001), ".000");
+        assert_eq!([-0.0001, -1.5e-16].map(r), [".000", ".000"]);
         assert_eq!([1.0, -1.0].map(r), ["1.000", "−1.000"]);
         assert_eq!(number(-0.001, 2), "0.00");
         assert_eq!(number(-0.01, 2), "−0.01");

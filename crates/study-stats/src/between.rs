@@ -1,13 +1,19 @@
-//! Groups of subjects who rated the same realizations: the analysis of variance between and
-//! within subjects.
+//! Independent groups of subjects.
+//!
+//! The functions of this module assume the same variance in all groups: the analysis of
+//! variance between and within subjects who rated the same realizations. [`welch`] compares
+//! one number of each subject without this assumption.
 //!
 //! As in [`super::anova`], an effect is tested by contrasts y = C·(row of the subject). With
 //! the group means ȳg and the mean ȳ of all, SS = Σ ng·|ȳg − ȳ|² and its error is
 //! Σ|y − ȳg|². The contrasts decide what is compared: the means of the subjects, their
 //! profiles over the realizations, or their slopes.
 
+pub mod welch;
+
 use super::anova::{covariance, greenhouse_geisser, helmert, unit};
-use super::distribution::{f_upper, t_quantile};
+use super::describe;
+use super::distribution::{f_upper, t_quantile, t_two_sided};
 use super::matrix::dot;
 use super::{finite, rectangular};
 
@@ -109,17 +115,57 @@ fn between<R: AsRef<[f64]>>(groups: &[Vec<R>], contrasts: &[Vec<f64>]) -> Option
     })
 }
 
-/// The difference of the means of two groups with its 95 % interval, by the variance within
-/// both (Student). `None` without such a variance.
-pub fn difference(a: &[f64], b: &[f64]) -> Option<(f64, (f64, f64))> {
+/// The difference of the means of two groups.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Difference {
+    /// Mean of the first minus that of the second.
+    pub difference: f64,
+    /// 95 % t interval.
+    pub ci95: (f64, f64),
+    /// t on `df` degrees of freedom.
+    pub t: f64,
+    /// Degrees of freedom.
+    pub df: f64,
+    /// Two-sided p of t.
+    pub p: Option<f64>,
+    /// The difference over the pooled standard deviation, times Hedges' (1981) exact
+    /// correction for small samples.
+    pub hedges_g: Option<f64>,
+}
+
+impl Difference {
+    /// The t test of a difference with this standard error.
+    fn of(a: &[f64], b: &[f64], se: f64, df: f64) -> Option<Self> {
+        let difference = describe::mean(a)? - describe::mean(b)?;
+        let t = finite(difference / se)?;
+        let half = t_quantile(0.975, df)? * se;
+        Some(Self {
+            difference,
+            ci95: (difference - half, difference + half),
+            t,
+            df,
+            p: t_two_sided(t, df),
+            hedges_g: hedges_g(a, b, difference),
+        })
+    }
+}
+
+fn hedges_g(a: &[f64], b: &[f64], difference: f64) -> Option<f64> {
+    let (na, nb) = (a.len() as f64, b.len() as f64);
+    let squares = (na - 1.0) * describe::variance(a)? + (nb - 1.0) * describe::variance(b)?;
+    let df = na + nb - 2.0;
+    let correction = libm::exp(
+        libm::lgamma(df / 2.0) - libm::lgamma((df - 1.0) / 2.0) - 0.5 * libm::log(df / 2.0),
+    );
+    finite(difference / (squares / df).sqrt() * correction)
+}
+
+/// Student's t test, by the variance within both groups. `None` without such a variance.
+pub fn difference(a: &[f64], b: &[f64]) -> Option<Difference> {
     let test = one_way(&[a.to_vec(), b.to_vec()])?;
-    let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
-    let difference = mean(a) - mean(b);
-    let variance = test.ss_error / test.df2;
+    let variance = test.f.map(|_| test.ss_error / test.df2)?;
     let se = (variance * (1.0 / a.len() as f64 + 1.0 / b.len() as f64)).sqrt();
-    let half = t_quantile(0.975, test.df2)? * se;
-    test.f
-        .map(|_| (difference, (difference - half, difference + half)))
+    Difference::of(a, b, se, test.df2)
 }
 
 #[cfg(test)]
@@ -201,10 +247,16 @@ mod tests {
             .map(|g| g.iter().map(|r| r.iter().sum::<f64>() / 3.0).collect())
             .collect();
         is_close(one_way(&means).unwrap().f, 0.802_742_149_491_37);
-        let (difference, ends) = difference(&means[0], &means[1]).unwrap();
-        is_close(Some(difference), 4.791_666_666_666_7 - 4.333_333_333_333_3);
-        is_close(Some(ends.0), -0.856_663_915_798_74);
-        is_close(Some(ends.1), 1.773_330_582_465_41);
+        let found = difference(&means[0], &means[1]).unwrap();
+        is_close(
+            Some(found.difference),
+            4.791_666_666_666_7 - 4.333_333_333_333_3,
+        );
+        is_close(Some(found.ci95.0), -0.856_663_915_798_74);
+        is_close(Some(found.ci95.1), 1.773_330_582_465_41);
+        // t² is the F of two groups.
+        is_close(Some(found.t * found.t), 0.802_742_149_491_37);
+        is_close(found.p, 0.411_330_370_273_09);
     }
 
     #[test]

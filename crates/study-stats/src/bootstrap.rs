@@ -8,7 +8,7 @@
 use super::correlation::pearson;
 use super::describe::is_constant;
 use super::distribution::{normal_cdf, normal_quantile};
-use super::matrix::{Cholesky, SymmetricMatrix};
+use super::matrix::{Cholesky, SymmetricMatrix, dot};
 use super::random::RandomSource;
 use super::{finite, rectangular};
 
@@ -85,20 +85,22 @@ fn resample(
     let exact = rows.len() <= MAX_EXACT && !normal_limit;
     let mut resamples = Vec::new();
     let (mut undefined, mut total) = (0u64, 0u64);
-    let mut count = |sums: &[f64], weight: u64| {
+    let mut count = |r: Option<f64>, weight: u64| {
         total += weight;
-        match score.of(sums) {
+        match r {
             Some(r) => resamples.push((r, weight)),
             None => undefined += weight,
         }
     };
     if exact {
-        let mut sums = vec![vec![0.0; x.len()]; rows.len() + 1];
-        compose(rows, 0, rows.len(), 1, &mut sums, &mut count);
+        let turned = Turned::new(rows, &score);
+        let mut sums = vec![vec![0.0; x.len() - 1]; rows.len() + 1];
+        let mut of_sum = |sum: &[f64], weight: u64| count(turned.correlation(sum), weight);
+        compose(&turned.rows, 0, rows.len(), 1, &mut sums, &mut of_sum);
     } else if normal_limit {
         let limit = NormalLimit::new(rows)?;
         for _ in 0..DRAWS {
-            count(&limit.draw(random), 1);
+            count(score.of(&limit.draw(random)), 1);
         }
     } else {
         let mut draws = vec![0u32; rows.len()];
@@ -108,7 +110,7 @@ fn resample(
                 // Below the number of rows, which is a usize.
                 draws[random.below(rows.len() as u64) as usize] += 1;
             }
-            count(&weighted(rows, &draws), 1);
+            count(score.of(&weighted(rows, &draws)), 1);
         }
     }
     let summed = summary(rows, &score, observed, &resamples, undefined, total)?;
@@ -160,25 +162,24 @@ fn summary(
     undefined: u64,
     total: u64,
 ) -> Option<Bootstrap> {
+    const TIE: f64 = 1e-12;
     let defined = (total - undefined) as f64;
-    let mean = resamples.iter().map(|(r, w)| r * *w as f64).sum::<f64>() / defined;
+    let (mut sum, mut below, mut ties, mut not_above) = (0.0, 0u64, 0u64, 0u64);
+    for &(r, weight) in resamples {
+        let if_so = |so: bool| if so { weight } else { 0 };
+        sum += r * weight as f64;
+        below += if_so(r < observed - TIE);
+        ties += if_so((r - observed).abs() <= TIE);
+        // Rounding can turn a correlation of 0 into 10⁻¹⁷.
+        not_above += if_so(r <= TIE);
+    }
+    let mean = sum / defined;
     let variance = resamples
         .iter()
         .map(|(r, w)| (r - mean) * (r - mean) * *w as f64)
         .sum::<f64>()
         / defined;
-    let share = |keep: &dyn Fn(f64) -> bool| {
-        let kept: u64 = resamples
-            .iter()
-            .filter(|(r, _)| keep(*r))
-            .map(|(_, w)| w)
-            .sum();
-        kept as f64 / defined
-    };
-    const TIE: f64 = 1e-12;
-    let below = share(&|r| r < observed - TIE);
-    let ties = share(&|r| (r - observed).abs() <= TIE);
-    let z0 = normal_quantile(below + 0.5 * ties);
+    let z0 = normal_quantile((below as f64 + 0.5 * ties as f64) / defined);
     let acceleration = acceleration(rows, score);
     let quantiles = Quantiles::of(resamples);
     let at = |p: f64| quantiles.at(p * defined);
@@ -196,8 +197,7 @@ fn summary(
         bca,
         z0,
         acceleration,
-        // Rounding can turn a correlation of 0 into 10⁻¹⁷.
-        p_le_zero: share(&|r| r <= TIE),
+        p_le_zero: not_above as f64 / defined,
         undefined_probability: undefined as f64 / total as f64,
         exact: false,
         normal_limit: false,
@@ -208,38 +208,47 @@ fn summary(
 /// accumulated in a histogram, and only the class that contains the quantile is sorted.
 struct Quantiles<'a> {
     resamples: &'a [(f64, u64)],
-    /// Weight of each class of equal width over [−1, 1].
+    /// The class of each, of equal width over [−1, 1].
+    class_of: Vec<u16>,
+    /// Weight of each class.
     classes: Vec<u64>,
 }
 
 impl<'a> Quantiles<'a> {
-    const CLASSES: usize = 4096;
+    const CLASSES: u16 = 4096;
 
     /// Non-decreasing in r.
-    fn class(r: f64) -> usize {
+    fn class(r: f64) -> u16 {
         // From 0 to CLASSES: r is a correlation.
-        (((r + 1.0) * 0.5 * Self::CLASSES as f64) as usize).min(Self::CLASSES - 1)
+        (((r + 1.0) * 0.5 * f64::from(Self::CLASSES)) as u16).min(Self::CLASSES - 1)
     }
 
     fn of(resamples: &'a [(f64, u64)]) -> Self {
-        let mut classes = vec![0; Self::CLASSES];
+        let mut classes = vec![0; usize::from(Self::CLASSES)];
+        let mut class_of = Vec::with_capacity(resamples.len());
         for (r, weight) in resamples {
-            classes[Self::class(*r)] += weight;
+            let class = Self::class(*r);
+            classes[usize::from(class)] += weight;
+            class_of.push(class);
         }
-        Self { resamples, classes }
+        Self {
+            resamples,
+            class_of,
+            classes,
+        }
     }
 
     /// The smallest value whose cumulative weight is at least `weight`; the largest value
     /// if, due to rounding, there is none.
     fn at(&self, weight: f64) -> Option<f64> {
         let mut sum = 0u64;
-        for (class, own) in self.classes.iter().enumerate() {
+        for (class, own) in (0u16..).zip(&self.classes) {
             if ((sum + own) as f64) < weight || *own == 0 {
                 sum += own;
                 continue;
             }
-            let inside = |item: &&(f64, u64)| Self::class(item.0) == class;
-            let mut members: Vec<_> = self.resamples.iter().filter(inside).collect();
+            let all = self.class_of.iter().zip(self.resamples);
+            let mut members: Vec<_> = all.filter(|(c, _)| **c == class).map(|(_, r)| r).collect();
             members.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
             return members.into_iter().find_map(|(r, w)| {
                 sum += w;
@@ -288,8 +297,8 @@ fn weighted(rows: &[&[f64]], draws: &[u32]) -> Vec<f64> {
 
 /// Enumerates the ways to draw `left` times from the rows from `row` on. `weight` is the
 /// number of sequences for each (S! / Π kᵢ!, at most 10¹⁰, exact).
-fn compose(
-    rows: &[&[f64]],
+fn compose<R: AsRef<[f64]>>(
+    rows: &[R],
     row: usize,
     left: usize,
     weight: u64,
@@ -300,25 +309,73 @@ fn compose(
         count(&sums[row], weight);
         return;
     }
-    let last = row + 1 == rows.len();
+    let own = rows[row].as_ref();
+    let (done, next) = sums.split_at_mut(row + 1);
+    if row + 1 == rows.len() {
+        for ((n, s), v) in next[0].iter_mut().zip(&done[row]).zip(own) {
+            *n = s + left as f64 * v;
+        }
+        count(&next[0], weight);
+        return;
+    }
+    next[0].copy_from_slice(&done[row]);
     let mut ways = weight;
     for k in 0..=left {
         // ways = weight · C(left, k)
         if k > 0 {
             ways = ways * (left - k + 1) as u64 / k as u64;
+            for (n, v) in sums[row + 1].iter_mut().zip(own) {
+                *n += v;
+            }
         }
-        if last && k < left {
-            continue;
+        compose(rows, row + 1, left - k, ways, sums, count);
+    }
+}
+
+/// Rows in orthonormal coordinates of the deviations from their means, the first of them
+/// along x: a sum of rows correlates with x by its first coordinate over its length.
+struct Turned {
+    rows: Vec<Vec<f64>>,
+    /// Sums that are shorter differ from 0 by rounding errors only.
+    shortest: f64,
+}
+
+impl Turned {
+    fn new(rows: &[&[f64]], score: &CorrelationWith) -> Self {
+        let k = score.x.len();
+        let mut basis = vec![vec![1.0 / (k as f64).sqrt(); k], score.x.clone()];
+        while basis.len() < k {
+            // The unit vector of which most is left, twice orthogonalised.
+            let left = |j: &usize| 1.0 - basis.iter().map(|b| b[*j] * b[*j]).sum::<f64>();
+            let most = (0..k).max_by(|a, b| left(a).total_cmp(&left(b)));
+            let mut v = vec![0.0; k];
+            v[most.unwrap_or(0)] = 1.0;
+            for b in basis.iter().chain(&basis) {
+                let along = dot(b, &v);
+                v.iter_mut().zip(b).for_each(|(v, b)| *v -= along * b);
+            }
+            let length = dot(&v, &v).sqrt();
+            v.iter_mut().for_each(|v| *v /= length);
+            basis.push(v);
         }
-        let (done, next) = sums.split_at_mut(row + 1);
-        for ((n, s), v) in next[0].iter_mut().zip(&done[row]).zip(rows[row]) {
-            *n = s + k as f64 * v;
+        let size = rows.iter().flat_map(|row| *row);
+        let size = size.fold(0.0f64, |most, v| most.max(v.abs()));
+        let turned = |row: &&[f64]| {
+            let mean = row.iter().sum::<f64>() / k as f64;
+            let centred: Vec<f64> = row.iter().map(|v| v - mean).collect();
+            basis[1..].iter().map(|b| dot(b, &centred)).collect()
+        };
+        Self {
+            rows: rows.iter().map(turned).collect(),
+            shortest: 1e-12 * size * rows.len() as f64,
         }
-        if last {
-            count(&next[0], ways);
-        } else {
-            compose(rows, row + 1, left - k, ways, sums, count);
-        }
+    }
+
+    /// The correlation of a sum of as many rows as there are.
+    fn correlation(&self, sum: &[f64]) -> Option<f64> {
+        let length = dot(sum, sum).sqrt();
+        let defined = length.is_finite() && length > self.shortest;
+        defined.then(|| (sum[0] / length).clamp(-1.0, 1.0))
     }
 }
 
@@ -384,6 +441,33 @@ mod tests {
             weights += w;
         });
         assert_eq!((compositions, weights), (35, 256));
+    }
+
+    #[test]
+    fn turned_rows_have_the_correlations_of_the_columns() {
+        let x = [0.7, 0.75, 0.8, 0.95, 0.9];
+        let rows: Vec<Vec<f64>> = (0..4)
+            .map(|s| {
+                let row = (0..5).map(|m| 1e6 + f64::from((7 * s + 3 * m * m + s * m) % 11));
+                row.collect()
+            })
+            .collect();
+        let score = CorrelationWith::new(&x).unwrap();
+        let turned = Turned::new(&slices(&rows), &score);
+        let mut both = [Vec::new(), Vec::new()];
+        let of_columns = &mut |s: &[f64], _: u64| both[0].push(pearson(&x, s).unwrap());
+        compose(&rows, 0, 4, 1, &mut vec![vec![0.0; 5]; 5], of_columns);
+        let of_turned = &mut |s: &[f64], _: u64| both[1].push(turned.correlation(s).unwrap());
+        compose(&turned.rows, 0, 4, 1, &mut vec![vec![0.0; 4]; 5], of_turned);
+        assert_eq!(both[0].len(), 35);
+        for (a, b) in both[0].iter().zip(&both[1]) {
+            assert!((a - b).abs() < 1e-9, "{a} {b}");
+        }
+        // Each column the same mean: only rounding is left.
+        let alike = vec![vec![0.1 + 0.2, 0.3, 0.3, 0.3, 0.3]; 3];
+        let turned = Turned::new(&slices(&alike), &score);
+        let sum: Vec<f64> = turned.rows[0].iter().map(|v| 3.0 * v).collect();
+        assert_eq!(turned.correlation(&sum), None);
     }
 
     /// With equally spaced x, the sign of r is that of the whole number Σ (2j − 3)·yⱼ.

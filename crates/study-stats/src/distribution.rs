@@ -135,7 +135,7 @@ pub fn f_quantile(p: f64, df1: f64, df2: f64) -> Option<f64> {
 /// The x ≥ 0 at which a decreasing tail probability has the value `target`: bracketed
 /// by doubling, then the Illinois variant of regula falsi on the logarithms, with
 /// bisection as the fallback.
-fn root_of_tail(target: f64, tail: impl Fn(f64) -> Option<f64>) -> Option<f64> {
+pub(super) fn root_of_tail(target: f64, tail: impl Fn(f64) -> Option<f64>) -> Option<f64> {
     let error = |x: f64| tail(x).map(|v| v.ln() - target.ln());
     if target >= tail(0.0)? {
         return Some(0.0);

@@ -6,7 +6,7 @@
 //! |---|---|
 //! | Means, standard deviations, quantiles | [`describe`] |
 //! | Do the realizations differ? | [`anova`], [`friedman`] (rank test), [`lmm`] (unbalanced data), [`clm`] and [`clmm`] (ordered categories) |
-//! | Do groups of subjects differ, or does a difference depend on the group? | [`between`] |
+//! | Do groups of subjects differ, or does a difference depend on the group? | [`between`] (equal variances), [`between::welch`] (variances of their own) |
 //! | Do the ratings follow a given order? | [`friedman::page`] |
 //! | Which pairs differ? Are they equivalent? | [`paired`] |
 //! | Are the ratings correlated with a covariate? | [`correlation`], [`permutation`] (exact p), [`bootstrap`] (interval), [`bayes`] |
@@ -14,7 +14,6 @@
 //! | Do the raters agree? | [`agreement`], [`disagreement`] (interaction of subject and realization) |
 //! | Does a rating depend on the one before? | [`carry_over`] |
 //! | How large an effect would be found? How many subjects and realizations does it take? | [`power`] |
-//! | Do independent groups differ? | [`welch`] (variances of their own) |
 //! | How large is a share of trials? | [`proportion`] |
 //! | At which level is a stimulus felt? | [`psychometric`] |
 //! | How well are two stimuli told apart? | [`detection`] |
@@ -75,7 +74,6 @@ pub mod random;
 pub mod rank;
 pub mod regression;
 pub mod two_way_slope;
-pub mod welch;
 
 /// The number, unless it is infinite or NaN.
 pub(crate) fn finite(x: f64) -> Option<f64> {

@@ -12,7 +12,7 @@
 pub mod covariate;
 pub mod two_conditions;
 
-use super::distribution::{normal_upper, t_quantile};
+use super::distribution::{normal_upper, root_of_tail, t_quantile};
 use statrs::function::gamma::ln_gamma;
 
 /// The probability that a two-sided t test with `df` degrees of freedom rejects at
@@ -67,26 +67,8 @@ pub fn detectable(target: f64, df: f64, alpha: f64) -> Option<f64> {
         return None;
     }
     let critical = t_quantile(1.0 - alpha / 2.0, df)?;
-    let (mut low, mut high) = (0.0, 1.0);
-    while rejected(high, df, critical) < target {
-        low = high;
-        high *= 2.0;
-        if high > 1e9 {
-            return None;
-        }
-    }
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if rejected(middle, df, critical) < target {
-            low = middle;
-        } else {
-            high = middle;
-        }
-        if high - low < 1e-10 * high {
-            break;
-        }
-    }
-    Some(high)
+    let missed = |ncp: f64| Some(1.0 - rejected(ncp, df, critical));
+    root_of_tail(1.0 - target, missed)
 }
 
 /// The smallest correlation between a covariate and the observed means of `n`

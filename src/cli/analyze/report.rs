@@ -2,10 +2,10 @@
 
 use super::super::{Failure, Kind};
 use crate::report::Source;
-use crate::report::chart::Figure;
 use crate::report::csv::TableFile;
 use crate::report::figures::{self, Drawn, Trace};
 use crate::report::html::{self, Details};
+use crate::report::picture::Picture;
 use crate::report::picture::png::{Painter, PngError};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -87,9 +87,8 @@ fn pictures(drawn: &[&Drawn]) -> Result<Vec<Output>, PngError> {
         let column = format!("{}{COLUMN}", d.name);
         [(d.name.clone(), &d.wide), (column, &d.narrow)]
     });
-    let figures: Vec<(String, &Figure)> = figures.collect();
-    let files = figures.par_iter().with_max_len(1).map(|(name, figure)| {
-        let picture = figure.picture();
+    let figures: Vec<(String, &Picture)> = figures.collect();
+    let files = figures.par_iter().with_max_len(1).map(|(name, picture)| {
         let named = |ending: &str, content| Output {
             name: format!("figures/{name}.{ending}"),
             content,

@@ -142,7 +142,7 @@ pub(super) fn figures(
         let path = |ending: &str| dir.join(format!("{}.{ending}", drawing.name));
         let picture = drawing.figure.picture();
         let png = painter
-            .png(picture)
+            .png(&picture)
             .map_err(|e| Failure::new(Kind::Bug, e.to_string()))?;
         files.push((path("svg"), picture.to_svg().into_bytes()));
         files.push((path("png"), png));

@@ -133,8 +133,9 @@ fn axes(out: &mut Picture, panel: &Panel, f: &Frame) {
         });
     }
     if !panel.title.is_empty() {
-        let at = (f.left, f.outer_top + TITLE_BASE);
-        let text = fitted(&panel.title, NORMAL, f.right - f.left);
+        let (left, room) = f.title;
+        let at = (left, f.outer_top + TITLE_BASE);
+        let text = fitted(&panel.title, NORMAL, room);
         out.text(Text {
             bold: true,
             ..Text::new(at, &text, NORMAL, Anchor::Start)

@@ -52,6 +52,8 @@ pub(super) struct Frame {
     pub(super) y_ticks: Vec<(f64, String)>,
     /// Whether the labels of x are turned.
     pub(super) turned: bool,
+    /// Left end of the title, and the room for it.
+    pub(super) title: (f64, f64),
     /// Legend: index of the series, position of its sample.
     pub(super) legend: Vec<(usize, (f64, f64))>,
 }
@@ -101,6 +103,13 @@ pub(super) fn frames(figure: &Figure) -> Vec<Frame> {
             left = right;
         }
         top += height;
+    }
+    // Titles begin at the axes, unless one has no room there.
+    let mut titles = figure.panels.iter().zip(&frames);
+    if titles.any(|(p, f)| text_width(&p.title, NORMAL) > f.title.1) {
+        for f in &mut frames {
+            f.title = (f.outer_left + 2.0, f.outer_right - f.outer_left - 4.0);
+        }
     }
     frames
 }
@@ -155,6 +164,7 @@ fn frame(panel: &Panel, outer: (f64, f64, f64, f64), margins: (f64, f64), label:
         x_ticks,
         y_ticks: panel.y.marks(most).into_iter().map(shorten).collect(),
         turned,
+        title: (left, right - left),
         legend,
     }
 }

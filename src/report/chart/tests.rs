@@ -28,12 +28,12 @@ fn sample() -> Figure {
 
 #[test]
 fn equal_figures_give_equal_bytes() {
-    assert_eq!(sample().to_svg(), sample().to_svg());
+    assert_eq!(sample().picture().to_svg(), sample().picture().to_svg());
 }
 
 #[test]
 fn what_is_not_finite_is_not_drawn_and_what_is_far_out_stays_near() {
-    let svg = sample().to_svg();
+    let svg = sample().picture().to_svg();
     assert_eq!(svg.matches("h0").count(), 3, "two and the legend's");
     assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
     assert!(!svg.split('"').any(|part| part.len() > 400), "{svg}");
@@ -49,7 +49,7 @@ fn hostile_text_stays_text() {
     figure.panels[0].x.ticks = Ticks::At(vec![(0.0, evil.to_owned())]);
     figure.panels[0].series[0].name = Some(evil.to_owned());
     figure.panels[0].notes[0].text = evil.to_owned();
-    let svg = figure.to_svg();
+    let svg = figure.picture().to_svg();
     assert!(!svg.contains("<script") && !svg.contains("]]>"), "{svg}");
     assert!(!svg.contains("onload='"), "{svg}");
     assert!(
@@ -62,7 +62,7 @@ fn hostile_text_stays_text() {
 fn ids_begin_with_the_figures_own_and_are_unique() {
     let mut figure = sample();
     figure.panels.push(figure.panels[0].clone());
-    let svg = figure.to_svg();
+    let svg = figure.picture().to_svg();
     let ids: Vec<&str> = svg
         .split(" id=\"")
         .skip(1)
@@ -109,7 +109,7 @@ fn names_that_have_no_room_are_turned_and_thinned() {
     let names: Vec<String> = (0..100).map(|i| format!("realization-{i}")).collect();
     let panel = Panel::new(Axis::of_names("", &names), Axis::new("", 0.0, 1.0));
     let figure = Figure::new("f", "", 400.0, 200.0).with(panel);
-    let shown = figure.to_svg().matches("rotate(-90").count();
+    let shown = figure.picture().to_svg().matches("rotate(-90").count();
     assert!((10..=30).contains(&shown), "{shown}");
 }
 
@@ -204,7 +204,7 @@ fn labels_of_crowded_points_do_not_overlap() {
     let (figure, places) = crowd(60, "a name that is far too long");
     assert!(!figure.labels_fit());
     let free = places.iter().filter(|p| p.is_free).count();
-    assert_eq!(figure.to_svg().matches("a name").count(), free);
+    assert_eq!(figure.picture().to_svg().matches("a name").count(), free);
 }
 
 #[test]
@@ -227,14 +227,17 @@ fn dots_in_one_place_are_drawn_once() {
     points.push((0.9, 0.9));
     let panel = Panel::new(Axis::new("", 0.0, 1.0), Axis::new("", 0.0, 1.0));
     let panel = panel.with(Look::nth(0), Mark::Dots(points));
-    let svg = Figure::new("f", "", 400.0, 200.0).with(panel).to_svg();
+    let svg = Figure::new("f", "", 400.0, 200.0)
+        .with(panel)
+        .picture()
+        .to_svg();
     assert_eq!(svg.matches("h0").count(), 2);
 }
 
 #[test]
 fn a_note_about_the_data_is_in_the_picture() {
-    assert!(!sample().to_svg().contains("<desc>"));
-    let mut figure = sample();
-    figure.note = Some("a < b \u{202e}".to_owned());
-    assert!(figure.to_svg().contains("<desc>a &lt; b \\u{202e}</desc>"));
+    let mut picture = sample().picture();
+    assert!(!picture.to_svg().contains("<desc>"));
+    picture.set_note("a < b \u{202e}");
+    assert!(picture.to_svg().contains("<desc>a &lt; b \\u{202e}</desc>"));
 }

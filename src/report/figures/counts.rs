@@ -62,10 +62,12 @@ pub(super) fn histograms(scene: &Scene<'_>) -> Option<Drawn> {
         let title_width = widest(&scene.names(), MAX_LABEL) * 1.1;
         let columns = (1..=c.pick(4, 2))
             .rev()
-            .find(|n| title_width <= c.width / f64::from(*n) - 50.0);
+            .find(|n| title_width <= c.width / f64::from(*n) - 10.0);
         let rows = scene.models.len().div_ceil(columns.unwrap_or(1) as usize);
         let columns = scene.models.len().div_ceil(rows);
-        let mut figure = c.figure("histograms", &title, c.pick(140.0, 120.0) * rows as f64);
+        // Many rows are lower, so that they fit on a page beside others.
+        let row = c.pick(140.0, if rows > 5 { 92.0 } else { 120.0 });
+        let mut figure = c.figure("histograms", &title, row * rows as f64);
         figure.columns = columns;
         for (j, (m, counts)) in scene.models.iter().zip(&counts).enumerate() {
             let under = j + columns >= scene.models.len();

@@ -36,12 +36,8 @@ pub fn of_part(number: usize, part: &PartAnalysis) -> Vec<Drawn> {
         (false, true) => Some("includes pilot data"),
         (false, false) => None,
     };
-    let mut all: Vec<Drawn> = all.into_iter().flatten().collect();
-    for figure in &mut all {
-        figure.wide.note = note.map(str::to_owned);
-        figure.narrow.note = note.map(str::to_owned);
-    }
-    all
+    let all = all.into_iter().flatten();
+    all.map(|drawn| drawn.noted(note)).collect()
 }
 
 /// A grid of panels, with as many columns as there is room for.

@@ -81,7 +81,9 @@ pub(super) fn traces(scene: &Scene<'_>, traces: &[Trace]) -> Option<Drawn> {
         let columns = c.pick(3, 2).min(shown.len());
         let rows = shown.len().div_ceil(columns);
         let title = "Force against position in some playbacks";
-        let mut figure = c.figure("telemetry", title, 176.0 * rows as f64);
+        // Many rows are lower, so that they fit on a page beside others.
+        let row = c.pick(176.0, if rows > 3 { 128.0 } else { 156.0 });
+        let mut figure = c.figure("telemetry", title, row * rows as f64);
         figure.columns = columns;
         for (j, (model, own)) in shown.iter().enumerate() {
             let mut x = x.clone();

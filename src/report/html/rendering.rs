@@ -23,7 +23,7 @@ pub(super) fn section(a: &Analysis) -> Markup {
                  not within them. The VAF here is the share of the variance of the table's force that the \
                  device commanded; the gain is the slope of the commanded force."
             }
-            (realizations(a).render())
+            @if is_judged(a) { (realizations(a).render()) }
             @if let Some(why) = about {
                 p.note { (safe(&format!("Delivered VAF: {why}."))) }
             } @else {
@@ -34,9 +34,15 @@ pub(super) fn section(a: &Analysis) -> Markup {
                      is not in it."
                 }
             }
-            (participants(a).render())
+            @if is_judged(a) { (participants(a).render()) }
         }
     }
+}
+
+/// Whether there is a verdict or a failed attempt to list.
+fn is_judged(a: &Analysis) -> bool {
+    let n = |what: &str| number(a, "rendering", what).unwrap_or(0.0);
+    ["n_ok", "n_flag", "n_fault", "n_failed_attempts"].map(n) != [0.0; 4]
 }
 
 fn number(a: &Analysis, id: &str, what: &str) -> Option<f64> {

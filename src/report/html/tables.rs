@@ -11,7 +11,7 @@ use study_core::outcome::Role;
 pub(super) const MAX_ROWS: usize = 200;
 
 /// Largest number of rows of a table that is kept on one printed page.
-const MAX_WHOLE: usize = 15;
+const MAX_WHOLE: usize = 10;
 
 /// A table on the page.
 pub(super) struct HtmlTable {

@@ -50,7 +50,7 @@ fn the_surface_has_a_box_and_a_row_for_every_cell() {
     let drawing = surface(Row::Lambda, &grid(), Some(0), "a < b", Shown::LINEAR).unwrap();
     assert_eq!(drawing.csv.lines().count(), 7);
     assert_eq!(drawing.csv.lines().nth(1), Some("0.999,1.5,0.5,0.95"));
-    let svg = drawing.figure.to_svg();
+    let svg = drawing.figure.picture().to_svg();
     assert!(svg.contains("a &lt; b"), "the name of a recording is text");
     assert!(svg.contains("-11"));
     assert!(svg.contains("VAF; all below 0.45 in one colour"), "{svg}");

@@ -157,8 +157,8 @@ fn difference(group: &str, sites: usize, of: impl Fn(usize) -> Vec<f64>, values:
         _ => None,
     };
     let mut g = values.group(group, "there are not two sites with a variance");
-    g.maybe("difference", found.map(|d| d.0));
-    g.interval("difference_ci95", found.map(|d| d.1));
+    g.maybe("difference", found.map(|d| d.difference));
+    g.interval("difference_ci95", found.map(|d| d.ci95));
 }
 
 #[cfg(test)]

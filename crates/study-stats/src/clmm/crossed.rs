@@ -148,7 +148,12 @@ struct Model<'a> {
     covariate: bool,
     /// The modes of z and then w: where the next search starts.
     modes: Vec<f64>,
+    /// The last Hessian, and where it was taken.
+    curvature: Option<(Vec<f64>, SymmetricMatrix)>,
 }
+
+/// Within this distance in each parameter, in logits, a search keeps the Hessian.
+const NEAR: f64 = 0.05;
 
 /// What the terms of a cell sum to.
 #[derive(Clone, Copy, Default)]
@@ -164,6 +169,7 @@ impl<'a> Model<'a> {
             table,
             covariate,
             modes: vec![0.0; table.subjects() + table.predictors().len()],
+            curvature: None,
         }
     }
 
@@ -180,7 +186,9 @@ impl<'a> Model<'a> {
         let starts: Vec<Vec<f64>> = near.into_iter().chain(scales.map(from)).collect();
         for start in starts {
             self.modes.fill(0.0);
-            if let Some(found) = maximise(start, |at| self.evaluate(at)) {
+            self.curvature = None;
+            let found = maximise(start, |at| self.evaluate(at));
+            if let Some(found) = found.and_then(|found| self.finished(found)) {
                 let far = found
                     .at
                     .iter()
@@ -197,23 +205,62 @@ impl<'a> Model<'a> {
         Err(ClmError::NoMaximum)
     }
 
-    /// Value, gradient, and Hessian by differences of the gradient.
+    /// A last step of Newton's method, with the Hessian of the maximum. Without the
+    /// covariate only the value is used, which is that of the maximum already.
+    fn finished(&mut self, found: Maximum) -> Option<Maximum> {
+        if !self.covariate {
+            return Some(found);
+        }
+        self.curvature = None;
+        let point = self.evaluate(&found.at)?;
+        let information = point.hessian.negated();
+        let step = Cholesky::definite(&information)?.solve(&point.gradient);
+        let at: Vec<f64> = found.at.iter().zip(step).map(|(x, d)| x + d).collect();
+        Some(Maximum {
+            value: self.gradient(&at)?.0,
+            at,
+            information,
+        })
+    }
+
+    /// Value, gradient, and a Hessian that was taken here or near.
     fn evaluate(&mut self, at: &[f64]) -> Option<Evaluation> {
+        let (value, gradient) = self.gradient(at)?;
+        let near = |(from, _): &&(Vec<f64>, SymmetricMatrix)| {
+            let mut moves = from.iter().zip(at);
+            moves.all(|(from, at)| (from - at).abs() < NEAR)
+        };
+        let hessian = match self.curvature.as_ref().filter(near) {
+            Some((_, hessian)) => hessian.clone(),
+            None => {
+                let hessian = self.hessian(at, &gradient)?;
+                self.curvature = Some((at.to_vec(), hessian.clone()));
+                hessian
+            }
+        };
+        Some(Evaluation {
+            value,
+            gradient,
+            hessian,
+        })
+    }
+
+    /// The Hessian by differences from the gradient.
+    fn hessian(&mut self, at: &[f64], here: &[f64]) -> Option<SymmetricMatrix> {
         const STEP: f64 = 1e-6;
-        let mut point = Evaluation::zero(at.len());
-        (point.value, point.gradient) = self.gradient(at)?;
+        let mut hessian = SymmetricMatrix::zero(at.len());
         let mut moved = at.to_vec();
         for i in 0..at.len() {
             moved[i] = at[i] + STEP;
             let (_, gradient) = self.gradient(&moved)?;
             moved[i] = at[i];
-            for (j, (above, here)) in gradient.iter().zip(&point.gradient).enumerate() {
+            for (j, (above, here)) in gradient.iter().zip(here).enumerate() {
                 // Each element off the diagonal is added twice.
                 let share = if i == j { 1.0 } else { 0.5 };
-                point.hessian.add(i, j, share * (above - here) / STEP);
+                hessian.add(i, j, share * (above - here) / STEP);
             }
         }
-        Some(point)
+        Some(hessian)
     }
 
     /// The approximate log-likelihood and its gradient.

@@ -107,7 +107,7 @@ pub(super) fn disagreement_as_caveat(found: &mut [Finding]) {
         if about_means.contains(&finding.question) && finding.verdict == Verdict::NotShown {
             finding.caveat(
                 "disagreement",
-                "participants disagree about the realizations, and means hide opposed opinions",
+                "participants disagree about the realizations, and means hide how they differ",
             );
         }
     }

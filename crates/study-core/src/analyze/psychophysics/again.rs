@@ -9,10 +9,9 @@ use crate::analyze::identifiers::{group_id, pair_id};
 use crate::analyze::values::Values;
 use std::collections::{BTreeMap, BTreeSet};
 use study_stats::agreement::icc;
-use study_stats::between;
+use study_stats::between::{self, welch};
 use study_stats::describe::{mean, sd};
 use study_stats::paired::holm;
-use study_stats::welch;
 
 /// A number of one participant in one condition and session.
 #[derive(Debug, Clone, PartialEq)]

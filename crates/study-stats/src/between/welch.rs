@@ -1,8 +1,10 @@
-//! Independent groups with variances of their own: Welch's (1947, 1951) tests.
+//! One number of each subject, where each group has a variance of its own: Welch's (1947,
+//! 1951) tests.
 
-use super::describe::{mean, variance};
-use super::distribution::{f_upper, t_quantile, t_two_sided};
-use super::finite;
+use super::Difference;
+use crate::describe::{mean, variance};
+use crate::distribution::f_upper;
+use crate::finite;
 
 /// The test that the means of several groups are equal.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,48 +55,13 @@ pub fn one_way<R: AsRef<[f64]>>(groups: &[R]) -> Option<OneWay> {
     })
 }
 
-/// The difference of the means of two groups.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Difference {
-    /// Mean of the first minus that of the second.
-    pub difference: f64,
-    /// 95 % t interval.
-    pub ci95: (f64, f64),
-    /// t on `df` degrees of freedom.
-    pub t: f64,
-    /// Welch's and Satterthwaite's approximation.
-    pub df: f64,
-    /// Two-sided p of t.
-    pub p: Option<f64>,
-    /// The difference over the pooled standard deviation, times Hedges' (1981) exact
-    /// correction for small samples.
-    pub hedges_g: Option<f64>,
-}
-
-/// Welch's t test. `None` if a group has fewer than two numbers, or neither varies.
+/// Welch's t test, with Welch's and Satterthwaite's degrees of freedom. `None` if a group has
+/// fewer than two numbers, or neither varies.
 pub fn difference(a: &[f64], b: &[f64]) -> Option<Difference> {
     let (na, nb) = (a.len() as f64, b.len() as f64);
     let (va, vb) = (variance(a)? / na, variance(b)? / nb);
-    let difference = mean(a)? - mean(b)?;
-    let se = (va + vb).sqrt();
     let df = finite((va + vb).powi(2) / (va * va / (na - 1.0) + vb * vb / (nb - 1.0)))?;
-    let t = finite(difference / se)?;
-    let half = t_quantile(0.975, df)? * se;
-    let pooled_df = na + nb - 2.0;
-    let pooled = ((na * (na - 1.0) * va + nb * (nb - 1.0) * vb) / pooled_df).sqrt();
-    let correction = libm::exp(
-        libm::lgamma(pooled_df / 2.0)
-            - libm::lgamma((pooled_df - 1.0) / 2.0)
-            - 0.5 * libm::log(pooled_df / 2.0),
-    );
-    Some(Difference {
-        difference,
-        ci95: (difference - half, difference + half),
-        t,
-        df,
-        p: t_two_sided(t, df),
-        hedges_g: finite(difference / pooled * correction),
-    })
+    Difference::of(a, b, (va + vb).sqrt(), df)
 }
 
 #[cfg(test)]
