@@ -309,12 +309,12 @@ fn few_participants_can_show_that_many_realizations_differ() {
     assert_eq!(comparisons(Question::Best), 1);
 }
 
-/// Eight of 16 participants like what the others dislike.
-fn camps(repetitions: usize) -> Analysis {
+/// Of 16 participants every so-many-th dislikes what the others like.
+fn camps(repetitions: usize, every: usize) -> Analysis {
     let mut random = Numbers::new(7);
     let mut rows = Vec::new();
     for s in 0..16 {
-        let slope = if s % 2 == 0 { 0.8 } else { -0.8 };
+        let slope = if s % every == every - 1 { -0.8 } else { 0.8 };
         for m in 0..6 {
             for k in 1..=repetitions {
                 let rating = 4.0 + slope * (m as f64 - 2.5) + 0.6 * random.normal();
@@ -328,7 +328,7 @@ fn camps(repetitions: usize) -> Analysis {
 #[test]
 fn two_opposed_camps_are_named() {
     for (repetitions, test) in [(3, TestKind::Interaction), (1, TestKind::SlopesDiffer)] {
-        let a = camps(repetitions);
+        let a = camps(repetitions, 2);
         assert_eq!(finding(&a, Question::Differ).verdict, Verdict::NotShown);
         assert_eq!(kind(&a, Question::Disagreement), test);
         let printed = Printed::of(&a);
@@ -352,6 +352,23 @@ fn two_opposed_camps_are_named() {
             "{results}"
         );
     }
+}
+
+#[test]
+fn an_effect_of_vaf_that_some_oppose_is_limited_to_these_participants() {
+    let a = camps(3, 4);
+    assert!(finding(&a, Question::Vaf).is_yes());
+    let printed = Printed::of(&a);
+    let limit = "The test takes these participants as given";
+    let (answers, _) = printed.sections();
+    for text in [printed.terminal.as_str(), answers] {
+        let text = text.to_lowercase();
+        assert!(text.contains(&limit.to_lowercase()), "{text}");
+    }
+    // All agree.
+    let agreed = camps(3, 17);
+    let caveats = &finding(&agreed, Question::Vaf).caveats;
+    assert!(caveats.iter().all(|c| c.code != "these-participants"));
 }
 
 #[test]

@@ -230,15 +230,16 @@ fn headline(warn: &mut impl FnMut(&'static str, String), values: &Values, findin
 }
 
 fn design(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values: &Values) {
-    let n = |id: &str| values.number(id).unwrap_or(0.0);
-    let incomplete = n("design/n_subjects") - n("design/n_subjects_complete");
-    if incomplete > 0.0 && !cells.ratings.models.is_empty() {
+    let design = Design::of(cells);
+    // Participants without any rating are counted at the head of the report.
+    let incomplete = design.participants - design.complete;
+    if incomplete > 0 && !cells.ratings.models.is_empty() {
         warn(
             "incomplete",
             format!(
                 "{} did not rate every test realization{}",
-                people(incomplete as usize),
-                match (Design::of(cells).uses_complete(), incomplete == 1.0) {
+                people(incomplete),
+                match (design.uses_complete(), incomplete == 1) {
                     (true, true) => " and is excluded from the comparisons of realizations",
                     (true, false) => " and are excluded from the comparisons of realizations",
                     (false, _) => {

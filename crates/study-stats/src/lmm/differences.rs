@@ -24,6 +24,17 @@ pub(super) fn first(
     Some(((moved(1.0)? - moved(-1.0)?) * 8.0 - (moved(2.0)? - moved(-2.0)?)) / (12.0 * h))
 }
 
+/// Gradient over some coordinates.
+pub(super) fn gradient(
+    f: &dyn Fn(&[f64]) -> Option<f64>,
+    at: &[f64],
+    over: &[usize],
+) -> Option<DVector<f64>> {
+    let f = |x: &[f64]| Some(DVector::from_element(1, f(x)?));
+    let all: Option<Vec<f64>> = (over.iter()).map(|&i| Some(first(&f, at, i)?[0])).collect();
+    Some(DVector::from_vec(all?))
+}
+
 /// Gradient and Hessian over some coordinates.
 pub(super) fn second(
     f: &dyn Fn(&[f64]) -> Option<f64>,

@@ -6,9 +6,10 @@
 //! is held at exactly 0. A direction with neither slope nor curvature is left out: if the
 //! intercept has no variance, θ₂² and δ cannot be separated, and the criterion is flat
 //! along their sum. The search has converged when the predicted decrease of the deviance
-//! is below 10⁻⁷; three more steps refine the last digits.
+//! is below 10⁻⁷; three more steps refine the last digits, with the Hessian of the first
+//! of them.
 
-use super::differences::second;
+use super::differences::{gradient, second};
 use nalgebra::{DVector, SymmetricEigen};
 
 /// The result of a search.
@@ -44,8 +45,12 @@ pub(super) fn minimize(
     let mut at = start.to_vec();
     let mut value = f(&at)?;
     let mut polished = 0;
+    let mut kept = None;
     for _ in 0..MAX_STEPS {
-        let (gradient, hessian) = second(f, &at, &all)?;
+        let (gradient, hessian) = match kept.take() {
+            Some(hessian) => (gradient(f, &at, &all)?, hessian),
+            None => second(f, &at, &all)?,
+        };
         let free: Vec<usize> = all
             .iter()
             .copied()
@@ -70,6 +75,7 @@ pub(super) fn minimize(
                 let far = (0..at.len()).any(|i| bounded[i] && at[i] >= FAR);
                 return (!far).then_some(Minimum { at, value, free });
             }
+            kept = Some(hessian);
             continue;
         }
         polished = 0;

@@ -96,18 +96,27 @@ pub(super) fn disagreement(facts: &Facts<'_>) -> Option<Finding> {
     Some(found)
 }
 
-/// Where participants disagree, a question about means that shows nothing says so.
+/// Where participants disagree, a question about means that shows nothing says so, and so
+/// does an effect of VAF that is opposite for some of them.
 pub(super) fn disagreement_as_caveat(found: &mut [Finding]) {
     let disagree = |f: &Finding| f.question == Question::Disagreement && f.is_yes();
     if !found.iter().any(disagree) {
         return;
     }
+    let opposed = (found.iter()).any(|f| f.caveats.iter().any(|c| c.code == "opposed"));
     let about_means = [Question::Vaf, Question::Differ];
     for finding in found.iter_mut() {
         if about_means.contains(&finding.question) && finding.verdict == Verdict::NotShown {
             finding.caveat(
                 "disagreement",
                 "participants disagree about the realizations, and means hide how they differ",
+            );
+        }
+        if opposed && finding.question == Question::Vaf && finding.is_yes() {
+            finding.caveat(
+                "these-participants",
+                "participants disagree, and the effect of VAF is opposite for some of them: the test takes \
+                 these participants as given, and with others it could be another one",
             );
         }
     }
