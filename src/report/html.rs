@@ -261,8 +261,9 @@ fn figure(f: &Drawn, number: usize) -> Markup {
             div.wide { (PreEscaped(f.wide.to_svg())) }
             div.narrow { (PreEscaped(f.narrow.to_svg())) }
             figcaption {
-                b { "Figure " (number) ". " } (typeset(&f.caption))
-                span.file { " figures/" (f.name) ".pdf, .svg, .png, .csv" }
+                // The space is outside, so that the line may break there.
+                b { "Figure " (number) ". " } (typeset(&f.caption)) " "
+                span.file { "figures/" (f.name) ".pdf, .svg, .png, .csv" }
             }
         }
     }
