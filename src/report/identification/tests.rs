@@ -121,7 +121,7 @@ fn a_turning_handle_is_drawn_in_its_units() {
         .collect();
     assert!((row[0] - 1.0).abs() < 1e-9, "{row:?}");
     assert!((row[3] - 0.057_295_78).abs() < 1e-6, "{row:?}");
-    let svg = five.figure.to_svg();
+    let svg = five.figure.picture().to_svg();
     assert!(
         svg.contains("angle θ (deg)") && svg.contains("stiffness k (N·m/deg)"),
         "{svg}"
@@ -139,7 +139,7 @@ fn a_turning_handle_is_drawn_in_its_units() {
         "{}",
         four.csv
     );
-    assert!(four.figure.to_svg().contains("δ (deg)"));
+    assert!(four.figure.picture().to_svg().contains("δ (deg)"));
 }
 
 /// A table without stiffness shows the slope of its offset; where 0 lies within an axis, a
