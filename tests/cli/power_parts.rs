@@ -46,7 +46,7 @@ fn pairs_have_power_by_their_own_analysis() {
     assert_eq!(found["part"], "more-real");
     let power = |cell: usize, test: &str| found["cells"][cell]["tests"][test]["power"].as_f64();
     assert!(power(1, "preferred") > power(0, "preferred"));
-    // Three realizations: 1/6 is the least p.
+    // Three uneven VAF: 1/6 is the least p.
     assert_eq!(power(1, "preference-vaf"), Some(0.0));
     assert!(found["cells"][0]["closed"].is_null());
     let (code, page, err) = run(&[]);
@@ -56,7 +56,7 @@ fn pairs_have_power_by_their_own_analysis() {
         "{page}"
     );
     assert!(
-        page.contains("no p of preference-vaf is below .333"),
+        page.contains("no p of preference-vaf is below .167"),
         "{page}"
     );
     assert!(page.lines().all(|l| l.chars().count() <= 100), "{page}");

@@ -521,6 +521,6 @@ fn a_study_of_pairs_has_no_power_of_a_correlation() {
     assert_eq!(code, 0, "{err}");
     assert!(!out.contains("power:"), "{out}");
     let (code, _, err) = run(dir.path(), &["power", "pairs", "--closed"]);
-    assert_eq!(code, 1);
-    assert!(err.contains("`more-real` is no rating"), "{err}");
+    assert_eq!(code, 2);
+    assert!(err.contains("has no closed form"), "{err}");
 }
