@@ -220,7 +220,7 @@ fn preferences_magnitudes_and_ratings_have_their_tables() {
     assert_eq!(found["mushra/n_kept"], 4.0);
     let page = text(&mut analyze(folder.path(), &table, &["--task", "mushra"]));
     assert!(
-        page.contains("Screened, and not in this table: P04, P05."),
+        page.contains("Screened, and only in the last column, the mean over all: P04, P05."),
         "{page}"
     );
 }

@@ -239,8 +239,8 @@ fn the_shipped_protocols_are_valid_and_broken_ones_are_not() {
     }
 }
 
-/// The templates of studies with parts, and protocols without a device of forces, are read without a fault and fit the schema; of a
-/// misspelt key both say so.
+/// The templates of studies with parts, and protocols without a device of forces, are read
+/// without a fault and fit the schema; of a misspelt key both say so.
 #[test]
 fn the_templates_of_parts_are_valid_and_broken_ones_are_not() {
     let schema = schema();
@@ -406,6 +406,13 @@ fn matches(pattern: &str, text: &str) -> bool {
         }
         "^-?[0-9]+$" => text.parse::<i64>().is_ok(),
         "^-?[0-9]+([.][0-9]+)?$" => text.parse::<f64>().is_ok(),
-        other => panic!("pattern {other}"),
+        // one of some names
+        other => {
+            let names = other.strip_prefix("^(").and_then(|p| p.strip_suffix(")$"));
+            let names = names.unwrap_or_else(|| panic!("pattern {other}"));
+            let plain = |c: char| c.is_ascii_lowercase() || c == '-' || c == '|';
+            assert!(names.chars().all(plain), "pattern {other}");
+            names.split('|').any(|name| name == text)
+        }
     }
 }
