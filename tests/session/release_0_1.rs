@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use crate::support::player::play_to_end;
+use crate::support::player::{play_to_end, play_until};
 use crate::support::{Terminal, copy_folder, repository, study};
 use serde_json::Value as Json;
 use std::collections::BTreeMap;
@@ -65,6 +65,12 @@ fn a_study_of_the_first_release_has_the_same_analysis_and_its_session_resumes() 
     let before = rows(folder);
     let arguments = ["run", "study", "--operator", "lw", "--participant", "G03"];
     let mut terminal = Terminal::start(&arguments, folder, 24, 80);
+    // The files say when it was left: more than the four hours after which somebody chooses.
+    play_until(&mut terminal, "G03", "c  continue where it stopped");
+    terminal.keys("c");
+    terminal.wait_until("the choice", |s| {
+        !s.contains("This session was not finished")
+    });
     play_to_end(&mut terminal, "G03");
     let (code, out, err) = study(&["verify", "results"], folder);
     assert_eq!(code, 0, "{out}{err}");
