@@ -19,8 +19,9 @@ use flaw::FlawInjector;
 use std::time::Duration;
 use study_base::limits::Limits;
 use study_haptics::plant::{HandParameters, Parameters, Probe};
+use study_wire::frame::Decoder;
 use study_wire::handler::{Bounds, Drive, Handler, Measured, Out, Profile};
-use study_wire::message::{DeviceState, Fault, Features, Flags, Loaded, Name};
+use study_wire::message::{DeviceState, Fault, Features, Flags, Loaded, Name, Reply};
 use study_wire::servo::ServoSettings;
 use wrong::Saboteur;
 pub use wrong::{Wrong, WrongLoads};
@@ -393,4 +394,18 @@ fn profile(options: &Options) -> Profile {
         rest_mm_s: 5.0,
         rest_s: 0.05,
     }
+}
+
+/// The replies in bytes that the handler wrote, with the sequence numbers of their requests.
+fn replies(bytes: &[u8]) -> Vec<(u16, Reply)> {
+    let mut decoder = Decoder::new();
+    let mut found = Vec::new();
+    for byte in bytes {
+        if let Some(Ok(body)) = decoder.push(*byte)
+            && let Ok((header, reply)) = Reply::decode(body)
+        {
+            found.push((header.sequence, reply));
+        }
+    }
+    found
 }

@@ -345,7 +345,7 @@ fn program_rendering(args: &CheckArgs, console: &mut Console) -> Result<(), Fail
     if pass {
         return Ok(());
     }
-    if all.iter().any(rendering::Rendered::is_silent) {
+    if all.iter().any(|line| line.is_silent) {
         return Err(Failure::device("the program does not answer in time")
             .hint("it has to answer load, start and stop as docs/devices.md says"));
     }

@@ -33,9 +33,6 @@ const FORCE_N: f64 = 9.0;
 /// A velocity limit that every hand passes, mm/s.
 const SLOW_MM_S: f64 = 3.0;
 
-/// What is seen of a device that does not answer; the other tables are not tried.
-const SILENT: &str = "it does not answer in time: the other tables are not tried";
-
 /// The result of one playback.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Rendered {
@@ -46,6 +43,9 @@ pub(super) struct Rendered {
     seen: String,
     #[serde(skip_serializing_if = "Option::is_none")]
     fidelity: Option<Fidelity>,
+    /// Whether the device did not answer: no further table is tried.
+    #[serde(skip)]
+    pub(super) is_silent: bool,
 }
 
 impl Rendered {
@@ -55,12 +55,8 @@ impl Rendered {
             result,
             seen: seen.into(),
             fidelity: None,
+            is_silent: false,
         }
-    }
-
-    /// Whether the device did not answer.
-    pub(super) fn is_silent(&self) -> bool {
-        self.seen == SILENT
     }
 
     /// For the terminal.
@@ -104,7 +100,7 @@ pub(super) fn check(
     for (what, table) in tables(middle_mm) {
         let result = one(device, &what, &table, &mut pace);
         report(&result)?;
-        let silent = result.is_silent();
+        let silent = result.is_silent;
         all.push(result);
         if silent {
             return Ok(all);
@@ -248,7 +244,13 @@ fn one(device: &mut dyn Device, what: &str, table: &Realization, pace: &mut Pace
         let heard = play(device, table, limits, pace);
         let playback = match heard.ended {
             Ok(playback) => playback,
-            Err(PlaybackError::Timeout) => return Rendered::new(what, "fail", SILENT),
+            Err(why @ PlaybackError::Timeout) => {
+                let seen = format!("{why}: the other tables are not tried");
+                return Rendered {
+                    is_silent: true,
+                    ..Rendered::new(what, "fail", seen)
+                };
+            }
             // A trip is usually caused by the hand.
             Err(why) => {
                 last = Rendered::new(what, "not judged", why.to_string());

@@ -3,6 +3,7 @@
 //! A flaw changes messages between the link and the handler. The handler itself is not
 //! changed, so the force stays within its limit.
 
+use super::replies;
 use std::collections::VecDeque;
 use std::time::Duration;
 use study_wire::frame::{Decoder, FRAME_CRC_LEN, Frame};
@@ -201,15 +202,8 @@ impl FlawInjector {
     /// The bytes to send at `at` for the handler's output.
     pub(super) fn outbound(&mut self, bytes: &[u8], at: Duration) -> Vec<u8> {
         let mut sent = Vec::new();
-        let mut decoder = Decoder::new();
-        for byte in bytes {
-            let Some(Ok(body)) = decoder.push(*byte) else {
-                continue;
-            };
-            let Ok((header, reply)) = Reply::decode(body) else {
-                continue;
-            };
-            let Some((sequence, reply)) = self.change_reply(header.sequence, reply) else {
+        for (sequence, reply) in replies(bytes) {
+            let Some((sequence, reply)) = self.change_reply(sequence, reply) else {
                 continue;
             };
             let frame = reply.frame(sequence).as_bytes().to_vec();

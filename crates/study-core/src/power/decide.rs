@@ -426,12 +426,8 @@ mod tests {
         squares.sum()
     }
 
-    /// Equivalence is that of the analysis, with missing trials and without.
-    #[test]
-    fn equivalence_is_that_of_the_analysis() {
-        let mut settings = settings(Scale::Continuous, Vaf::Listed, 0.05);
-        settings.assumptions.slope = 0.0;
-        settings.tests = vec![Test::Equivalence];
+    /// A small design, and the rules of an analysis with the margin of the settings.
+    fn equivalence(settings: &Settings) -> (Cell, Rules) {
         let cell = Cell {
             realizations: 5,
             repetitions: 3,
@@ -441,6 +437,16 @@ mod tests {
             equivalence_margin: settings.margin,
             ..Rules::default()
         };
+        (cell, rules)
+    }
+
+    /// Equivalence is that of the analysis, with missing trials and without.
+    #[test]
+    fn equivalence_is_that_of_the_analysis() {
+        let mut settings = settings(Scale::Continuous, Vaf::Listed, 0.05);
+        settings.assumptions.slope = 0.0;
+        settings.tests = vec![Test::Equivalence];
+        let (cell, rules) = equivalence(&settings);
         let (mut yes, mut no) = (0, 0);
         for k in 0..60u32 {
             settings.assumptions.missing = [0.0, 0.1][k as usize % 2];
@@ -470,15 +476,7 @@ mod tests {
         let mut settings = settings(Scale::Rounded(1, 7), Vaf::Listed, 0.05);
         settings.tests = vec![Test::ReferenceEquivalence];
         settings.margin = Some(0.6);
-        let cell = Cell {
-            realizations: 5,
-            repetitions: 3,
-            participants: 12,
-        };
-        let rules = Rules {
-            equivalence_margin: settings.margin,
-            ..Rules::default()
-        };
+        let (cell, rules) = equivalence(&settings);
         let (mut yes, mut no) = (0, 0);
         for k in 0..60u32 {
             settings.assumptions.missing = [0.0, 0.1][k as usize % 2];

@@ -1,5 +1,6 @@
 //! What a wrong device changes.
 
+use super::super::replies;
 use super::{Wrong, WrongLoads};
 use std::collections::VecDeque;
 use study_wire::frame::Decoder;
@@ -331,14 +332,7 @@ impl Saboteur {
     /// The bytes to send for the handler's output.
     pub(in crate::device::firmware) fn outbound(&mut self, bytes: &[u8]) -> Vec<u8> {
         let mut sent = Vec::new();
-        let mut decoder = Decoder::new();
-        for byte in bytes {
-            let Some(Ok(body)) = decoder.push(*byte) else {
-                continue;
-            };
-            let Ok((header, reply)) = Reply::decode(body) else {
-                continue;
-            };
+        for (sequence, reply) in replies(bytes) {
             let reply = match reply {
                 Reply::Telemetry(telemetry) => Reply::Telemetry(self.telemetry(telemetry)),
                 Reply::Identity(mut identity) => {
@@ -353,7 +347,7 @@ impl Saboteur {
                 }
                 other => other,
             };
-            sent.extend_from_slice(reply.frame(header.sequence).as_bytes());
+            sent.extend_from_slice(reply.frame(sequence).as_bytes());
         }
         sent
     }

@@ -5,7 +5,7 @@ use super::over_participants::{Threshold, mixed};
 use crate::analyze::identifiers::group_id;
 use crate::analyze::values::Values;
 use std::collections::{BTreeMap, BTreeSet};
-use study_stats::magnitude::{Estimate, magnitude as estimate};
+use study_stats::magnitude::{Estimate, Magnitude, magnitude as estimate};
 use study_stats::mushra::{Screening, condition};
 
 /// One estimate.
@@ -19,24 +19,30 @@ pub struct MagnitudeRow {
     pub estimate: f64,
 }
 
-/// Geometric means, exponent and coefficient of the power law.
-pub fn magnitude(rows: &[MagnitudeRow]) -> Values {
-    let people: BTreeSet<&str> = rows.iter().map(|r| r.participant.as_str()).collect();
-    let people: Vec<&str> = people.into_iter().collect();
-    let estimates: Vec<Estimate> = (rows.iter())
-        .map(|row| Estimate {
-            participant: people
-                .binary_search(&row.participant.as_str())
-                .unwrap_or_default(),
-            level: row.level,
-            estimate: row.estimate,
-        })
-        .collect();
-    let found = estimate(&estimates);
+/// The estimates of participants, in the order of `people`, and how many are left out.
+fn estimated<'a>(
+    people: &[&str],
+    rows: impl Iterator<Item = (&'a str, f64, f64)>,
+) -> (Magnitude, Values) {
+    let of_row = |(participant, level, estimate)| Estimate {
+        participant: people.binary_search(&participant).unwrap_or_default(),
+        level,
+        estimate,
+    };
+    let found = estimate(&rows.map(of_row).collect::<Vec<_>>());
     let mut values = Values::default();
     values
         .group("magnitude", "")
         .put("n_left_out", found.left_out as f64);
+    (found, values)
+}
+
+/// Geometric means, exponent and coefficient of the power law.
+pub fn magnitude(rows: &[MagnitudeRow]) -> Values {
+    let people: BTreeSet<&str> = rows.iter().map(|r| r.participant.as_str()).collect();
+    let people: Vec<&str> = people.into_iter().collect();
+    let rows = (rows.iter()).map(|row| (row.participant.as_str(), row.level, row.estimate));
+    let (found, mut values) = estimated(&people, rows);
     for (level, mean) in &found.levels {
         // A level always has a decimal point: 1.0.
         let mut group = values.group(
@@ -88,18 +94,11 @@ pub(super) fn realizations(rows: &[RealizationRow]) -> Values {
     people.dedup();
     let place = |list: &[&str], name: &str| list.binary_search(&name).unwrap_or_default();
     // A realization has no level: its place stands for it, and no power law is fitted.
-    let estimates: Vec<Estimate> = (rows.iter())
-        .map(|row| Estimate {
-            participant: place(&people, &row.participant),
-            level: place(&names, &row.realization) as f64,
-            estimate: row.estimate,
-        })
-        .collect();
-    let found = estimate(&estimates);
-    let mut values = Values::default();
-    values
-        .group("magnitude", "")
-        .put("n_left_out", found.left_out as f64);
+    let levels = rows.iter().map(|row| {
+        let level = place(&names, &row.realization) as f64;
+        (row.participant.as_str(), level, row.estimate)
+    });
+    let (found, mut values) = estimated(&people, levels);
     for (place, mean) in &found.levels {
         let name = names[*place as usize];
         let prefix = group_id("magnitude/realization", &[name]);
