@@ -10,6 +10,7 @@
 #[path = "../tests/support/mod.rs"]
 mod support;
 
+use ::study::tui::pace::TYPED;
 use std::fs;
 use std::io::Write as _;
 use std::path::Path;
@@ -68,7 +69,11 @@ fn session(folder: &Path) {
         }
         if screen.contains("Tab: comment") {
             terminal.keys("5");
-            until(&terminal, |s| s.contains("┃  5  ┃"));
+            until(&terminal, |s| {
+                s.contains("┃  5  ┃") && s.contains("Enter: ")
+            });
+            // An Enter that comes with the key before it counts as pasted.
+            std::thread::sleep(2 * TYPED);
             let count = saved.len() + 1;
             let began = Instant::now();
             terminal.keys("\r");

@@ -19,7 +19,7 @@ use std::time::{Duration, Instant};
 use study_core::outcome::Channel;
 use study_core::session::{Input, View};
 
-/// An Enter alone within this time after a new page is a repeated or held key.
+/// A line that ends within this time after a new page is held, repeated or pasted.
 const UNREAD: Duration = Duration::from_millis(300);
 /// How long Ctrl-Z waits for the device to stop before the program stops.
 const SUSPEND_WAIT: Duration = Duration::from_secs(2);
@@ -64,8 +64,11 @@ impl Plain {
             Typed::Stop => return Ok(vec![Input::Stop]),
             Typed::Line(line) => line,
         };
-        let held = self.input.has_keys() && self.said.elapsed() < UNREAD;
-        if held && line.trim().is_empty() {
+        let unread = self.input.has_keys() && self.said.elapsed() < UNREAD;
+        if unread && !line.starts_with('/') {
+            if !line.trim().is_empty() {
+                self.dialogue.repeat();
+            }
             return Ok(Vec::new());
         }
         let (inputs, lines) = self.dialogue.line(&line, view);

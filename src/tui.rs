@@ -139,7 +139,8 @@ impl Tui {
         });
         drawn?;
         if turns {
-            self.pace.turned(Instant::now());
+            let of_lines = matches!(view.screen, Screen::Who { .. });
+            self.pace.turned(Instant::now(), of_lines);
         }
         self.terminal.allow_paste(!view.armed);
         self.drawn = Some(now);

@@ -21,8 +21,8 @@ use study_core::protocol::DeviceKind;
 use study_core::session::roster::Newcomer;
 use study_core::session::{Config, Ending, MAX_OPERATOR, Roster};
 use study_core::store::{
-    Copies, Frozen, Plan, SeatKind, SessionData, StoreError, StudyFolder, layout, next_row,
-    next_session, participants,
+    Copies, Frozen, Plan, SeatKind, SessionData, StoreError, StudyFolder, check_new_id, layout,
+    next_row, next_session, participants,
 };
 
 /// Arguments of `study run`.
@@ -124,9 +124,11 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let mut known = Vec::new();
     if let Some(study) = &begun {
         known = study.sessions()?;
-        if let Some(participant) = &participant {
-            study.check_id(participant)?;
-        }
+    }
+    match (&participant, &begun) {
+        (Some(id), Some(study)) => study.check_id(id)?,
+        (Some(id), None) => check_new_id(id)?,
+        (None, _) => {}
     }
     let options = tui::Options {
         mouse: !args.no_mouse,
@@ -402,19 +404,17 @@ fn resume_command(args: &Args, participant: &str) -> String {
     let mut command = vec!["study".to_owned(), "run".to_owned()];
     let path = |path: &std::path::Path| path.display().to_string();
     command.extend(args.protocol.as_deref().map(path));
-    let mut option = |name: &str, value: Option<String>| {
-        if let Some(value) = value {
-            command.extend([format!("--{name}"), value]);
-        }
+    let mut option = |name: &str, value: Option<String>| match value {
+        Some(value) if value.starts_with('-') => command.push(format!("--{name}={value}")),
+        Some(value) => command.extend([format!("--{name}"), value]),
+        None => {}
     };
     let results = Some(path(&args.results)).filter(|p| p != "results");
     option("results", results);
     option("device", args.device.kind.map(|k| k.as_str().to_owned()));
-    option("port", args.device.address.serial.port.clone());
-    option(
-        "baud",
-        args.device.address.serial.baud.map(|b| b.to_string()),
-    );
+    let serial = &args.device.address.serial;
+    option("port", serial.port.clone());
+    option("baud", serial.baud.map(|b| b.to_string()));
     option("command", args.device.address.command.clone());
     option(
         "rows",
@@ -459,7 +459,7 @@ fn finish(
         Ending::Nothing => Ok(()),
         _ => study.refresh(protocol).map(drop),
     };
-    let folder = study.path();
+    let folder = study.saved_in();
     let shown = folder.display();
     match ending {
         Ending::Finished => console.out(format!(
@@ -473,7 +473,7 @@ fn finish(
         )),
         Ending::Nothing => console.out("Nothing was recorded.\n"),
     }?;
-    written.map_err(|e| unwritten(&e, folder))
+    written.map_err(|e| unwritten(&e, &folder))
 }
 
 /// The failure to report if the tables could not be written after a session.

@@ -303,6 +303,7 @@ impl Host {
             if self.stage.known() {
                 self.stage = Stage::Idle;
                 self.queue.clear();
+                self.rearm_retry = None;
             }
             self.send(Request::Limp, at);
         }

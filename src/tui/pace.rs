@@ -2,8 +2,9 @@
 //!
 //! A key that was pressed before a page appeared does not act on it, nor does an Enter so
 //! soon after that nobody can have seen the page. An Enter right after another one does not
-//! advance: the key is held, or was pressed twice. In a dialog every key counts. Keys that
-//! stop, leave or open a dialog always count.
+//! advance: the key is held, or was pressed twice. Nor does one that comes with the key
+//! before: both were pasted. In a dialog every key counts. Keys that stop, leave or open a
+//! dialog always count.
 
 use super::keys::{self, Key};
 use crossterm::event::{Event, KeyEventKind};
@@ -18,6 +19,10 @@ pub const QUIET: Duration = Duration::from_millis(700);
 /// Response Times).
 pub const SEEN: Duration = Duration::from_millis(150);
 
+/// Keys that come closer together were not typed but pasted: the quickest typists make about
+/// one stroke in 60 ms.
+pub const TYPED: Duration = Duration::from_millis(10);
+
 /// Decides by the time of each event whether it is meant for the page.
 #[derive(Debug, Clone)]
 pub struct Pace {
@@ -27,6 +32,10 @@ pub struct Pace {
     used: bool,
     /// The last Enter, if no other key came after it.
     entered: Option<Instant>,
+    /// The last other key, meant for the page or not.
+    pressed: Option<Instant>,
+    /// Whether the page asks for lines of text only, which may be pasted.
+    of_lines: bool,
 }
 
 impl Pace {
@@ -36,11 +45,15 @@ impl Pace {
             shown,
             used: false,
             entered: None,
+            pressed: None,
+            of_lines: false,
         }
     }
 
-    /// Another page is on the screen since a moment.
-    pub fn turned(&mut self, shown: Instant) {
+    /// Another page is on the screen since a moment; `of_lines`: it asks for lines of text
+    /// only.
+    pub fn turned(&mut self, shown: Instant, of_lines: bool) {
+        self.of_lines = of_lines;
         self.shown = shown;
         self.used = false;
     }
@@ -50,6 +63,12 @@ impl Pace {
         let since = |before: Instant| at.saturating_duration_since(before);
         let unseen = !self.used && since(self.shown) < SEEN;
         unseen || self.entered.is_some_and(|before| since(before) < QUIET)
+    }
+
+    /// Whether an Enter at a moment comes with the key before it.
+    fn pasted(&self, at: Instant) -> bool {
+        let close = |before: Instant| at.saturating_duration_since(before) < TYPED;
+        !self.of_lines && self.pressed.is_some_and(close)
     }
 
     /// Whether an event is meant for what is on the screen. `dialog`: a dialog is open;
@@ -62,9 +81,12 @@ impl Pace {
         let on_time = dialog || at >= self.shown || always(event, key, armed);
         if key == Some(Key::Enter) {
             let repeated = matches!(event, Event::Key(key) if key.kind == KeyEventKind::Repeat);
-            let waits = repeated || self.waits(at);
+            let waits = repeated || self.pasted(at) || self.waits(at);
             self.entered = Some(at);
             return dialog || (on_time && !waits);
+        }
+        if key.is_some() {
+            self.pressed = Some(at);
         }
         if key.is_some() && on_time {
             self.entered = None;
@@ -157,10 +179,11 @@ mod tests {
         let mut pace = Pace::new(start);
         assert!(pace.waits(start));
         assert!(pace.accepts(&key(KeyCode::Char('5')), start, false, false));
-        assert!(pace.accepts(&key(KeyCode::Enter), start, false, false));
+        assert!(!pace.waits(start + TYPED));
+        assert!(pace.accepts(&key(KeyCode::Enter), start + TYPED, false, false));
         // but not on the next one
         let next = start + QUIET * 2;
-        pace.turned(next);
+        pace.turned(next, false);
         assert!(!pace.accepts(&key(KeyCode::Enter), next, false, false));
         assert!(pace.waits(next + SEEN));
         assert!(!pace.waits(next + QUIET));
@@ -175,7 +198,27 @@ mod tests {
         assert!(pace.waits(start));
         assert!(pace.accepts(&key(KeyCode::Char('5')), start, false, false));
         assert!(!pace.waits(start));
-        assert!(pace.accepts(&key(KeyCode::Enter), start, false, false));
+        assert!(pace.accepts(&key(KeyCode::Enter), start + TYPED, false, false));
+    }
+
+    /// A terminal that does not mark what is pasted sends it as keys.
+    #[test]
+    fn an_enter_that_comes_with_another_key_is_pasted_and_does_not_advance() {
+        let shown = Instant::now();
+        let at = |ms| shown + Duration::from_millis(ms);
+        let pasted = |times: [u64; 2], dialog| {
+            let mut pace = Pace::new(shown);
+            pace.accepts(&key(KeyCode::Char('5')), at(times[0]), dialog, false);
+            pace.accepts(&key(KeyCode::Enter), at(times[1]), dialog, false)
+        };
+        assert!(!pasted([2000, 2000], false));
+        assert!(!pasted([2000, 2009], false));
+        assert!(pasted([2000, 2010], false));
+        assert!(pasted([2000, 2000], true));
+        let mut pace = Pace::new(shown);
+        pace.turned(shown, true);
+        assert!(pace.accepts(&key(KeyCode::Char('1')), at(300), false, false));
+        assert!(pace.accepts(&key(KeyCode::Enter), at(300), false, false));
     }
 
     #[test]

@@ -235,3 +235,43 @@ fn held_quick_or_early_keys_answer_nothing() {
     let journal = fs::read_to_string(folder.path().join(journal)).unwrap();
     assert!(journal.contains("quickly"), "{journal}");
 }
+
+/// A pasted line is no answer to what was not looked at, whether the terminal marks it as
+/// pasted or sends it as keys.
+#[test]
+fn pasted_lines_answer_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let protocol = folder.path().join("paper");
+    changed_protocol("turn-signal", &protocol, &[PATIENT]);
+    let mut terminal = start(folder.path(), &protocol);
+    let pasted = "6\r7\r6\r7\r6\r".repeat(4);
+    let marked = format!("\u{1b}[200~{pasted}\u{1b}[201~");
+    let rates = |screen: &str| screen.contains("1–7: choose");
+    for _ in 0..20 {
+        play_until(&mut terminal, "Enter: rate");
+        terminal.keys(&pasted);
+        std::thread::sleep(Duration::from_millis(300));
+        let screen = terminal.screen();
+        assert!(!rates(&screen), "{screen}");
+        // a busy machine may lose the playback
+        if screen.contains("Enter: rate") {
+            break;
+        }
+    }
+    play_until(&mut terminal, "1–7: choose");
+    for paste in [&pasted, &marked] {
+        terminal.keys(paste);
+        std::thread::sleep(Duration::from_millis(300));
+        let screen = terminal.screen();
+        assert!(rates(&screen) && screen.contains("trial 1 of"), "{screen}");
+    }
+    terminal.wait_for("no text field to paste into");
+    // the choice is on the screen, and a deliberate key changes it
+    terminal.wait_for("┃  6  ┃");
+    play_until(&mut terminal, "trial 2 of");
+    let journal = "results/turn-signal/sessions/P01/1/journal.jsonl";
+    let journal = fs::read_to_string(folder.path().join(journal)).unwrap();
+    let answers = journal.matches("\"question\":\"realism\"").count();
+    assert_eq!(answers, 1, "{journal}");
+    assert!(journal.contains("{\"rating\":3}"), "{journal}");
+}

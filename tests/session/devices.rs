@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![allow(clippy::print_stderr, reason = "what is skipped is printed")]
 
-use crate::support::player::{play_to_end, play_until};
+use crate::support::player::{enter, play_to_end, play_until};
 use crate::support::simulator::Simulator;
 use crate::support::{PATIENT, Terminal, changed_protocol, repository, study};
 use std::fs;
@@ -532,7 +532,9 @@ fn a_cable_that_is_pulled_in_each_state_costs_no_answer() {
     // while the rating is typed: it is not disturbed
     rig.to("1–7: choose");
     rig.device.control("unplug");
-    rig.terminal.keys("6\r");
+    rig.terminal.keys("6");
+    rig.terminal.wait_for("┃  6  ┃");
+    enter(&mut rig.terminal);
     rig.terminal
         .wait_until("the rating to be taken", |s| !s.contains("1–7: choose"));
     // the next trial has to wait for the device

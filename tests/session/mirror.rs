@@ -83,6 +83,7 @@ fn a_results_folder_that_is_lost_costs_nothing() {
     for words in [
         "the results folder was left behind",
         "the mirror has everything that was saved",
+        "finished and saved in mirror/turn-signal.",
         "Receipt: ",
     ] {
         assert!(said.contains(words), "{words}: {said}");

@@ -4,7 +4,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use crate::support::player::{correct_newest, mark_bad, play, quit};
+use crate::support::player::{correct_newest, enter, mark_bad, play, quit};
 use crate::support::{PATIENCE, Terminal, repository, study};
 use serde_json::Value as Json;
 use std::fs;
@@ -149,7 +149,7 @@ fn play_until(
             };
             typed(terminal, &answer, shown);
             terminal.wait_for("Enter: save");
-            terminal.keys("\r");
+            enter(terminal);
             terminal.wait_until("the next page", |s| !s.contains(PROMPT));
         } else if !page.contains(PROMPT) {
             play(terminal, "P01");

@@ -327,3 +327,27 @@ fn a_pipe_that_ends_leaves_the_session_unfinished_and_everything_saved() {
     let (code, out, err) = study(&["verify", "results"], folder.path());
     assert_eq!(code, 0, "{out}{err}");
 }
+
+/// Of several lines that are pasted at once only the first is meant for the page.
+#[test]
+fn of_pasted_lines_only_the_first_answers() {
+    let folder = tempfile::tempdir().unwrap();
+    let protocol = short(folder.path());
+    let run = ["run", protocol.to_str().unwrap(), "--plain"];
+    let mut lines = Lines::start(folder.path(), &run, None);
+    lines.play(Some("Type a number from 1 to 7"));
+    lines.types("6\n7\n6\n7\n6\n");
+    lines.play(Some("Trial 3 of"));
+    lines.types("/quit\n");
+    lines.asked(&["Leave the session?"]);
+    lines.types("y\n");
+    lines.line(&["The session is not finished"]);
+    lines.child.wait().unwrap();
+    let journal = events(folder.path());
+    let answered = journal.iter().filter(|e| e["event"] == "answered");
+    let ratings: Vec<u64> = answered
+        .filter_map(|e| e["answer"]["rating"].as_u64())
+        .collect();
+    // the second by the player
+    assert_eq!(ratings, [6, 4]);
+}

@@ -6,7 +6,7 @@
 
 #![cfg(target_os = "linux")]
 
-use crate::support::player::{F10, play_to_end, play_until};
+use crate::support::player::{F10, enter, play_to_end, play_until};
 use crate::support::{PATIENT, Terminal, changed_protocol, study};
 use rustix::process::{Pid, Resource, Rlimit, prlimit};
 use std::fs;
@@ -78,6 +78,8 @@ impl Desk {
 
     fn rate(&mut self, keys: &str) {
         self.terminal.keys(keys);
+        self.terminal.wait_for("late");
+        enter(&mut self.terminal);
         self.terminal.wait_for("NOT SAVED");
         let screen = self.terminal.screen();
         assert!(screen.contains("trial 1: realism = 6"), "{screen}");
@@ -139,7 +141,7 @@ fn start(folder: &Path) -> Terminal {
 fn quitting_names_what_is_not_saved_and_writes_it_elsewhere() {
     let mut desk = Desk::at_a_rating();
     desk.fail();
-    desk.rate("6\tlate\r");
+    desk.rate("6\tlate");
     // A second attempt, in a new segment, fails as well.
     desk.terminal.wait_for("Enter: try again");
     desk.terminal.keys("\r");
@@ -168,7 +170,7 @@ fn signals_name_what_is_not_saved_and_write_it_elsewhere() {
     for signal in ["TERM", "HUP"] {
         let mut desk = Desk::at_a_rating();
         desk.fail();
-        desk.rate("6\tlate\r");
+        desk.rate("6\tlate");
         desk.terminal.signal(signal);
         let text = desk.ended();
         assert!(text.contains(&format!("SIG{signal}")), "{text}");
@@ -181,7 +183,7 @@ fn signals_name_what_is_not_saved_and_write_it_elsewhere() {
 fn a_repaired_disk_gets_everything() {
     let mut desk = Desk::at_a_rating();
     desk.fail();
-    desk.rate("6\tlate\r");
+    desk.rate("6\tlate");
     desk.repair();
     desk.terminal.wait_for("Enter: try again");
     desk.terminal.keys("\r");

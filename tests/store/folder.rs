@@ -144,6 +144,31 @@ fn ids_that_differ_only_in_case_are_refused() {
     );
 }
 
+/// A command would take it for an option. Earlier releases accepted it.
+#[test]
+fn an_id_like_an_option_is_refused_unless_it_exists() {
+    let results = tempfile::tempdir().unwrap();
+    let study = open(results.path());
+    for id in ["-x", "--", "-", "-01"] {
+        let refused = study.claim(&real(id));
+        assert!(
+            matches!(refused, Err(StoreError::LikeOption { .. })),
+            "{refused:?}"
+        );
+        let refused = set(&study, id, State::NoShow, false);
+        assert!(
+            matches!(refused, Err(StoreError::LikeOption { .. })),
+            "{refused:?}"
+        );
+        assert!(!study.path().join("sessions").join(id).exists());
+    }
+    std::fs::create_dir_all(study.path().join("sessions/-x")).unwrap();
+    assert_eq!(run(&study, &real("-x"), 3), Seat::Row(1));
+    set(&study, "-x", State::Excluded, false).unwrap();
+    assert_eq!(study.sessions().unwrap()[0].participant.as_str(), "-x");
+    run(&study, &real("x-1"), 3);
+}
+
 #[test]
 fn a_session_can_be_void_only_before_its_first_rating() {
     let results = tempfile::tempdir().unwrap();

@@ -6,6 +6,7 @@
 
 use super::{PATIENCE, Shown, Terminal};
 use std::time::{Duration, Instant};
+use study::tui::pace::TYPED;
 
 /// The action of the player at a page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -93,6 +94,12 @@ pub const F3: &str = "\u{1b}OR";
 pub const F4: &str = "\u{1b}OS";
 pub const F7: &str = "\u{1b}[18~";
 pub const F10: &str = "\u{1b}[21~";
+
+/// Presses Enter after keys whose effect is on the screen. With them it would be pasted.
+pub fn enter(terminal: &mut Terminal) {
+    std::thread::sleep(2 * TYPED);
+    terminal.keys("\r");
+}
 
 /// Opens a dialog by its key, waits for its title and types into it what ends it.
 pub fn dialog(terminal: &mut Terminal, key: &str, title: &str, typed: &str) {
@@ -183,6 +190,7 @@ fn act(terminal: &mut Terminal, participant: &str, page: &Shown, until: Option<I
             return did;
         }
     }
+    std::thread::sleep(2 * TYPED);
     terminal.keys(key);
     let before = asked(&before);
     waited(terminal, until, "the page to change", |now| {

@@ -240,6 +240,13 @@ identifier!(
     /// A participant's pseudonym: `[A-Za-z0-9_-]{1,32}`. Names a folder.
     ParticipantId, "participant id", 32, "A-Z a-z 0-9 _ -", &['_', '-']
 );
+impl ParticipantId {
+    /// Whether a command would take it for an option.
+    pub fn is_like_option(&self) -> bool {
+        self.0.starts_with('-')
+    }
+}
+
 identifier!(
     /// A realization's id: `[A-Za-z0-9._-]{1,32}`. Names a file, without its extension.
     ModelId, "model id", 32, "A-Z a-z 0-9 . _ -", &['.', '_', '-']

@@ -44,7 +44,7 @@ pub use derive::{Derived, participants};
 pub use error::{StoreError, plain, when};
 pub use head::{Head, HeadFile};
 pub use journal::Journal;
-pub use ledger::{ClaimRequest, Claimed, SeatKind, next_row};
+pub use ledger::{ClaimRequest, Claimed, SeatKind, check_new_id, next_row};
 pub use manifest::Manifest;
 pub use mirror::Copies;
 pub use participant::{StateChange, StateRequest};
@@ -208,6 +208,15 @@ impl StudyFolder {
         self.mirror.as_ref().map(MirrorDisk::copies)
     }
 
+    /// The folder that has everything: this one, or the mirror's if this one was left behind.
+    pub fn saved_in(&self) -> PathBuf {
+        let mirror = self.mirror.as_ref();
+        let mirror = mirror.filter(|mirror| mirror.copies().results.is_some());
+        mirror
+            .and_then(|mirror| mirror.mirrored(&self.path))
+            .unwrap_or_else(|| self.path.clone())
+    }
+
     /// Opens the folder of an existing study.
     ///
     /// # Errors
@@ -257,6 +266,8 @@ impl StudyFolder {
     ) -> Result<u32, StoreError> {
         let _lock = self.lock()?;
         let mut manifest = Manifest::read_intact(self.disk.as_ref(), &self.path)?;
+        // The tables are derived again afterwards: nothing is frozen if they could not be.
+        self.sessions()?;
         let newest = manifest.newest();
         let version = newest.version;
         if manifest.study != frozen.protocol.study.id

@@ -6,7 +6,7 @@ use crate::device::host::DeviceClock;
 use std::time::Duration;
 use study_core::outcome::{Playback, Sample};
 use study_wire::message::{
-    self, DeviceState, EventKind, Fault, Outcome, Pulse, Refusal, Reply, Request, Telemetry,
+    self, DeviceState, Event, EventKind, Fault, Outcome, Pulse, Refusal, Reply, Request, Telemetry,
 };
 
 /// Whether this is a HELLO with a minor version.
@@ -59,13 +59,20 @@ impl Host {
             }
             Reply::Pulse(pulse) => self.pulse(pulse, at),
             Reply::Telemetry(telemetry) => self.telemetry(&telemetry, at),
-            Reply::Event(event) if event.playback == self.playback => match event.kind {
+            Reply::Event(event) if self.concerns(&event) => match event.kind {
                 EventKind::Started => {}
                 EventKind::Stopped => self.ask_outcome(at),
                 EventKind::Latched => self.latched(event.fault, at),
             },
             Reply::Event(_) | Reply::Recorded(_) => {}
         }
+    }
+
+    /// Whether an event is about the present playback, or about the table that was loaded
+    /// for it: no playback of that has a number before PLAY is executed.
+    fn concerns(&self, event: &Event) -> bool {
+        let waiting = matches!(self.stage, Stage::Loaded { .. } | Stage::Starting);
+        event.playback == self.playback || (waiting && event.playback == 0)
     }
 
     fn identified(&mut self, sequence: u16, identity: message::Identity, at: Duration) {
@@ -146,7 +153,11 @@ impl Host {
             detail => format!(" ({detail})"),
         };
         let what = upload::describe(&request);
-        let reason = reason.as_str();
+        let reason = match reason {
+            // It went limp before the request arrived.
+            Refusal::WrongState if ack.state.latched() => ack.fault.as_str(),
+            reason => reason.as_str(),
+        };
         self.reports.push(Report::Fault(format!(
             "it refuses {what}: {reason}{detail}"
         )));

@@ -109,6 +109,7 @@ impl Roster {
                 Some(words) => words.clone(),
                 None => "finished".to_owned(),
             },
+            None if id.is_like_option() => "begins with -, like an option".to_owned(),
             None
             | Some(Known {
                 state: State::Void, ..

@@ -201,6 +201,12 @@ pub enum StoreError {
         /// Existing id.
         existing: ParticipantId,
     },
+    /// A new id that begins like an option.
+    #[error("`{given}` cannot be a new participant's id: it begins with `-`, like an option")]
+    LikeOption {
+        /// Requested id.
+        given: ParticipantId,
+    },
     /// No row is free in the range of this rig.
     #[error("no row from {from} to {to} is free")]
     NoRow {
@@ -329,6 +335,7 @@ impl StoreError {
             Self::Collides { existing, .. } => {
                 format!("use `{existing}` if it is the same person")
             }
+            Self::LikeOption { .. } => "use a pseudonym, such as P01".to_owned(),
             Self::NoRow { .. } => "give this rig a larger range with --rows".to_owned(),
             Self::OtherKind { .. } => "use another id".to_owned(),
             Self::SessionsMissing { path, .. } => format!(
@@ -353,6 +360,7 @@ impl StoreError {
                 | Self::Erased { .. }
                 | Self::OtherKind { .. }
                 | Self::Collides { .. }
+                | Self::LikeOption { .. }
                 | Self::NoRow { .. }
                 | Self::TooEarly { .. }
                 | Self::OtherGroup { .. }

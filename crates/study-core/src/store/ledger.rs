@@ -199,12 +199,16 @@ impl StudyFolder {
         })
     }
 
-    /// Refuses an id that a file system may not distinguish from an existing one.
+    /// Refuses an id that a file system may not distinguish from an existing one, and a
+    /// new one that a command would take for an option.
     ///
     /// # Errors
-    /// [`StoreError::Collides`], or the sessions cannot be read.
+    /// [`StoreError::Collides`], [`StoreError::LikeOption`], or the sessions cannot be read.
     pub fn check_id(&self, id: &ParticipantId) -> Result<(), StoreError> {
         let ids = self.participant_ids()?;
+        if !ids.contains(id) {
+            check_new_id(id)?;
+        }
         match ids.into_iter().find(|i| i != id && i.collides_with(id)) {
             None => Ok(()),
             Some(existing) => Err(StoreError::Collides {
@@ -362,6 +366,17 @@ fn check_standing(
             state,
             reason: standing.reason.clone(),
         }),
+    }
+}
+
+/// Refuses a new id that a command would take for an option. Earlier releases accepted it.
+///
+/// # Errors
+/// [`StoreError::LikeOption`].
+pub fn check_new_id(id: &ParticipantId) -> Result<(), StoreError> {
+    match id.is_like_option() {
+        true => Err(StoreError::LikeOption { given: id.clone() }),
+        false => Ok(()),
     }
 }
 

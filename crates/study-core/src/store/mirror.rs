@@ -115,7 +115,7 @@ impl MirrorDisk {
     }
 
     /// Where a path of the results folder is in the mirror; `None` if it is outside.
-    fn mirrored(&self, path: &Path) -> Option<PathBuf> {
+    pub(super) fn mirrored(&self, path: &Path) -> Option<PathBuf> {
         let inside = path.strip_prefix(&self.results.root).ok()?;
         Some(self.mirror.root.join(inside))
     }

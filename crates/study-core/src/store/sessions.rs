@@ -180,6 +180,8 @@ impl StudyFolder {
         number: u32,
     ) -> Result<SessionData, StoreError> {
         let path = layout::session(&self.path, id, number);
+        // What a link leads to would be neither verified nor erased.
+        check_kind(self.disk.as_ref(), &path, |name| name == layout::TELEMETRY)?;
         // The head first: a session under way may write on between the two.
         let head = Head::read(self.disk.as_ref(), &path)?;
         let segments = journal::segments(self.disk.as_ref(), &path)?;

@@ -7,9 +7,9 @@
 use super::Finding;
 use crate::outcome::{Event, TelemetryFile};
 use crate::store::journal_record::sha256;
-use crate::store::sessions::{SessionData, check_kind};
+use crate::store::sessions::SessionData;
 use crate::store::telemetry::header;
-use crate::store::{StoreError, StudyFolder, layout, plain};
+use crate::store::{StudyFolder, layout, plain};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
@@ -24,17 +24,8 @@ impl StudyFolder {
         session: &SessionData,
         place: &str,
         found: &mut Vec<Finding>,
-    ) -> Result<(), StoreError> {
+    ) {
         let folder = format!("{place}/{}", layout::TELEMETRY);
-        let is_telemetry = |name: &str| name == layout::TELEMETRY;
-        match check_kind(self.disk.as_ref(), &session.path, is_telemetry) {
-            Err(StoreError::WrongKind { found: what, .. }) => {
-                let what = format!("{what} in the place of a folder");
-                found.push(Finding::problem(folder, what));
-                return Ok(());
-            }
-            other => other.map(drop)?,
-        }
         // Attempts of which the journal says more than the number of samples.
         let mut known = BTreeSet::new();
         for entry in &session.entries {
@@ -78,7 +69,6 @@ impl StudyFolder {
         for (presented, samples) in counted {
             self.count_lines(session, presented, samples, &folder, found);
         }
-        Ok(())
     }
 
     /// Compares a file with the hash that the journal has of it.
