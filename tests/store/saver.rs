@@ -98,6 +98,7 @@ fn lost_telemetry_is_in_the_journal_and_no_problem_for_ever() {
         saved, 3,
         "the session waits for three events and knows of no fourth"
     );
+    disk.remove_file(telemetry()).unwrap();
     let session = study.sessions().unwrap().remove(0);
     let lost = |e: &Event| {
         matches!(
@@ -110,7 +111,6 @@ fn lost_telemetry_is_in_the_journal_and_no_problem_for_ever() {
         )
     };
     assert!(session.entries.iter().any(|e| lost(&e.event)));
-    disk.remove_file(telemetry()).unwrap();
     let [(false, note)] = &findings(&study)[..] else {
         panic!("{:?}", findings(&study));
     };
