@@ -372,14 +372,14 @@ pub(super) fn methods(part: &PartAnalysis) -> String {
     if has("magnitude_mixed/") {
         text.push(
             "Realizations were compared by a linear mixed model of the logarithms with an intercept for each \
-             participant (REML, Satterthwaite's degrees of freedom), contrasts with Holm's correction."
+             participant (REML; F with Satterthwaite's degrees of freedom, contrasts by Kenward and Roger's method with Holm's correction)."
                 .to_owned(),
         );
     }
     if has("psy_mixed/") {
         text.push(
             "Conditions were compared by a linear mixed model with an intercept for each participant \
-             (REML, Satterthwaite's degrees of freedom), contrasts with Holm's correction."
+             (REML; F with Satterthwaite's degrees of freedom, contrasts by Kenward and Roger's method with Holm's correction)."
                 .to_owned(),
         );
     }

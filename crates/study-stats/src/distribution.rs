@@ -137,18 +137,20 @@ pub fn f_quantile(p: f64, df1: f64, df2: f64) -> Option<f64> {
 /// bisection as the fallback.
 pub(super) fn root_of_tail(target: f64, tail: impl Fn(f64) -> Option<f64>) -> Option<f64> {
     let error = |x: f64| tail(x).map(|v| v.ln() - target.ln());
-    if target >= tail(0.0)? {
+    let mut at_low = error(0.0)?;
+    if at_low <= 0.0 {
         return Some(0.0);
     }
     let (mut low, mut high) = (0.0, 1.0);
-    while error(high)? > 0.0 {
-        low = high;
+    let mut at_high = error(high)?;
+    while at_high > 0.0 {
+        (low, at_low) = (high, at_high);
         high *= 2.0;
         if high > 1e300 {
             return None;
         }
+        at_high = error(high)?;
     }
-    let (mut at_low, mut at_high) = (error(low)?, error(high)?);
     for _ in 0..200 {
         let secant = (low * at_high - high * at_low) / (at_high - at_low);
         let middle = if secant > low && secant < high {

@@ -38,7 +38,7 @@ pub use adjusted::{AdjustedMeans, adjusted_means};
 pub use balanced::{BalancedSlope, balanced_slope};
 pub use data::{CellSummary, FixedEffects, LmmData};
 pub use fit::{Criterion, LmmFit, VarianceComponents, fit};
-pub use kenward_roger::kenward_roger;
+pub use kenward_roger::{kenward_roger, kenward_roger_t};
 pub use satterthwaite::{ContrastF, ContrastT};
 pub use slope_variance::{SlopeVariance, slope_variance};
 

@@ -23,7 +23,7 @@ pub fn power(ncp: f64, df: f64, alpha: f64) -> Option<f64> {
         return None;
     }
     let critical = t_quantile(1.0 - alpha / 2.0, df)?;
-    Some(rejected(ncp, df, critical))
+    Some(Scale::of(df).rejected(ncp, critical))
 }
 
 /// Nodes and weights of Gauss–Legendre quadrature on (−1, 1), the half with x ≥ 0.
@@ -36,29 +36,42 @@ const RULE: [(f64, f64); 3] = [
 /// Intervals on which the rule is applied.
 const PANELS: usize = 60;
 
-/// ∫ f(u) P(|Z + δ| > cu) du over the density f of u = √(χ²(ν)/ν).
-fn rejected(ncp: f64, df: f64, critical: f64) -> f64 {
-    let at = |u: f64| normal_upper(critical * u - ncp) + normal_upper(critical * u + ncp);
-    average(df, at).clamp(0.0, 1.0)
-}
+/// A node with a smaller weight changes no probability in double precision.
+const NEGLIGIBLE: f64 = 1e-20;
 
-/// The mean of `g(u)` over u = √(χ²(ν)/ν).
-fn average(df: f64, g: impl Fn(f64) -> f64) -> f64 {
-    // The density is below 10⁻¹⁶ outside.
-    let reach = 9.0 / (2.0 * df).sqrt();
-    let (low, high) = ((1.0 - reach).max(0.0), 1.0 + 1.3 * reach);
-    let half = (high - low) / (2 * PANELS) as f64;
-    let ln_scale = 2f64.ln() + df / 2.0 * (df / 2.0).ln() - ln_gamma(df / 2.0);
-    let at = |u: f64| g(u) * (ln_scale + (df - 1.0) * u.ln() - df * u * u / 2.0).exp();
-    let panel = |i: usize| {
-        let middle = low + half * (2 * i + 1) as f64;
-        let pair = |&(x, w): &(f64, f64)| {
-            let both = at(middle + half * x) + at(middle - half * x);
-            if x == 0.0 { w * both / 2.0 } else { w * both }
+/// u = √(χ²(ν)/ν): values with the probabilities that stand for its density.
+struct Scale(Vec<(f64, f64)>);
+
+impl Scale {
+    fn of(df: f64) -> Self {
+        // The density is below 10⁻¹⁶ outside.
+        let reach = 9.0 / (2.0 * df).sqrt();
+        let (low, high) = ((1.0 - reach).max(0.0), 1.0 + 1.3 * reach);
+        let half = (high - low) / (2 * PANELS) as f64;
+        let ln_scale = 2f64.ln() + df / 2.0 * (df / 2.0).ln() - ln_gamma(df / 2.0);
+        let density = |u: f64| (ln_scale + (df - 1.0) * u.ln() - df * u * u / 2.0).exp();
+        let node = |u: f64, w: f64| (u, half * w * density(u));
+        let panel = |i: usize| {
+            let middle = low + half * (2 * i + 1) as f64;
+            RULE.iter().flat_map(move |&(x, w)| {
+                let other = (x != 0.0).then(|| node(middle - half * x, w));
+                [Some(node(middle + half * x, w)), other]
+            })
         };
-        half * RULE.iter().map(pair).sum::<f64>()
-    };
-    (0..PANELS).map(panel).sum()
+        let nodes = (0..PANELS).flat_map(panel).flatten();
+        Self(nodes.filter(|(_, weight)| *weight > NEGLIGIBLE).collect())
+    }
+
+    /// The mean of `g(u)`.
+    fn average(&self, g: impl Fn(f64) -> f64) -> f64 {
+        self.0.iter().map(|&(u, weight)| g(u) * weight).sum()
+    }
+
+    /// ∫ f(u) P(|Z + δ| > cu) du over the density f of u.
+    fn rejected(&self, ncp: f64, critical: f64) -> f64 {
+        let at = |u: f64| normal_upper(critical * u - ncp) + normal_upper(critical * u + ncp);
+        self.average(at).clamp(0.0, 1.0)
+    }
 }
 
 /// The smallest noncentrality with this power. `None` unless `alpha` < `target` < 1.
@@ -67,7 +80,8 @@ pub fn detectable(target: f64, df: f64, alpha: f64) -> Option<f64> {
         return None;
     }
     let critical = t_quantile(1.0 - alpha / 2.0, df)?;
-    let missed = |ncp: f64| Some(1.0 - rejected(ncp, df, critical));
+    let scale = Scale::of(df);
+    let missed = |ncp: f64| Some(1.0 - scale.rejected(ncp, critical));
     root_of_tail(1.0 - target, missed)
 }
 

@@ -349,7 +349,7 @@ fn tests(a: &Analysis) -> Vec<String> {
     let test = test.or_else(|| finding(&Question::Best)?.test.as_ref());
     if let Some(test) = test {
         let how = match test.kind {
-            TestKind::MixedContrast => "contrasts of the same model",
+            TestKind::MixedContrast => "contrasts of the same model by Kenward and Roger's method",
             _ => "paired t tests",
         };
         let wilcoxon = if wilcoxon {

@@ -146,7 +146,7 @@ pub enum TestKind {
     Friedman,
     /// Paired t test.
     PairedT,
-    /// Contrast of the mixed model of all cell means.
+    /// Contrast of the mixed model of all cell means, Kenward and Roger's degrees of freedom.
     MixedContrast,
     /// Permutation test over all orders of the realizations.
     PermutationExact,

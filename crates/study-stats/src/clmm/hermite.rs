@@ -1,8 +1,8 @@
 //! Nodes and weights of Gauss–Hermite quadrature.
 //!
 //! The nodes are the eigenvalues of the Jacobi matrix with a zero diagonal and the
-//! off-diagonal elements √(k/2) (Golub & Welsch 1969), found by bisection with Sturm
-//! sequences. The weights are Christoffel's, 1/Σ p_k(z)² over the orthonormal
+//! off-diagonal elements √(k/2) (Golub & Welsch 1969), separated by bisection with Sturm
+//! sequences and found by Newton's method. The weights are Christoffel's, 1/Σ p_k(z)² over the orthonormal
 //! polynomials, which are accurate also for the smallest weights.
 
 use std::f64::consts::PI;
@@ -33,21 +33,40 @@ pub(super) fn rule(n: usize) -> Vec<Node> {
     nodes
 }
 
-/// The i-th root, ascending, by bisection on the number of roots below.
+/// The i-th root, ascending.
 fn root(n: usize, i: usize) -> f64 {
     // All roots lie within ±√(2n).
     let (mut low, mut high) = (-(2.0 * n as f64).sqrt() - 1.0, 0.0);
-    loop {
+    // The smallest distance of two roots is above π/√(2n + 1).
+    let alone = 0.1 / (2.0 * n as f64 + 1.0).sqrt();
+    while high - low > alone {
         let middle = 0.5 * (low + high);
-        if middle <= low || middle >= high {
-            return middle;
-        }
         if roots_below(n, middle) > i {
             high = middle;
         } else {
             low = middle;
         }
     }
+    let mut z = 0.5 * (low + high);
+    for _ in 0..6 {
+        z -= step(n, z);
+    }
+    z
+}
+
+/// Newton's step pₙ/pₙ′ at z, with pₙ′ = √(2n) pₙ₋₁.
+fn step(n: usize, z: f64) -> f64 {
+    let (mut before, mut value) = (0.0, 1.0);
+    for k in 0..n {
+        (before, value) = (value, next(k, z, value, before));
+    }
+    value / ((2.0 * n as f64).sqrt() * before)
+}
+
+/// pₖ₊₁ from pₖ and pₖ₋₁, orthonormal polynomials.
+fn next(k: usize, z: f64, value: f64, before: f64) -> f64 {
+    let k = k as f64;
+    (2.0 / (k + 1.0)).sqrt() * z * value - (k / (k + 1.0)).sqrt() * before
 }
 
 /// Number of eigenvalues below x: that of the negative pivots of J − xI (Sturm).
@@ -73,9 +92,7 @@ fn ln_weight(n: usize, z: f64) -> f64 {
     let mut sum = 0.0;
     for k in 0..n {
         sum += value * value;
-        let k = k as f64;
-        let next = (2.0 / (k + 1.0)).sqrt() * z * value - (k / (k + 1.0)).sqrt() * before;
-        (before, value) = (value, next);
+        (before, value) = (value, next(k, z, value, before));
     }
     -sum.ln()
 }

@@ -9,10 +9,11 @@
 
 use super::data::{FixedEffects, LmmData};
 use super::fit::{Criterion, VarianceComponents, fit};
+use super::kenward_roger::kenward_roger_t;
 use super::satterthwaite::{ContrastF, ContrastT};
 use super::{LmmError, RandomEffects};
 
-/// Adjusted means of all realizations, with tests by Satterthwaite's degrees of freedom.
+/// Adjusted means of all realizations, with their tests.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AdjustedMeans {
     /// The numbers that identify the realizations, sorted.
@@ -22,7 +23,7 @@ pub struct AdjustedMeans {
     /// The differences of all pairs of `realizations`, the first minus the second:
     /// (0, 1), (0, 2), …, (1, 2), ….
     pub pairs: Vec<ContrastT>,
-    /// The test that all means are equal.
+    /// The test that all means are equal, by Satterthwaite's degrees of freedom.
     pub effect: Option<ContrastF>,
     /// The variances: of the subjects, and of the cell means (`error`).
     pub variances: VarianceComponents,
@@ -53,7 +54,8 @@ pub fn adjusted_means(table: &LmmData) -> Result<AdjustedMeans, LmmError> {
         l
     };
     let contrasts: Vec<Vec<f64>> = (0..k).map(unit).chain(pairs.map(difference)).collect();
-    let mut means = found.t_tests(&contrasts);
+    let adjusted = kenward_roger_t(&found, &contrasts);
+    let mut means = adjusted.unwrap_or_else(|| found.t_tests(&contrasts));
     let pairs = means.split_off(k);
     Ok(AdjustedMeans {
         means,

@@ -1,4 +1,4 @@
-//! Kenward & Roger's (1997) F test of realization means in a model with a subject
+//! Kenward & Roger's (1997) F and t tests of realization means in a model with a subject
 //! intercept.
 //!
 //! V = σ²I + τ²J within a subject with n ratings.
@@ -17,82 +17,115 @@
 use super::RandomEffects;
 use super::data::FixedEffects;
 use super::fit::{Criterion, LmmFit};
-use super::satterthwaite::ContrastF;
+use super::satterthwaite::{ContrastF, ContrastT, contrast, quadratic};
 use crate::distribution::f_upper;
 use crate::finite;
-use nalgebra::{Cholesky, DMatrix};
+use nalgebra::{Cholesky, DMatrix, Matrix2};
+
+/// The quantities of the model that no contrast changes, with σ² = 1: it cancels in F and
+/// its degrees of freedom.
+struct Adjustment {
+    phi: DMatrix<f64>,
+    /// Φ_A.
+    adjusted: DMatrix<f64>,
+    /// ΦPᵢΦ.
+    sandwich: [DMatrix<f64>; 2],
+    w: Matrix2<f64>,
+}
+
+/// The two variances cannot be told apart if the correlation of their estimates is within
+/// this of ±1.
+const SEPARATE: f64 = 1e-9;
+
+impl Adjustment {
+    fn of(fit: &LmmFit<'_>) -> Option<Self> {
+        let table = fit.table;
+        let wanted = table.fixed == FixedEffects::Realizations
+            && fit.coordinates.random == RandomEffects::default()
+            && fit.criterion == Criterion::Reml;
+        let p = Some(table.columns()).filter(|_| wanted)?;
+        let gamma = fit.coordinates.ratios(&fit.at).intercept;
+        let zero = || DMatrix::<f64>::zeros(p, p);
+        let mut information = zero();
+        let mut p_of = [zero(), zero()];
+        let mut q_of = [zero(), zero(), zero()];
+        let mut traces = [0.0; 3];
+        for pattern in &table.patterns {
+            let k = pattern.subjects;
+            let n: f64 = pattern.units.iter().map(|u| u.n).sum();
+            let e = 1.0 / (1.0 + n * gamma);
+            let less = |power: i32| (1.0 - e.powi(power)) / n;
+            traces[0] += k * (n * e).powi(2);
+            traces[1] += k * n * e * e;
+            traces[2] += k * (n - 1.0 + e * e);
+            for a in &pattern.units {
+                let i = a.realization;
+                information[(i, i)] += k * a.n;
+                p_of[1][(i, i)] -= k * a.n;
+                q_of[2][(i, i)] += k * a.n;
+                for b in &pattern.units {
+                    let j = b.realization;
+                    let both = k * a.n * b.n;
+                    information[(i, j)] -= both * less(1);
+                    p_of[0][(i, j)] -= both * e * e;
+                    p_of[1][(i, j)] += both * less(2);
+                    q_of[0][(i, j)] += both * n * e.powi(3);
+                    q_of[1][(i, j)] += both * e.powi(3);
+                    q_of[2][(i, j)] -= both * less(3);
+                }
+            }
+        }
+        let phi = Cholesky::new(information)?.inverse();
+        let phi_p = [&phi * &p_of[0], &phi * &p_of[1]];
+        let both = |i: usize, j: usize| i + j;
+        let expected = Matrix2::from_fn(|i, j| {
+            traces[both(i, j)] - 2.0 * (&phi * &q_of[both(i, j)]).trace()
+                + (&phi_p[i] * &phi_p[j]).trace()
+        });
+        let scale = expected[(0, 0)] * expected[(1, 1)];
+        let separate = expected.determinant() > SEPARATE * scale;
+        let w = expected.try_inverse().filter(|_| separate)? * 2.0;
+        let mut inner = zero();
+        for i in 0..2 {
+            for j in 0..2 {
+                inner += (&q_of[both(i, j)] - &p_of[i] * &phi_p[j]) * w[(i, j)];
+            }
+        }
+        Some(Self {
+            adjusted: &phi + &phi * inner * &phi * 2.0,
+            sandwich: phi_p.map(|phi_p| phi_p * &phi),
+            phi,
+            w,
+        })
+    }
+
+    /// The sum of Wᵢⱼ times `term` of i and j.
+    fn weighted(&self, term: impl Fn(usize, usize) -> f64) -> f64 {
+        let pairs = [(0, 0), (0, 1), (1, 0), (1, 1)];
+        pairs
+            .iter()
+            .map(|&(i, j)| self.w[(i, j)] * term(i, j))
+            .sum()
+    }
+}
 
 /// Tests that all realizations have the same mean. `None` unless the model was fitted by
 /// REML with [`FixedEffects::Realizations`] and a subject intercept only, or if the
 /// adjustment is not defined.
 pub fn kenward_roger(fit: &LmmFit<'_>) -> Option<ContrastF> {
-    let table = fit.table;
-    let wanted = table.fixed == FixedEffects::Realizations
-        && fit.coordinates.random == RandomEffects::default()
-        && fit.criterion == Criterion::Reml;
-    let p = table.columns();
-    let q = p.checked_sub(1).filter(|q| *q > 0 && wanted)?;
-    // σ² = 1 without loss of generality: it cancels in F and its degrees of freedom.
-    let gamma = fit.coordinates.ratios(&fit.at).intercept;
-    let zero = || DMatrix::<f64>::zeros(p, p);
-    let mut information = zero();
-    let mut p_of = [zero(), zero()];
-    let mut q_of = [zero(), zero(), zero()];
-    let mut traces = [0.0; 3];
-    for pattern in &table.patterns {
-        let k = pattern.subjects;
-        let n: f64 = pattern.units.iter().map(|u| u.n).sum();
-        let e = 1.0 / (1.0 + n * gamma);
-        let less = |power: i32| (1.0 - e.powi(power)) / n;
-        traces[0] += k * (n * e).powi(2);
-        traces[1] += k * n * e * e;
-        traces[2] += k * (n - 1.0 + e * e);
-        for a in &pattern.units {
-            let i = a.realization;
-            information[(i, i)] += k * a.n;
-            p_of[1][(i, i)] -= k * a.n;
-            q_of[2][(i, i)] += k * a.n;
-            for b in &pattern.units {
-                let j = b.realization;
-                let both = k * a.n * b.n;
-                information[(i, j)] -= both * less(1);
-                p_of[0][(i, j)] -= both * e * e;
-                p_of[1][(i, j)] += both * less(2);
-                q_of[0][(i, j)] += both * n * e.powi(3);
-                q_of[1][(i, j)] += both * e.powi(3);
-                q_of[2][(i, j)] -= both * less(3);
-            }
-        }
-    }
-    let phi = Cholesky::new(information)?.inverse();
-    let phi_p = [&phi * &p_of[0], &phi * &p_of[1]];
-    let at = |i: usize, j: usize| i + j;
-    let mut expected = nalgebra::Matrix2::<f64>::zeros();
-    for i in 0..2 {
-        for j in 0..2 {
-            expected[(i, j)] = traces[at(i, j)] - 2.0 * (&phi * &q_of[at(i, j)]).trace()
-                + (&phi_p[i] * &phi_p[j]).trace();
-        }
-    }
-    let w = expected.try_inverse()? * 2.0;
+    let found = Adjustment::of(fit)?;
+    let p = fit.table.columns();
+    let q = p.checked_sub(1).filter(|q| *q > 0)?;
     let l = DMatrix::from_fn(q, p, |i, j| {
         f64::from(i8::from(j == i + 1) - i8::from(j == 0))
     });
-    let theta = l.transpose() * Cholesky::new(&l * &phi * l.transpose())?.inverse() * &l;
-    let mut inner = zero();
-    let (mut a1, mut a2) = (0.0, 0.0);
-    let tpp = [&theta * &phi_p[0] * &phi, &theta * &phi_p[1] * &phi];
-    for i in 0..2 {
-        for j in 0..2 {
-            inner += (&q_of[at(i, j)] - &p_of[i] * &phi_p[j]) * w[(i, j)];
-            a1 += w[(i, j)] * tpp[i].trace() * tpp[j].trace();
-            a2 += w[(i, j)] * (&tpp[i] * &tpp[j]).trace();
-        }
-    }
-    let adjusted = &phi + &phi * inner * &phi * 2.0;
+    let theta = l.transpose() * Cholesky::new(&l * &found.phi * l.transpose())?.inverse() * &l;
+    let tpp = [0, 1].map(|i| &theta * &found.sandwich[i]);
+    let a1 = found.weighted(|i, j| tpp[i].trace() * tpp[j].trace());
+    let a2 = found.weighted(|i, j| (&tpp[i] * &tpp[j]).trace());
     let (df2, lambda) = scaled(a1, a2, q as f64)?;
     let values = &l * &fit.profile.beta;
-    let middle = Cholesky::new(&l * adjusted * l.transpose())?;
+    let middle = Cholesky::new(&l * found.adjusted * l.transpose())?;
     let wald = values.dot(&middle.solve(&values)) / fit.sigma2;
     let f = finite(lambda * wald / q as f64)?;
     Some(ContrastF {
@@ -101,6 +134,23 @@ pub fn kenward_roger(fit: &LmmFit<'_>) -> Option<ContrastF> {
         df2: Some(df2),
         p: f_upper(f, q as f64, df2),
     })
+}
+
+/// Tests each of several contrasts Σ lᵢβᵢ. Here q = 1, so that A₁ = A₂ = A, λ = 1 and
+/// m = 2/A; the standard error is that of Φ_A. `None` as in [`kenward_roger`].
+pub fn kenward_roger_t(fit: &LmmFit<'_>, contrasts: &[Vec<f64>]) -> Option<Vec<ContrastT>> {
+    let found = Adjustment::of(fit)?;
+    let test = |l: &Vec<f64>| {
+        let scaled = fit.scaled(l);
+        let variance = quadratic(&found.phi, &scaled);
+        let share = |i: usize| quadratic(&found.sandwich[i], &scaled) / variance;
+        let a = found.weighted(|i, j| share(i) * share(j));
+        let se = (quadratic(&found.adjusted, &scaled) * fit.sigma2)
+            .max(0.0)
+            .sqrt();
+        contrast(fit.estimate(l), se, finite(2.0 / a).filter(|df| *df > 0.0))
+    };
+    Some(contrasts.iter().map(test).collect())
 }
 
 /// The denominator degrees of freedom m and the scale λ.

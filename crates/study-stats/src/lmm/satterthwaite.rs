@@ -24,7 +24,8 @@ pub struct ContrastT {
     pub se: f64,
     /// estimate/se; `None` if it overflows.
     pub t: Option<f64>,
-    /// Satterthwaite's degrees of freedom; `None` if the criterion has no curvature.
+    /// Degrees of freedom, Satterthwaite's or Kenward and Roger's; `None` if the criterion
+    /// has no curvature.
     pub df: Option<f64>,
     /// Two-sided p of t.
     pub p: Option<f64>,
@@ -67,10 +68,24 @@ impl Uncertainty {
 }
 
 /// l'Al; a contrast has few elements that are not 0.
-fn quadratic(a: &DMatrix<f64>, l: &DVector<f64>) -> f64 {
+pub(super) fn quadratic(a: &DMatrix<f64>, l: &DVector<f64>) -> f64 {
     let used: Vec<usize> = (0..l.len()).filter(|&i| l[i] != 0.0).collect();
     let row = |i: usize| l[i] * used.iter().map(|&j| a[(i, j)] * l[j]).sum::<f64>();
     used.iter().map(|&i| row(i)).sum()
+}
+
+/// The t test of a contrast with its standard error and degrees of freedom.
+pub(super) fn contrast(estimate: f64, se: f64, df: Option<f64>) -> ContrastT {
+    let t = finite(estimate / se);
+    let half = df.and_then(|df| t_quantile(0.975, df)).map(|q| q * se);
+    ContrastT {
+        estimate,
+        se,
+        t,
+        df,
+        p: t.zip(df).and_then(|(t, df)| t_two_sided(t, df)),
+        ci95: half.map(|h| (estimate - h, estimate + h)),
+    }
 }
 
 impl LmmFit<'_> {
@@ -90,7 +105,7 @@ impl LmmFit<'_> {
     }
 
     /// The contrast, applied to standardised effects.
-    fn scaled(&self, l: &[f64]) -> DVector<f64> {
+    pub(super) fn scaled(&self, l: &[f64]) -> DVector<f64> {
         DVector::from_iterator(
             l.len(),
             self.units().iter().zip(l).map(|((unit, _), l)| l * unit),
@@ -100,18 +115,7 @@ impl LmmFit<'_> {
     fn t_with(&self, l: &[f64], covariance: &DMatrix<f64>, u: Option<&Uncertainty>) -> ContrastT {
         let scaled = self.scaled(l);
         let se = quadratic(covariance, &scaled).max(0.0).sqrt();
-        let estimate = self.estimate(l);
-        let df = u.and_then(|u| u.df(&scaled));
-        let t = finite(estimate / se);
-        let half = df.and_then(|df| t_quantile(0.975, df)).map(|q| q * se);
-        ContrastT {
-            estimate,
-            se,
-            t,
-            df,
-            p: t.zip(df).and_then(|(t, df)| t_two_sided(t, df)),
-            ci95: half.map(|h| (estimate - h, estimate + h)),
-        }
+        contrast(self.estimate(l), se, u.and_then(|u| u.df(&scaled)))
     }
 
     /// Tests that the means of all realizations are equal. `None` unless the model has

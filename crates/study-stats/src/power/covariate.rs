@@ -11,7 +11,7 @@
 //! mean slope, which that scatter does not contain: with κ = 1 + qσ²ₛ/(nV) it is t/√κ that
 //! is noncentral t, with δ/√κ. The limit for n → ∞ is the ceiling: only σₘ is left of V.
 
-use super::{average, rejected};
+use super::Scale;
 use crate::distribution::{normal_upper, t_quantile};
 use crate::finite;
 use statrs::function::gamma::ln_gamma;
@@ -129,14 +129,15 @@ impl Design {
     pub fn power(&self, alpha: f64) -> Option<f64> {
         let (df, critical) = self.critical(alpha)?;
         let v = self.scatter();
+        let scale = Scale::of(df);
         let given = |sxx: f64| {
             let root = self.inflation(sxx).sqrt();
-            rejected(self.slope * (sxx / v).sqrt() / root, df, critical / root)
+            scale.rejected(self.slope * (sxx / v).sqrt() / root, critical / root)
         };
         let q = self.realizations as f64;
         Some(match self.values {
             Values::Fixed => given(q),
-            Values::Drawn => average(q - 1.0, |u| given((q - 1.0) * u * u)),
+            Values::Drawn => Scale::of(q - 1.0).average(|u| given((q - 1.0) * u * u)),
         })
     }
 
@@ -253,9 +254,10 @@ fn mean_root(df: f64) -> f64 {
 /// 2014).
 fn errors(ncp: f64, df: f64, critical: f64) -> (f64, f64) {
     let density = |z: f64| (-0.5 * z * z).exp() / (2.0 * PI).sqrt();
-    let power = rejected(ncp, df, critical);
-    let wrong = average(df, |u| normal_upper(critical * u + ncp));
-    let size = average(df, |u| {
+    let scale = Scale::of(df);
+    let power = scale.rejected(ncp, critical);
+    let wrong = scale.average(|u| normal_upper(critical * u + ncp));
+    let size = scale.average(|u| {
         let (right, left) = (critical * u - ncp, critical * u + ncp);
         ncp * (normal_upper(right) - normal_upper(left)) + density(right) + density(left)
     });

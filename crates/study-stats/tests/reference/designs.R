@@ -32,18 +32,18 @@ for (n in names(designs)) { d<-designs[[n]]
   f <- if (rep) y~m+(1|s)+(1|s:m) else y~m+(1|s)
   a <- lmer(f, d, control=ctl)
   # Means, pairs and F of the ratings, and of the cell means.
-  of <- function(f, d, prefix) {
+  of <- function(f, d, prefix, df) {
     a <- lmer(f, d, control=ctl)
     put(paste0(prefix,"variances"), num(comp(a,"s"), comp(a,"s:m"), sigma(a)^2))
-    e <- emmeans(a, ~m, lmer.df="satterthwaite")
+    e <- emmeans(a, ~m, lmer.df=df)
     t <- as.data.frame(summary(e))
     for (j in 1:k) put(paste0(prefix,"mean"), num(unlist(t[j,2:6])))
     t <- as.data.frame(summary(pairs(e, adjust="none"), infer=c(TRUE,TRUE)))
     for (i in 1:nrow(t)) put(paste0(prefix,"pair"), num(unlist(t[i,c("estimate","SE","df","lower.CL","upper.CL","t.ratio","p.value")])))
     w <- anova(a); put(paste0(prefix,"F"), num(w$`F value`, w$NumDF, w$DenDF, w$`Pr(>F)`))
   }
-  of(if (rep) y~m+(1|s)+(1|s:m) else y~m+(1|s), d, "")
-  of(y~m+(1|s), aggregate(y~s+m, d, mean), "cell_")
+  of(if (rep) y~m+(1|s)+(1|s:m) else y~m+(1|s), d, "", "satterthwaite")
+  of(y~m+(1|s), aggregate(y~s+m, d, mean), "cell_", "kenward-roger")
   f <- if (rep) y~x+(1|s)+(1|m)+(1|s:m) else y~x+(1|s)+(1|m)
   b <- lmer(f, d, control=ctl)
   z <- coef(summary(b))["x",]

@@ -61,8 +61,8 @@ pub(super) struct Threshold<'a> {
     pub(super) value: f64,
 }
 
-/// The mixed model in `group`, threshold ~ condition + (1 | participant) by REML, with Satterthwaite's
-/// degrees of freedom: of natural logarithms, so that differences are ratios, unless the
+/// The mixed model in `group`, threshold ~ condition + (1 | participant) by REML, F with Satterthwaite's
+/// degrees of freedom, contrasts with Kenward and Roger's: of natural logarithms, so that differences are ratios, unless the
 /// levels have no ratios, as those of a blend. Nothing with one condition.
 pub(super) fn mixed(group: &str, thresholds: &[Threshold<'_>], ratios: bool, values: &mut Values) {
     let names = |of: fn(&Threshold<'_>) -> String| -> Vec<String> {
@@ -171,8 +171,9 @@ mod tests {
         values
     }
 
-    /// R 4.2.2: lmer(log(t) ~ c + (1|p)) of lme4 with lmerTest and emmeans. Its search stops
-    /// within 1e-6 of the optimum, which the degrees of freedom follow.
+    /// R 4.2.2: lmer(log(t) ~ c + (1|p)) of lme4 with lmerTest and emmeans
+    /// (`lmer.df = "kenward-roger"`). Its search stops within 1e-6 of the optimum, which the
+    /// degrees of freedom follow.
     #[test]
     fn conditions_are_compared_by_the_mixed_model_of_logarithms() {
         let values = of(true);
@@ -184,14 +185,14 @@ mod tests {
             ("sd_participant", 0.2859466002),
             ("sd_error", 0.1305492018),
             ("x/geometric_mean", 0.319921852099),
-            ("x/ci95_lo", 0.222969700375),
-            ("z/ci95_hi", 0.744972374412),
+            ("x/ci95_lo", 0.222829973271),
+            ("z/ci95_hi", 0.745733322319),
             ("x|y/ratio", 0.740112344923),
-            ("x|y/ci95_lo", 0.608939309289),
-            ("x|z/t", -5.39175101248),
-            ("x|z/df", 7.09585939158),
-            ("y|z/p", 0.080340255854569),
-            ("x|y/p_holm", 0.01635305310446),
+            ("x|y/ci95_lo", 0.608847212186),
+            ("x|z/t", -5.37171391024),
+            ("x|z/df", 7.06918395354),
+            ("y|z/p", 0.08139892217989),
+            ("x|y/p_holm", 0.01646204458111),
         ] {
             let found = values.number(&format!("psy_mixed/{id}")).unwrap();
             assert!(
