@@ -130,6 +130,27 @@ impl Rater {
         ((judged - 1.0) / 6.0).clamp(0.0, 1.0)
     }
 
+    /// The answer to a choice of which the share of one option is analyzed: `counted` if the
+    /// realization is judged above the middle of the scale, otherwise one of the others.
+    pub fn answer_counted(
+        &mut self,
+        question: &Question,
+        counted: &str,
+        felt: Option<&Impression>,
+    ) -> Answer {
+        let felt = felt.filter(|_| self.effect == Effect::BuiltIn);
+        let above = self.position(question, felt) > 0.5;
+        let others: Vec<&String> = match &question.kind {
+            QuestionKind::Choice { options, .. } => {
+                options.iter().filter(|o| *o != counted).collect()
+            }
+            _ => Vec::new(),
+        };
+        let other = others.get(self.pick(others.len()));
+        let chosen = other.filter(|_| !above).map_or(counted, |o| o.as_str());
+        Answer::Choice(vec![chosen.to_owned()])
+    }
+
     fn choose(&mut self, options: &[String], multiple: bool) -> Answer {
         let first = self.pick(options.len());
         let chosen = options
@@ -283,6 +304,37 @@ mod tests {
             .filter(|s| (6.0..15.0).contains(s))
             .count();
         assert!(within > 880, "{within}");
+    }
+
+    #[test]
+    fn the_counted_answer_is_that_of_what_is_judged_above_the_middle() {
+        let options = ["no", "yes", "cannot say"].map(str::to_owned).to_vec();
+        let kind = QuestionKind::Choice {
+            options,
+            multiple: false,
+        };
+        let question = question("real", true, kind);
+        let share = |effect, error: f64| {
+            let mut said = [0u32; 3];
+            for number in 1..=400 {
+                let mut rater = Rater::new(11, number, effect);
+                let answer = rater.answer_counted(&question, "yes", Some(&felt(error)));
+                assert_eq!(question.accepts(&answer), Ok(()));
+                let Answer::Choice(chosen) = answer else {
+                    panic!()
+                };
+                let options = ["yes", "no", "cannot say"];
+                said[options.iter().position(|o| *o == chosen[0]).unwrap()] += 1;
+            }
+            // the other answers are drawn
+            assert!(said[1].abs_diff(said[2]) < 60, "{said:?}");
+            f64::from(said[0]) / 400.0
+        };
+        // opinions of 6, 4 and 2 on the scale from 1 to 7
+        let [good, middle, bad] = [0.0, 20.0 / 7.0, 40.0 / 7.0].map(|e| share(Effect::BuiltIn, e));
+        assert!(good > 0.9 && bad < 0.1, "{good} {bad}");
+        assert!((middle - 0.5).abs() < 0.1, "{middle}");
+        assert!((share(Effect::None, 0.0) - 0.5).abs() < 0.1);
     }
 
     fn any_kind() -> impl Strategy<Value = QuestionKind> {

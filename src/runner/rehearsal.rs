@@ -229,7 +229,11 @@ fn answers(
         let trial = felt.trial;
         let compared =
             trial.and_then(|trial| rater.compare(question, trial, felt.protocol, felt.percepts));
-        compared.unwrap_or_else(|| rater.answer(question, impression))
+        let counted = felt.protocol.analysis.share_of(&question.id);
+        compared.unwrap_or_else(|| match counted {
+            Some(counted) => rater.answer_counted(question, counted, impression),
+            None => rater.answer(question, impression),
+        })
     };
     questions
         .iter()
