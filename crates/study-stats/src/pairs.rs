@@ -67,6 +67,9 @@ pub enum NoAbilities {
     /// The order effect needs pairs that were presented in both orders.
     #[error("no pair was presented in both orders")]
     OneOrder,
+    /// Nobody preferred anything.
+    #[error("every comparison is a tie")]
+    AllTied,
     /// The search found no maximum.
     #[error("the likelihood has no maximum that was found")]
     NotFound,
@@ -268,6 +271,9 @@ pub fn abilities(
     let sum = |f: fn(&Comparison) -> f64| comparisons.iter().map(f).sum::<f64>();
     let with_ties = ties && sum(|c| c.tied) > 0.0;
     existence::check(items, comparisons, with_ties, model.order)?;
+    if with_ties && sum(|c| c.first_preferred + c.second_preferred) == 0.0 {
+        return Err(NoAbilities::AllTied);
+    }
     let order_place = items - 1;
     let tie_place = order_place + usize::from(model.order);
     let size = tie_place + usize::from(with_ties);

@@ -97,14 +97,17 @@ fn refused(
     let label = family.at(failing).certificate().to_string();
     Some(match family.passing(low, high) {
         Passing::Between(from, to) => Fault::error(format!(
-            "levels of the family `{id}` can put energy into a hand: of {low} to {high} only {from:.6} to {to:.6} pass"
+            "levels of the family `{id}` can put energy into a hand: of {low} to {high} only {} to {} pass",
+            // Rounded inwards, so that they pass.
+            (from * 1e6).ceil() / 1e6,
+            (to * 1e6).floor() / 1e6,
         ))
-        .label(format!("level {failing:.6}: {label}"))
+        .label(format!("level {failing}: {label}"))
         .hint("take a range that passes"),
         Passing::All | Passing::None => Fault::error(format!(
             "no level of the family `{id}` from {low} to {high} passes its certificate"
         ))
-        .label(format!("level {failing:.6}: {label}"))
+        .label(format!("level {failing}: {label}"))
         .hint(PERMIT),
     })
 }

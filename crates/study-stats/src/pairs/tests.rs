@@ -170,3 +170,19 @@ fn circular_triads_are_counted() {
     assert_eq!(circular_triads(3, &[(0, 1), (1, 0), (1, 2)]), None);
     assert_eq!(circular_triads(3, &[(0, 1), (1, 2), (0, 7)]), None);
 }
+
+/// Nothing but ties: the weight of a tie has no maximum, and says why.
+#[test]
+fn ties_alone_have_no_abilities() {
+    let model = Model {
+        link: Link::Davidson,
+        order: false,
+    };
+    let tied = [pair(0, 1, [0.0, 0.0, 4.0]), pair(1, 2, [0.0, 0.0, 3.0])];
+    assert!(matches!(
+        abilities(3, &tied, model),
+        Err(NoAbilities::AllTied)
+    ));
+    let once = [tied[0], tied[1], pair(2, 0, [1.0, 0.0, 2.0])];
+    assert!(abilities(3, &once, model).is_ok());
+}

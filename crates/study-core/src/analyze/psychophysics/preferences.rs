@@ -202,6 +202,9 @@ fn reason(error: &NoAbilities, items: &[&str]) -> String {
                 names(top)
             )
         }
-        NoAbilities::NoPairs | NoAbilities::OneOrder | NoAbilities::NotFound => error.to_string(),
+        NoAbilities::NoPairs
+        | NoAbilities::OneOrder
+        | NoAbilities::AllTied
+        | NoAbilities::NotFound => error.to_string(),
     }
 }
