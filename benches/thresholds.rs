@@ -4,17 +4,19 @@
 //! `cargo bench --bench thresholds -- --tracks 2000` simulates a participant in a
 //! two-interval task whose function is a cumulative normal with mean 0.5 and standard
 //! deviation 0.2, on a ladder from 0 to 2. The seed is fixed: the same number of tracks
-//! prints the same tables for any number of threads.
+//! prints the same tables for any number of threads. The last table is of a ladder whose levels
+//! are spaced by equal ratios, fitted over the level and over its logarithm.
 #![allow(clippy::print_stdout)]
 
 use rayon::prelude::*;
 use study_base::rng::Stream;
 use study_core::procedure::{
-    Answer, Constant, Ladder, QuestPlus, Rule, Scale, Staircase, Stop, Track,
+    Answer, Constant, Function, Ladder, Parameter, QuestPlus, Rule, Scale, Staircase, Stop, Track,
 };
 use study_stats::describe;
+use study_stats::distribution::normal_cdf;
 use study_stats::psychometric::{
-    Core, Curve, Experiment, Level, Support, maximum_likelihood, posterior,
+    Core, Curve, Experiment, Level, Posterior, Spacing, Support, maximum_likelihood, posterior,
 };
 
 const MEAN: f64 = 0.5;
@@ -23,15 +25,31 @@ const SD: f64 = 0.2;
 const WIDTH: f64 = 3.289_707_253_902_944;
 
 fn main() {
-    let mut tracks = 200;
+    let (mut tracks, mut ratios_only) = (200, false);
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         if argument == "--tracks" {
             let given = arguments.next().and_then(|n| n.parse().ok());
             tracks = given.expect("--tracks takes a number");
         }
+        ratios_only |= argument == "--ratios";
     }
     println!("{tracks} tracks each\n");
+    if !ratios_only {
+        equal_differences(tracks);
+    }
+    println!(
+        "\n| participant | procedure | trials | fitted | estimate / threshold | SD of ln | below half, above twice | threshold | width |\n|---|---|---|---|---|---|---|---|---|"
+    );
+    for participant in [Grown::Weibull, Grown::Proportional] {
+        for (name, rule) in ratio_rules() {
+            print_ratios(participant, name, &rule, tracks);
+        }
+    }
+}
+
+/// The tables of a ladder whose levels are equally far apart.
+fn equal_differences(tracks: u64) {
     println!(
         "| procedure | lapses | trials | target | bias | SD | not estimated |\n|---|---|---|---|---|---|---|"
     );
@@ -104,15 +122,19 @@ fn procedures() -> Vec<(&'static str, Rule)> {
 }
 
 /// One track: its answers, and the estimate at its end.
-fn simulate(rule: &Rule, curve: &Curve, stream: &mut Stream) -> (Vec<Answer>, Option<f64>) {
-    let ladder = ladder();
-    let mut track = Track::new(rule, &ladder, stream).expect("the rule is good");
+fn simulate(
+    rule: &Rule,
+    ladder: &Ladder,
+    correct: impl Fn(f64) -> f64,
+    stream: &mut Stream,
+) -> (Vec<Answer>, Option<f64>) {
+    let mut track = Track::new(rule, ladder, stream).expect("the rule is good");
     let mut answers = Vec::new();
     while let Some(proposal) = track.next() {
         let presented = ladder.level(proposal.step);
         let answer = Answer {
             presented,
-            positive: stream.unit() < curve.value(presented),
+            positive: stream.unit() < correct(presented),
             easy: false,
         };
         track.answer(&answer);
@@ -129,7 +151,10 @@ fn simulated(
 ) -> Vec<(Vec<Answer>, Option<f64>)> {
     (0..tracks)
         .into_par_iter()
-        .map(|i| simulate(rule, curve, &mut Stream::new(i, &["thresholds", name])))
+        .map(|i| {
+            let mut stream = Stream::new(i, &["thresholds", name]);
+            simulate(rule, &ladder(), |x| curve.value(x), &mut stream)
+        })
         .collect()
 }
 
@@ -222,6 +247,154 @@ fn print_coverage(name: &str, rule: &Rule, lambda: f64, tracks: u64) {
             share(|c| c.0),
             share(|c| c.1),
             found.len() - covered.len(),
+        );
+    }
+}
+
+/// Participants on a ladder of ratios, with 2 % lapses: the share correct rises with the level
+/// as a Weibull function of slope 2, or d′ is in proportion to the level.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Grown {
+    Weibull,
+    Proportional,
+}
+
+/// Where the function without guesses and lapses is ½.
+const RATIO_THRESHOLD: f64 = 0.095;
+
+impl Grown {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Weibull => "Weibull",
+            Self::Proportional => "d′ in proportion",
+        }
+    }
+
+    /// The function without guesses and lapses.
+    fn core(self, level: f64) -> f64 {
+        let x = level / RATIO_THRESHOLD;
+        match self {
+            Self::Weibull => -(-std::f64::consts::LN_2 * x * x).exp_m1(),
+            // 2 Φ(z(.75) x) − 1
+            Self::Proportional => 2.0 * normal_cdf(0.674_489_750_196_082 * x) - 1.0,
+        }
+    }
+
+    /// The logarithm of the ratio of the levels at .95 and .05.
+    fn width(self) -> f64 {
+        let level_at = |share: f64| {
+            let (mut low, mut high) = (1e-6, 1e3);
+            for _ in 0..200 {
+                let middle = f64::sqrt(low * high);
+                match self.core(middle) < share {
+                    true => low = middle,
+                    false => high = middle,
+                }
+            }
+            low
+        };
+        (level_at(0.95) / level_at(0.05)).ln()
+    }
+}
+
+/// 30 levels from 0.02 to 0.6, as the templates of `study new` have.
+fn ratio_ladder() -> Ladder {
+    let level = |i: i32| 0.02 * f64::powf(30.0, f64::from(i) / 29.0);
+    Ladder::new((0..30).map(level).collect()).expect("levels rise")
+}
+
+fn ratio_rules() -> Vec<(&'static str, Rule)> {
+    let ladder = ratio_ladder();
+    let quest = |trials| {
+        let parameters = vec![
+            Parameter::new("threshold", ladder.levels().to_vec()),
+            Parameter::new("slope", vec![0.8, 1.3, 2.0, 3.0, 5.0, 8.0]),
+            Parameter::new("gamma", vec![0.5]),
+            Parameter::new("lambda", vec![0.01, 0.03, 0.06]),
+        ];
+        Rule::QuestPlus(QuestPlus::new(Function::Weibull, parameters, trials))
+    };
+    let staircase = |reversals, max_trials| {
+        Rule::Staircase(Staircase {
+            up: 1,
+            down: 3,
+            start: 0.5,
+            steps: vec![0.2, 0.1],
+            scale: Scale::Log,
+            step_up_factor: 1.0,
+            min_level: None,
+            max_level: None,
+            initial_one_up_one_down: true,
+            stop: Stop {
+                reversals,
+                min_trials: 0,
+                max_trials,
+            },
+            estimate_last: 6,
+        })
+    };
+    let constant = Rule::Constant(Constant {
+        levels: [4, 9, 14, 19, 24].map(|i| ladder.level(i)).to_vec(),
+        repetitions: 20,
+    });
+    vec![
+        ("1-up-3-down, 8 reversals", staircase(8, 60)),
+        ("QUEST+, 40 trials", quest(40)),
+        ("QUEST+, 100 trials", quest(100)),
+        ("constant, 5 × 20", constant),
+    ]
+}
+
+fn print_ratios(participant: Grown, name: &str, rule: &Rule, tracks: u64) {
+    let ladder = ratio_ladder();
+    let correct = |level: f64| 0.5 + 0.48 * participant.core(level);
+    let found: Vec<Vec<Answer>> = (0..tracks)
+        .into_par_iter()
+        .map(|i| {
+            let mut stream = Stream::new(i, &["ratios", participant.name(), name]);
+            simulate(rule, &ladder, correct, &mut stream).0
+        })
+        .collect();
+    let trials: Vec<f64> = found.iter().map(|a| a.len() as f64).collect();
+    for (fitted, spacing, core) in [
+        ("level, normal", Spacing::Lin, Core::Norm),
+        ("logarithm, Weibull", Spacing::Log, Core::Gumbel),
+    ] {
+        let places = ladder.levels().iter().filter_map(|x| spacing.place(*x));
+        let support = Support::of(places);
+        let width = (spacing == Spacing::Log).then(|| participant.width());
+        let one = |answers: &Vec<Answer>| {
+            let placed = spacing.places(&levels(answers));
+            posterior(core, &placed, Experiment::ForcedChoice(0.5), support).ok()
+        };
+        let fits: Vec<Posterior> = found.par_iter().filter_map(one).collect();
+        let estimates: Vec<f64> = (fits.iter())
+            .map(|p| p.threshold_level(spacing).mean / RATIO_THRESHOLD)
+            .collect();
+        // Over the level, an estimate can be 0 or less.
+        let positive: Vec<f64> = estimates
+            .iter()
+            .filter(|e| **e > 0.0)
+            .map(|e| e.ln())
+            .collect();
+        let far = estimates.iter().filter(|e| **e < 0.5 || **e > 2.0).count();
+        let share = |n: usize| n as f64 / fits.len() as f64;
+        let within = |(low, high): (f64, f64), truth: f64| low <= truth && truth <= high;
+        let truth = spacing.place(RATIO_THRESHOLD).unwrap_or_default();
+        let covered = fits
+            .iter()
+            .filter(|p| within(p.threshold.ci95, truth))
+            .count();
+        let widths = width.map(|w| fits.iter().filter(|p| within(p.width.ci95, w)).count());
+        println!(
+            "| {} | {name} | {:.1} | {fitted} | {:.3} | {:.3} | {:.3} | {:.3} | {} |",
+            participant.name(),
+            describe::mean(&trials).unwrap_or_default(),
+            describe::mean(&positive).unwrap_or_default().exp(),
+            describe::sd(&positive).unwrap_or_default(),
+            share(far),
+            share(covered),
+            widths.map_or_else(|| "–".to_owned(), |n| format!("{:.3}", share(n))),
         );
     }
 }

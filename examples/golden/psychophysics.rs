@@ -11,7 +11,7 @@ use study_core::procedure::{Function, Parameter, Passes, QuestPlus, Scale, Stair
 use study_core::procedure::{quest, staircase};
 use study_stats::detection::Answers;
 use study_stats::mushra::Screening;
-use study_stats::psychometric::{Core, Experiment, Level};
+use study_stats::psychometric::{Core, Experiment, Level, Spacing};
 
 /// Seed of the bootstrap of the deviance.
 const SEED: u64 = 2007;
@@ -362,6 +362,7 @@ fn psychometric(input: &Settings) -> Result<Values, Error> {
     }
     let settings = analysis::FitSettings {
         core,
+        spacing: Spacing::Lin,
         experiment,
         gamma,
         lambda: input.number("lambda")?,

@@ -3,8 +3,9 @@
 
 use super::{apa, sentences};
 use study_base::text::counted;
-use study_core::analyze::psychophysics::{PartAnalysis, PartFinding, PartQuestion};
+use study_core::analyze::psychophysics::{LevelData, PartAnalysis, PartFinding, PartQuestion};
 use study_core::analyze::{Pair, Verdict, group_id};
+use study_stats::psychometric::{Core, Spacing};
 
 /// The most pairs that a sentence lists.
 const MAX_LISTED: usize = 12;
@@ -188,6 +189,7 @@ pub(super) fn caveats(part: &PartAnalysis) -> Vec<String> {
 pub(super) fn results(part: &PartAnalysis) -> String {
     let mut text: Vec<String> = thresholds(part);
     text.extend(scores(part));
+    text.extend(exponent(part));
     for f in &part.findings {
         let Some(test) = &f.test else { continue };
         let what = result(part, f);
@@ -307,6 +309,25 @@ fn thresholds(part: &PartAnalysis) -> Vec<String> {
     conditions.iter().filter_map(one).collect()
 }
 
+/// The exponent of estimated magnitudes of levels.
+fn exponent(part: &PartAnalysis) -> Option<String> {
+    let exponent = part.values.number("magnitude/exponent")?;
+    let ci = part
+        .values
+        .interval("magnitude/exponent_over_participants/ci95");
+    let ci = ci.map_or_else(String::new, |ends| {
+        format!(
+            ", 95 % CI {} over participants",
+            apa::interval(ends, apa::two)
+        )
+    });
+    Some(format!(
+        "Estimates were proportional to the level to the power of {}{ci} (n = {}).",
+        apa::two(exponent),
+        part.participants
+    ))
+}
+
 /// The mean score of a questionnaire.
 fn scores(part: &PartAnalysis) -> Option<String> {
     let get = |what: &str| part.values.number(&format!("questionnaire/{what}"));
@@ -347,17 +368,48 @@ pub(super) fn answers(part: &PartAnalysis) -> String {
     }
 }
 
+/// The psychometric functions, by condition where they differ.
+fn shapes(part: &PartAnalysis) -> String {
+    let shape = |cell: &LevelData| match (cell.spacing, cell.core) {
+        (Spacing::Lin, Core::Norm) => "a cumulative normal",
+        (Spacing::Lin, Core::Logistic) => "a logistic function",
+        (Spacing::Lin, Core::Gumbel) => "a Gumbel function",
+        (Spacing::Lin, Core::ReversedGumbel) => "a reversed Gumbel function",
+        (Spacing::Log, Core::Norm) => "a cumulative normal of the logarithm of the level",
+        (Spacing::Log, Core::Logistic) => "a logistic function of the logarithm of the level",
+        (Spacing::Log, Core::Gumbel) => "a Weibull function of the level",
+        (Spacing::Log, Core::ReversedGumbel) => {
+            "a reversed Gumbel function of the logarithm of the level"
+        }
+    };
+    let mut conditions: Vec<(&str, &str)> = (part.data.levels.iter())
+        .map(|cell| (cell.condition.as_str(), shape(cell)))
+        .collect();
+    conditions.sort_unstable();
+    conditions.dedup();
+    match &conditions[..] {
+        [] => "a cumulative normal".to_owned(),
+        [first, others @ ..] if others.iter().all(|o| o.1 == first.1) => first.1.to_owned(),
+        all => {
+            let each: Vec<String> = (all.iter())
+                .map(|(condition, shape)| format!("{shape} ({condition})"))
+                .collect();
+            apa::listing(&each)
+        }
+    }
+}
+
 /// How the numbers were computed, for a paper.
 pub(super) fn methods(part: &PartAnalysis) -> String {
     let has = |group: &str| part.values.iter().any(|(id, _)| id.starts_with(group));
     let mut text = Vec::new();
     if has("psy/") {
-        text.push(
-            "The psychometric function of each participant and condition was a cumulative normal with \
+        text.push(format!(
+            "The psychometric function of each participant and condition was {} with \
              beta-binomial errors; thresholds are posterior means with equal-tailed 95 % intervals \
-             (Schütt et al., 2016), at half the height between guesses and lapses."
-                .to_owned(),
-        );
+             (Schütt et al., 2016), at half the height between guesses and lapses.",
+            shapes(part)
+        ));
     }
     if let Some((_, how)) = questionnaire(part) {
         text.push(how.to_owned());

@@ -3,9 +3,10 @@
 
 mod scales;
 
-use super::apa::{interval_or_dash, name, or_dash, plain, two};
+use super::apa::{self, bare_p, interval_or_dash, name, or_dash, plain, two};
 use scales::{items, magnitudes, ratings, scores};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
+use study_base::text::Untrusted;
 use study_core::analyze::{Value, Values};
 
 /// How a number is printed.
@@ -91,23 +92,32 @@ fn named(text: &str) -> PartCell {
 
 /// Each participant and condition.
 fn thresholds(values: &Values) -> PartTable {
+    const COLUMNS: [Column; 9] = [
+        ("", "participant"),
+        ("condition", "condition"),
+        ("trials", "n_trials"),
+        ("threshold", "threshold"),
+        ("95 %", "threshold_ci95"),
+        ("width", "width"),
+        ("95 %", "width_ci95"),
+        ("ML", "ml_threshold"),
+        ("reversals", "reversal_mean"),
+    ];
+    // Only staircases have reversals.
+    let staircases = (cells(values, "track", 2).iter()).any(|cell| {
+        values
+            .get(&format!("track/{}/{}/estimate", cell[0], cell[1]))
+            .is_some()
+    });
     let mut table = PartTable {
         file: "thresholds",
         caption: "Thresholds",
-        columns: &[
-            ("", "participant"),
-            ("condition", "condition"),
-            ("trials", "n_trials"),
-            ("threshold", "threshold"),
-            ("95 %", "threshold_ci95"),
-            ("width", "width"),
-            ("95 %", "width_ci95"),
-            ("ML", "ml_threshold"),
-        ],
+        columns: if staircases { &COLUMNS } else { &COLUMNS[..8] },
         rows: Vec::new(),
         notes: Vec::new(),
     };
-    let mut reasons = Vec::new();
+    let mut reasons: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    let mut logarithms = false;
     for cell in cells(values, "psy", 2) {
         let id = |statistic: &str| format!("psy/{}/{}/{statistic}", cell[0], cell[1]);
         let number = |statistic: &str| PartCell::Number(values.number(&id(statistic)), plain);
@@ -115,9 +125,10 @@ fn thresholds(values: &Values) -> PartTable {
             let ends = values.interval(&id(&format!("posterior/{statistic}/ci95")));
             PartCell::Interval(ends, plain)
         };
+        logarithms |= values.number(&id("log_scale")).is_some();
         if cell[0] != "pooled" {
             let trials = values.number(&id("n_trials"));
-            table.rows.push(vec![
+            let mut row = vec![
                 named(cell[0]),
                 named(cell[1]),
                 PartCell::Number(trials, |n| format!("{n}")),
@@ -126,25 +137,47 @@ fn thresholds(values: &Values) -> PartTable {
                 number("posterior/width/mean"),
                 interval("width"),
                 number("ml/threshold"),
-            ]);
+            ];
+            if staircases {
+                let mean = format!("track/{}/{}/estimate", cell[0], cell[1]);
+                row.push(PartCell::Number(values.number(&mean), plain));
+            }
+            table.rows.push(row);
         }
-        if let Some(why) = values.reason(&id("ml/threshold")) {
-            reasons.push(format!(
-                "{} {}: no maximum of the likelihood: {why}.",
-                name(cell[0]),
-                name(cell[1])
-            ));
+        // What is pooled is not in the table.
+        let why = values.reason(&id("ml/threshold"));
+        if let Some(why) = why.filter(|_| cell[0] != "pooled") {
+            let whose = format!("{} {}", name(cell[0]), name(cell[1]));
+            reasons.entry(why.to_owned()).or_default().push(whose);
         }
     }
     if table.rows.is_empty() {
         return table;
     }
-    table.notes.push(
+    let scale = match logarithms {
+        true => {
+            ", over logarithms: the threshold is a level, the width the natural logarithm of a ratio"
+        }
+        false => "",
+    };
+    table.notes.push(format!(
         "Threshold: the level at which the function without guesses and lapses is ½. Width: from .05 to \
-         .95 of it. Both are posterior means."
-            .to_owned(),
-    );
-    table.notes.extend(reasons);
+         .95 of it. Both are posterior means{scale}.{}",
+        match staircases {
+            true => " Reversals: the mean of the last reversals, where the rule settles.",
+            false => "",
+        }
+    ));
+    if !reasons.is_empty() {
+        let rests = "Without a maximum of the likelihood a posterior mean rests on its priors as much as on the answers; see its interval.";
+        table.notes.push(rests.to_owned());
+    }
+    for (why, whose) in reasons {
+        let whose = apa::listing(&whose);
+        table
+            .notes
+            .push(format!("{whose}: no maximum of the likelihood: {why}."));
+    }
     for cell in cells(values, "psy_group", 2) {
         let id = |statistic: &str| format!("psy_group/{}/{}/{statistic}", cell[0], cell[1]);
         let Some(mean) = values
@@ -195,7 +228,7 @@ fn conditions(values: &Values) -> PartTable {
     if let Some(why) = values.reason("psy_mixed/F") {
         table
             .notes
-            .push(format!("No comparison of conditions: {}.", name(why)));
+            .push(format!("No comparison of conditions: {}.", Untrusted(why)));
     }
     table
 }
@@ -255,7 +288,7 @@ fn contrast(values: &Values, group: &str, pair: &str) -> Option<Vec<PartCell>> {
         PartCell::Interval(values.interval(&id("ci95")), plain),
         PartCell::Number(number("t"), two),
         PartCell::Number(number("df"), two),
-        PartCell::Number(number("p_holm"), plain),
+        PartCell::Number(number("p_holm"), bare_p),
     ])
 }
 
@@ -295,7 +328,7 @@ fn groups(values: &Values) -> PartTable {
         if let Some(why) = values.reason(&format!("{kind}/F")) {
             table
                 .notes
-                .push(format!("No comparison of {kind}: {}.", name(why)));
+                .push(format!("No comparison of {kind}: {}.", Untrusted(why)));
         }
     }
     table
@@ -364,6 +397,11 @@ fn comparisons(values: &Values) -> PartTable {
     table
 }
 
+/// With two decimals; what is 0 but for rounding is 0.
+fn two_or_0(x: f64) -> String {
+    two(if x.abs() < 1e-9 { 0.0 } else { x })
+}
+
 fn sensitivities(values: &Values) -> PartTable {
     let mut table = PartTable {
         file: "sensitivities",
@@ -391,7 +429,7 @@ fn sensitivities(values: &Values) -> PartTable {
             named(cell[1]),
             PartCell::Number(number(d), two),
             PartCell::Interval(values.interval(&id(&format!("{d}_ci95"))), two),
-            PartCell::Number(bias, two),
+            PartCell::Number(bias, two_or_0),
         ]);
     }
     for cell in cells(values, "sdt_group", 1) {
@@ -451,9 +489,9 @@ fn abilities(values: &Values) -> PartTable {
         ]);
     }
     if let Some(order) = values.number("pairs/order") {
-        let p = or_dash(values.number("pairs/order_p"), plain);
+        let p = or_dash(values.number("pairs/order_p"), apa::p);
         table.notes.push(format!(
-            "Order: {} for what is presented first, p = {p}.",
+            "Order: {} for what is presented first, p {p}.",
             two(order)
         ));
     }
@@ -490,7 +528,7 @@ fn differences(values: &Values) -> PartTable {
             PartCell::Number(number("se"), two),
             PartCell::Number(number("se_clustered"), two),
             PartCell::Number(number("preferred"), two),
-            PartCell::Number(number("p_holm"), plain),
+            PartCell::Number(number("p_holm"), bare_p),
         ]);
     }
     table

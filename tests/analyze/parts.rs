@@ -8,7 +8,7 @@ use std::fs;
 use std::path::Path;
 
 /// The range of the shipped protocol of a threshold, and the same as an option.
-const LADDER: (&str, &str) = ("range = [0.02, 0.6] ", "0.02..0.6:0.02");
+const LADDER: (&str, &str) = ("range = [0.02, 0.6] ", "0.02..0.6:1.1244372275696026");
 
 /// Runs `study`: exit code, standard output, standard error.
 pub(crate) fn study(arguments: &[&str], folder: &Path) -> (i32, String, String) {
@@ -191,9 +191,19 @@ fn a_track_of_a_study_gives_the_threshold_of_its_table() {
     assert!(trials.len() > 60);
     let protocol = fs::read_to_string(folder.path().join("questplus/protocol.toml")).unwrap();
     assert!(protocol.contains(LADDER.0), "{protocol}");
-    let table = of_table(folder.path(), &table, &["2ifc", "--ladder", LADDER.1]);
+    let table = of_table(
+        folder.path(),
+        &table,
+        &["2ifc", "--fit-scale", "log", "--ladder", LADDER.1],
+    );
     let values = part["values"].as_object().unwrap();
     assert!(values.len() > 10);
+    // The template's levels are spaced by equal ratios, and the functions fitted over them.
+    assert_eq!(values["psy/SIM001/quest/log_scale"], 1.0);
+    for (id, value) in values.iter().filter(|v| v.0.ends_with("threshold/mean")) {
+        let within = (0.02..0.6).contains(&value.as_f64().unwrap());
+        assert!(within || id.starts_with("track/"), "{id}: {value}");
+    }
     let of_trials = ["psy/", "psy_group/"];
     for (id, value) in values
         .iter()
@@ -303,6 +313,7 @@ fn magnitude_estimates_of_a_study_give_the_exponent_of_their_table() {
     assert_eq!(part["task"], "magnitude");
     let values = of_table(folder.path(), &table, &["magnitude"]);
     assert_eq!(part["values"], values);
+    report(folder.path(), "magnitude", &["magnitudes"], &[]);
     let exponent = values["magnitude/exponent"].as_f64().unwrap();
     assert!((0.4..1.6).contains(&exponent), "{exponent}");
     let (code, out, err) = study(&["verify", "out"], folder.path());

@@ -134,6 +134,113 @@ fn a_comparison_has_a_pse() {
     assert!(page.contains("Weber fraction"), "{page}");
 }
 
+/// The same counts at the exponentials of the reference's levels: what the reference has as a
+/// threshold is its logarithm here.
+#[test]
+fn functions_over_logarithms_are_those_of_the_reference() {
+    let folder = tempfile::tempdir().unwrap();
+    let row = |r: &[Json]| format!("P01,{},{},{}", r[0].as_f64().unwrap().exp(), r[1], r[2]);
+    let head = "participant,level,positive,trials";
+    let file = golden("fit_sim_weibull_3afc");
+    // A level of 0 has no logarithm.
+    let table = csv(head, &file, row) + "P01,0,5,12\n";
+    let args = ["--task", "3ifc", "--fit-scale", "log", "--json"];
+    let found = values(&mut analyze(folder.path(), &table, &args));
+    let want = |id: &str| file["expected"][id]["value"].as_f64().unwrap();
+    let number = |id: &str| found[id].as_f64().unwrap();
+    for (id, tolerance) in [
+        ("ml/threshold", 1e-6),
+        ("ml_lapse/threshold", 1e-4),
+        ("map/threshold", 1e-4),
+        ("posterior/threshold/ci95_lo", 0.006),
+        ("posterior/threshold/ci95_hi", 0.006),
+    ] {
+        let id = format!("psy/P01/all/{id}");
+        assert!((number(&id).ln() - want(&id)).abs() < tolerance, "{id}");
+    }
+    for id in ["ml/width", "ml/deviance", "ml/se_width", "n_trials"] {
+        close(&found, &file, &format!("psy/P01/all/{id}"));
+    }
+    let se = want("psy/P01/all/ml/se_threshold") * want("psy/P01/all/ml/threshold").exp();
+    assert!((number("psy/P01/all/ml/se_threshold") - se).abs() < 1e-6);
+    assert_eq!(number("psy/P01/all/n_left_out"), 12.0);
+    assert_eq!(number("psy/P01/all/log_scale"), 1.0);
+    // The mean of the level: e^(m + s²/2) of a normal posterior of the logarithm.
+    let mean = number("psy/P01/all/posterior/threshold/mean").ln();
+    let spread = want("psy/P01/all/posterior/threshold/ci95_hi")
+        - want("psy/P01/all/posterior/threshold/ci95_lo");
+    let expected = want("psy/P01/all/posterior/threshold/mean") + (spread / 3.92).powi(2) / 2.0;
+    assert!((mean - expected).abs() < 2e-3, "{mean} {expected}");
+    let page = text(&mut analyze(folder.path(), &table, &args[..4]));
+    let page = page.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(page.contains("natural logarithm of a ratio"), "{page}");
+
+    // R 4.2.2: optim and optimHess of the probit likelihood, with the delta method.
+    let file = golden("fit_sim_pse");
+    let table = csv(head, &file, row);
+    let args = [
+        "--task",
+        "comparison",
+        "--fit-scale",
+        "log",
+        "--core",
+        "norm",
+        "--lapse",
+        "0",
+        "--standard",
+        "2.718281828",
+        "--json",
+    ];
+    let found = values(&mut analyze(folder.path(), &table, &args));
+    for (id, expected) in [
+        ("pse", 2.747821),
+        ("se_pse", 0.05279952),
+        ("pse_ci95_lo", 2.646261),
+        ("pse_ci95_hi", 2.85328),
+        ("jnd", 0.3582593),
+        ("se_jnd", 0.03600095),
+    ] {
+        let got = found[format!("psy/P01/all/{id}")].as_f64().unwrap();
+        assert!((got / expected - 1.0).abs() < 1e-5, "{id}: {got}");
+    }
+}
+
+#[test]
+fn a_ladder_over_logarithms_has_a_ratio() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = "participant,level,positive,trials\nP01,0.1,6,10\nP01,0.11,9,10\n";
+    let with = |scale: &str, ladder: &str| {
+        let args = [
+            "--task",
+            "2ifc",
+            "--json",
+            "--fit-scale",
+            scale,
+            "--ladder",
+            ladder,
+        ];
+        analyze(folder.path(), table, &args)
+    };
+    let width = |ladder: &str| {
+        let found = values(&mut with("log", ladder));
+        let end = |id: &str| found[format!("psy/P01/all/posterior/threshold/ci95_{id}")].as_f64();
+        end("hi").unwrap() / end("lo").unwrap()
+    };
+    assert!(width("0.02..0.6:1.1") > 1.5 * width("0.09..0.12:1.1"));
+    for (scale, ladder, says) in [
+        ("log", "0..0.6:1.1", "above 0"),
+        ("log", "0.02..0.6:0.05", "the ratio of two neighbours"),
+        ("log", "0.02..0.6:1", "the ratio of two neighbours"),
+        ("lin", "0.6..0.02:0.1", "the step"),
+        ("lin", "0..1", "--ladder"),
+    ] {
+        with(scale, ladder)
+            .assert()
+            .failure()
+            .stderr(predicates::str::contains(says));
+    }
+}
+
 #[test]
 fn sensitivities_come_from_targets_and_answers() {
     let folder = tempfile::tempdir().unwrap();

@@ -27,8 +27,8 @@ pub mod schema;
 pub use exclusion::Exclusion;
 pub use groups::{Assign, Assigned, GroupRules, Groups, SessionPlan};
 pub use parts::{
-    Compared, Exposure, FamilyRules, Interval, IntervalOrder, Method, Mushra, Pairs, Part,
-    Presentations, Task, TrackRules, Vary,
+    Compared, Exposure, FamilyRules, FitRules, Interval, IntervalOrder, Method, Mushra, Pairs,
+    Part, Presentations, Task, TrackRules, Vary,
 };
 pub use plan::{Seat, Stimuli, Trial};
 pub use question::{Answer, AnswerError, Question, QuestionKind};

@@ -6,6 +6,8 @@
 //! width is the distance between S = .05 and S = .95. A Weibull function is the Gumbel
 //! core over the logarithm of the level.
 //!
+//! The functions here know nothing of the scale: [`Spacing`] takes levels to it, and thresholds back.
+//!
 //! [`maximum_likelihood`] has γ and λ fixed and an explicit test whether a maximum
 //! exists; [`free_lapse`] estimates λ, too. [`posterior`] integrates over λ, γ and
 //! overdispersion, and always has an answer.
@@ -15,11 +17,13 @@ mod core;
 mod group;
 mod likelihood;
 mod simplex;
+mod spacing;
 
 pub use self::core::Core;
 pub use bayes::{Interval, Map, Posterior, Support, map, posterior};
 pub use group::{Group, group};
 pub use likelihood::{Fit, NoThreshold, deviance_p, free_lapse, maximum_likelihood};
+pub use spacing::Spacing;
 
 /// The trials of one level.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -171,17 +171,20 @@ fn trials(protocol: &Protocol, part: &Part) -> String {
     }
     let exposure = &part.exposure;
     let mut felt = match part.gap_s > 0.0 {
-        true => format!("Between intervals there were {} s.", part.gap_s),
+        true => format!("Intervals were {} s apart.", part.gap_s),
         false => String::new(),
     };
-    if exposure.min_s > 0.0 {
-        felt += &format!(" Each was felt for at least {} s.", exposure.min_s);
-    }
-    if let Some(most) = exposure.max_s {
-        felt += &format!(" Each was felt for at most {most} s.");
+    match (exposure.min_s > 0.0, exposure.max_s) {
+        (true, Some(most)) => {
+            felt += &format!(" Each was felt for {} to {most} s.", exposure.min_s);
+        }
+        (true, None) => felt += &format!(" Each was felt for at least {} s.", exposure.min_s),
+        (false, Some(most)) => felt += &format!(" Each was felt for at most {most} s."),
+        (false, None) => {}
     }
     felt += &match exposure.replays {
         0 => " Nothing could be felt again.".to_owned(),
+        1 => " A trial could be felt again once.".to_owned(),
         n => format!(
             " A trial could be felt again {}.",
             counted(n as usize, "time", "times")

@@ -8,7 +8,7 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 use study_core::analyze::psychophysics::{TableKind, TrialSettings, analyze_table};
-use study_stats::psychometric::{Core, Support};
+use study_stats::psychometric::{Core, Spacing, Support};
 
 /// Options of a table of trials.
 #[derive(Debug, clap::Args)]
@@ -16,10 +16,14 @@ pub(super) struct TrialArgs {
     /// A CSV of trials and how they are answered; needs a table, not a study
     #[arg(long, value_name = "KIND", value_parser = clap::builder::PossibleValuesParser::new(TableKind::names()))]
     pub(super) task: Option<String>,
-    /// Shape of the psychometric functions
-    #[arg(long, value_name = "CORE", default_value = "norm", requires = "task",
+    /// Shape of the psychometric functions [default: norm; with --fit-scale log gumbel, a Weibull function]
+    #[arg(long, value_name = "CORE", requires = "task",
           value_parser = clap::builder::PossibleValuesParser::new(Core::NAMES.map(|n| n.1)))]
-    core: String,
+    core: Option<String>,
+    /// Scale of the levels over which functions are fitted; log: a threshold is a level all the same
+    #[arg(long, value_name = "SCALE", default_value = "lin", requires = "task",
+          value_parser = clap::builder::PossibleValuesParser::new(["lin", "log"]))]
+    fit_scale: String,
     /// Lapse rate of the fit by maximum likelihood; the posterior estimates it
     #[arg(long, value_name = "RATE", default_value = "0.02", requires = "task", value_parser = parse_rate)]
     lapse: f64,
@@ -31,9 +35,10 @@ pub(super) struct TrialArgs {
         allow_hyphen_values = true
     )]
     standard: Option<f64>,
-    /// Lowest and highest level of an adaptive track, with the step between levels, such as 0..2:0.05
+    /// Lowest and highest level of an adaptive track, with the step between levels, such as 0..2:0.05;
+    /// with --fit-scale log, with their ratio, such as 0.02..0.6:1.1
     #[arg(long, value_name = "LOW..HIGH:STEP", requires = "task", value_parser = parse_ladder, allow_hyphen_values = true)]
-    ladder: Option<Support>,
+    ladder: Option<LadderArg>,
     /// Simulated data sets for the p of the deviance; not for adaptive tracks
     #[arg(long, value_name = "N", default_value = "0", requires = "task", value_parser = clap::value_parser!(u32).range(0..=100_000))]
     bootstrap: u32,
@@ -48,22 +53,45 @@ enum OptionError {
     Ladder,
 }
 
+/// The ends of a ladder, and the step or the ratio between its levels.
+#[derive(Debug, Clone, Copy)]
+struct LadderArg {
+    low: f64,
+    high: f64,
+    step: f64,
+}
+
+impl LadderArg {
+    /// The range of the priors on a scale; `None` if there is no such ladder.
+    fn support(self, spacing: Spacing) -> Option<Support> {
+        let least = match spacing {
+            Spacing::Lin => self.step,
+            Spacing::Log => spacing.place(self.step)?,
+        };
+        let support = Support {
+            low: spacing.place(self.low)?,
+            high: spacing.place(self.high)?,
+            least,
+        };
+        (least > 0.0 && support.low + least <= support.high).then_some(support)
+    }
+}
+
 fn parse_rate(given: &str) -> Result<f64, OptionError> {
     let rate = given.parse().ok().filter(|r| (0.0..0.5).contains(r));
     rate.ok_or(OptionError::Rate)
 }
 
-fn parse_ladder(given: &str) -> Result<Support, OptionError> {
+fn parse_ladder(given: &str) -> Result<LadderArg, OptionError> {
     let number = |text: &str| text.trim().parse().ok().filter(|x: &f64| x.is_finite());
     let found = || {
         let (ends, step) = given.split_once(':')?;
         let (low, high) = ends.split_once("..")?;
-        let support = Support {
+        Some(LadderArg {
             low: number(low)?,
             high: number(high)?,
-            least: number(step)?,
-        };
-        (support.least > 0.0 && support.low + support.least <= support.high).then_some(support)
+            step: number(step)?,
+        })
     };
     found().ok_or(OptionError::Ladder)
 }
@@ -76,13 +104,28 @@ pub(super) fn run(
     as_json: bool,
     console: &mut Console,
 ) -> Result<(), Failure> {
-    let known = TableKind::named(task).zip(Core::named(&args.core));
-    let (kind, core) = known.ok_or_else(|| Failure::input("unknown task"))?;
+    let kind = TableKind::named(task).ok_or_else(|| Failure::input("unknown task"))?;
+    let spacing = match args.fit_scale.as_str() {
+        "log" => Spacing::Log,
+        _ => Spacing::Lin,
+    };
+    let named = args.core.as_deref().and_then(Core::named);
+    let core = named.unwrap_or_else(|| spacing.usual_core());
+    let support = match args.ladder {
+        None => None,
+        Some(ladder) => Some(ladder.support(spacing).ok_or_else(|| {
+            Failure::input(match spacing {
+                Spacing::Lin => "--ladder: give the lowest and the highest level and the step, such as 0..2:0.05",
+                Spacing::Log => "--ladder: over logarithms, give the lowest and the highest level, above 0, and the ratio of two neighbours, such as 0.02..0.6:1.1",
+            })
+        })?),
+    };
     let settings = TrialSettings {
         core,
+        spacing,
         lambda: args.lapse,
         standard: args.standard,
-        support: args.ladder,
+        support,
         repeats: args.bootstrap,
         seed: 2007,
     };

@@ -72,6 +72,33 @@ impl Axis {
         }
     }
 
+    /// The same over the natural logarithms of positive values: the axis goes by logarithms, its
+    /// labels are values.
+    pub fn of_logarithms(quantity: &str, values: impl IntoIterator<Item = f64>) -> Self {
+        let axis = Self::around(quantity, values.into_iter().map(f64::ln));
+        let (low, high) = (axis.low.exp(), axis.high.exp());
+        // 1, 2 and 5 of each power of ten; of many powers 1 only.
+        let decades = (axis.high - axis.low) / std::f64::consts::LN_10;
+        let digits: &[i32] = if decades > 2.0 { &[1] } else { &[1, 2, 5] };
+        let powers = (low.log10().floor() as i32)..=(high.log10().ceil() as i32);
+        let round = |power: i32| {
+            let text = move |digit: &i32| format!("{digit}e{power}").parse().unwrap_or(f64::NAN);
+            digits.iter().map(text).collect::<Vec<f64>>()
+        };
+        let ticks: Vec<(f64, String)> = (powers.flat_map(round))
+            .filter(|x| (low..=high).contains(x))
+            .map(|x| (x.ln(), format!("{x}")))
+            .collect();
+        match ticks.len() {
+            // Within less than a factor of two: both ends.
+            0 | 1 => {
+                let ends = [axis.low, axis.high].map(|at| (at, label(at.exp(), 0.1 * at.exp())));
+                axis.at(ends.to_vec())
+            }
+            _ => axis.at(ticks),
+        }
+    }
+
     /// Categories at 0, 1, 2 …, without grid lines.
     pub fn of_names<S: AsRef<str>>(label: &str, names: &[S]) -> Self {
         let at = names.iter().enumerate();
@@ -180,6 +207,16 @@ mod tests {
             labels(&Axis::new("", -0.05, 0.15), 5),
             ["−0.05", "0.00", "0.05", "0.10", "0.15"]
         );
+    }
+
+    #[test]
+    fn an_axis_of_logarithms_is_labelled_with_values() {
+        let ticks = |values: &[f64]| labels(&Axis::of_logarithms("", values.iter().copied()), 5);
+        assert_eq!(ticks(&[0.02, 0.6]), ["0.02", "0.05", "0.1", "0.2", "0.5"]);
+        assert_eq!(ticks(&[0.02, 60.0]), ["0.01", "0.1", "1", "10", "100"]);
+        let narrow = Axis::of_logarithms("", [2.4, 3.0]);
+        assert_eq!(labels(&narrow, 5), ["2.3", "3.1"]);
+        assert!((narrow.marks(5)[1].0.exp() - 3.0676).abs() < 1e-3);
     }
 
     #[test]

@@ -8,8 +8,8 @@ use crate::report::chart::{
 use crate::report::chart::{Label, shortened};
 use crate::report::csv::digits;
 use study_core::analyze::group_id;
-use study_core::analyze::psychophysics::{LevelData, PartAnalysis, TrackData};
-use study_stats::psychometric::{Core, Curve};
+use study_core::analyze::psychophysics::{LevelData, PartAnalysis, TrackData, TrackTrial};
+use study_stats::psychometric::{Curve, Spacing};
 
 /// What the files of these figures are called before the number of the part.
 pub const PREFIX: &str = "part-";
@@ -30,6 +30,7 @@ pub fn of_part(number: usize, part: &PartAnalysis) -> Vec<Drawn> {
         sensitivities(&name("sensitivities"), part),
         preferences(&name("preferences"), part),
         against_vaf(&name("preference-against-vaf"), part),
+        magnitudes(&name("magnitudes"), part),
     ];
     let note = match (part.simulated, part.pilot) {
         (true, _) => Some("includes simulated data"),
@@ -65,13 +66,26 @@ fn level_label(part: &PartAnalysis) -> String {
         .unwrap_or_else(|| "level".to_owned())
 }
 
-/// The function of a cell, of posterior means.
+/// An axis of levels on the scale of their functions.
+fn level_axis(spacing: Spacing, label: &str, levels: impl IntoIterator<Item = f64>) -> Axis {
+    match spacing {
+        Spacing::Lin => Axis::around(label, levels),
+        Spacing::Log => Axis::of_logarithms(label, levels),
+    }
+}
+
+/// Where a level is on such an axis.
+fn place(spacing: Spacing, level: f64) -> f64 {
+    spacing.place(level).unwrap_or(f64::NAN)
+}
+
+/// The function of a cell, of posterior means, on its scale.
 fn curve(part: &PartAnalysis, cell: &LevelData) -> Option<Curve> {
     let id = group_id("psy", &[&cell.participant, &cell.condition]);
     let get = |what: &str| part.values.number(&format!("{id}/posterior/{what}"));
     Some(Curve {
-        core: Core::Norm,
-        threshold: get("threshold/mean")?,
+        core: cell.core,
+        threshold: cell.spacing.place(get("threshold/mean")?)?,
         width: get("width/mean")?,
         gamma: part.data.guess.or_else(|| get("gamma/mean"))?,
         lambda: get("lambda/mean")?,
@@ -100,7 +114,7 @@ fn psychometric(name: &str, part: &PartAnalysis) -> Option<Drawn> {
                 digits(l.level),
                 digits(l.positive),
                 digits(l.trials),
-                self::cell(curve.map(|c| c.value(l.level))),
+                self::cell(curve.map(|c| c.value(place(cell.spacing, l.level)))),
             ]);
         }
     }
@@ -113,7 +127,8 @@ fn psychometric(name: &str, part: &PartAnalysis) -> Option<Drawn> {
         (a.min(x), b.max(x))
     });
     let panel = |cell: &LevelData| {
-        let x = Axis::around(&level_label(part), [low, high]);
+        let spacing = cell.spacing;
+        let x = level_axis(spacing, &level_label(part), [low, high]);
         let (from, to) = (x.low, x.high);
         let mut panel = Panel::new(x, Axis::new(shares, -0.04, 1.04));
         panel.title = format!(
@@ -132,6 +147,7 @@ fn psychometric(name: &str, part: &PartAnalysis) -> Option<Drawn> {
                 .interval(&format!("{id}/posterior/threshold/ci95"))
             {
                 let at = curve.value(curve.threshold);
+                let (low, high) = (place(spacing, low), place(spacing, high));
                 let bar = Mark::ErrorBarsAcross(vec![Whisker { at, low, high }]);
                 panel = panel.with(Look::plain(PALETTE[1]).stroke(1.8), bar);
             }
@@ -142,7 +158,8 @@ fn psychometric(name: &str, part: &PartAnalysis) -> Option<Drawn> {
                 .levels
                 .iter()
                 .filter(|l| least <= l.trials && l.trials < most);
-            let points = own.map(|l| (l.level, l.positive / l.trials)).collect();
+            let points = own.map(|l| (place(spacing, l.level), l.positive / l.trials));
+            let points = points.collect();
             panel = panel.with(Look::plain(PALETTE[0]).size(size), Mark::Points(points));
         }
         panel
@@ -191,13 +208,18 @@ fn tracks(name: &str, part: &PartAnalysis) -> Option<Drawn> {
         }
     }
     let panel = |track: &TrackData| {
+        // Of a track without a function, such as same-different, the level itself.
+        let of_track = |cell: &&LevelData| cell.condition == track.track;
+        let spacing = part.data.levels.iter().find(of_track);
+        let spacing = spacing.map_or_else(Spacing::default, |cell| cell.spacing);
         let points = |keep: &dyn Fn(usize) -> bool| -> Vec<(f64, f64)> {
             let all = track.trials.iter().enumerate().filter(|(i, _)| keep(*i));
-            all.map(|(i, t)| ((i + 1) as f64, t.level)).collect()
+            let at = |(i, t): (usize, &TrackTrial)| ((i + 1) as f64, place(spacing, t.level));
+            all.map(at).collect()
         };
         let levels = track.trials.iter().map(|t| t.level);
         let x = Axis::new("trial", 0.0, track.trials.len() as f64 + 1.0);
-        let mut panel = Panel::new(x, Axis::around(&level_label(part), levels));
+        let mut panel = Panel::new(x, level_axis(spacing, &level_label(part), levels));
         panel.title = format!(
             "{} · {}",
             shortened(&track.participant, 14),
@@ -207,6 +229,7 @@ fn tracks(name: &str, part: &PartAnalysis) -> Option<Drawn> {
         let thin = Look::plain(PALETTE[6]).stroke(1.0);
         panel = panel.with(thin, Mark::Line(points(&moved)));
         if let Some(estimate) = track.estimate {
+            let estimate = place(spacing, estimate);
             let across = vec![(0.0, estimate), (track.trials.len() as f64 + 1.0, estimate)];
             let dashed = Look::plain(PALETTE[1]).stroke(1.2).dashed(Dash::Dashed);
             panel = panel.with(dashed, Mark::Line(across));
@@ -501,6 +524,65 @@ fn against_vaf(name: &str, part: &PartAnalysis) -> Option<Drawn> {
             })
             .collect();
         c.figure(name, "Preference against VAF", c.pick(300.0, 260.0))
+            .with(panel)
+    }))
+}
+
+/// A level, what it was estimated as, and its interval.
+type Estimate = (f64, f64, Option<(f64, f64)>);
+
+/// Estimated magnitudes of levels over the levels, both on logarithmic axes.
+fn magnitudes(name: &str, part: &PartAnalysis) -> Option<Drawn> {
+    let found = part.values.iter().filter_map(|(id, _)| {
+        let level = id.strip_prefix("magnitude/level/")?;
+        let level = level.strip_suffix("/geometric_mean")?;
+        let ci95 = format!("magnitude/level/{level}/ci95");
+        let mean = part.values.number(id)?;
+        Some((level.parse().ok()?, mean, part.values.interval(&ci95)))
+    });
+    let mut rows: Vec<Estimate> = found.collect();
+    rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+    if rows.len() < 2 || rows.iter().any(|row| row.0 <= 0.0) {
+        return None;
+    }
+    let mut data = vec![head(["level", "geometric_mean", "ci95_lo", "ci95_hi"])];
+    for (level, mean, ci95) in &rows {
+        data.push(vec![
+            digits(*level),
+            digits(*mean),
+            cell(ci95.map(|e| e.0)),
+            cell(ci95.map(|e| e.1)),
+        ]);
+    }
+    let caption = "Estimated magnitudes: geometric means with 95 % intervals over participants, after their own means \
+                   were made equal. Line: the power function fitted to the means. Both axes are logarithmic."
+        .to_owned();
+    let line = || {
+        let exponent = part.values.number("magnitude/exponent")?;
+        let at_1 = part.values.number("magnitude/log10_coefficient")? * std::f64::consts::LN_10;
+        let point = |row: &Estimate| (row.0.ln(), at_1 + exponent * row.0.ln());
+        Some(vec![point(rows.first()?), point(rows.last()?)])
+    };
+    Some(drawn(name, caption, data, |c: Canvas| {
+        let ends = rows.iter().flat_map(|(_, mean, ci95)| {
+            let (low, high) = ci95.unwrap_or((*mean, *mean));
+            [low, high, *mean]
+        });
+        let x = Axis::of_logarithms(&level_label(part), rows.iter().map(|row| row.0));
+        let mut panel = Panel::new(x, Axis::of_logarithms("estimate", ends));
+        if let Some(line) = line() {
+            panel = panel.with(Look::plain(PALETTE[1]).stroke(1.8), Mark::Line(line));
+        }
+        let look = Look::plain(PALETTE[0]).stroke(1.5);
+        let bars = rows.iter().filter_map(|(level, _, ci95)| {
+            let ((low, high), at) = ((*ci95)?, level.ln());
+            let (low, high) = (low.ln(), high.ln());
+            Some(Whisker { at, low, high })
+        });
+        panel = panel.with(look, Mark::ErrorBars(bars.collect()));
+        let points = rows.iter().map(|(level, mean, _)| (level.ln(), mean.ln()));
+        panel = panel.with(look.size(7.0), Mark::Points(points.collect()));
+        c.figure(name, "Estimated magnitudes by level", c.pick(300.0, 260.0))
             .with(panel)
     }))
 }

@@ -28,8 +28,10 @@ pub(super) fn magnitudes(values: &Values) -> PartTable {
     levels.sort_by(|a, b| level(a).total_cmp(&level(b)));
     for level in levels {
         let id = format!("magnitude/level/{level}");
+        let number = level.parse().ok();
+        let shown = number.map_or_else(|| named(level), |x| PartCell::Number(Some(x), plain));
         table.rows.push(vec![
-            named(level),
+            shown,
             PartCell::Number(values.number(&format!("{id}/geometric_mean")), plain),
             PartCell::Interval(values.interval(&format!("{id}/ci95")), plain),
         ]);

@@ -19,7 +19,10 @@
 //!   can be resumed.
 //! * analysis: `[analysis]`, planned participants, VAF and covariates, `[device.rendering]`.
 
-use super::{FamilyRules, FileOrders, Order, Part, Protocol, Question, QuestionKind};
+use super::keys::word;
+use super::{
+    FamilyRules, FileOrders, FitRules, Order, Part, Protocol, Question, QuestionKind, TrackRules,
+};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
@@ -209,6 +212,9 @@ pub fn parts(
     if device.rendering != super::RenderingRules::default() {
         analysis["rendering"] = json!(device.rendering);
     }
+    if tracks.iter().any(|t| t.fit != FitRules::default()) {
+        analysis["tracks"] = tracks.iter().map(fit).collect();
+    }
     if !questionnaires.is_empty() {
         analysis["questionnaires"] = json!(questionnaires);
     }
@@ -240,6 +246,7 @@ fn levels(family: &FamilyRules, model_bytes: &BTreeMap<ModelId, Vec<u8>>) -> Val
         vary,
         to: _,
         ladder,
+        spacing: _,
         unit,
     } = family;
     let sha256 = |end| family_file(id, end).and_then(|id| model_bytes.get(&id));
@@ -250,6 +257,15 @@ fn levels(family: &FamilyRules, model_bytes: &BTreeMap<ModelId, Vec<u8>>) -> Val
         "unit": unit,
         "from": sha256("from").map(|bytes| hex(bytes)),
         "to": sha256("to").map(|bytes| hex(bytes)),
+    })
+}
+
+/// How the functions of a track are fitted, as far as the protocol says it.
+fn fit(track: &TrackRules) -> Value {
+    let FitRules { scale, core, lapse } = track.fit;
+    json!({
+        "id": track.id,
+        "fit": { "scale": scale.map(word), "core": core.map(word), "lapse": lapse },
     })
 }
 

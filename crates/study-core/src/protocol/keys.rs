@@ -307,6 +307,12 @@ pub(super) trait Words: Clone + 'static {
     const WORDS: &'static [Word];
 }
 
+/// The word of a value.
+pub(super) fn word<W: Words + PartialEq>(value: W) -> &'static str {
+    let found = W::VALUES.iter().find(|v| v.1 == value);
+    found.map_or("", |v| v.0)
+}
+
 /// Declares an enumeration whose values are words of the protocol file. The doc
 /// comment of a value is its meaning in `docs/protocol.md`.
 macro_rules! words {

@@ -11,6 +11,7 @@ use crate::procedure::{Ladder, ProcedureError, Rule, Track};
 use serde::{Deserialize, Serialize};
 use study_base::rng::Stream;
 use study_base::text::{ModelId, PartId, QuestionId};
+use study_stats::psychometric::{Core, Spacing};
 
 /// One of `[[parts]]`: trials of one kind, in an order of their own.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -153,6 +154,9 @@ pub struct FamilyRules {
     pub to: Option<String>,
     /// The levels.
     pub ladder: Ladder,
+    /// How they are spaced; over it the functions of its tracks are fitted.
+    #[serde(skip)]
+    pub spacing: Spacing,
     /// Unit of the levels, for people.
     pub unit: Option<String>,
 }
@@ -190,6 +194,30 @@ pub struct TrackRules {
     pub catch: f64,
     /// Share of trials at the top of the ladder.
     pub easy: f64,
+    /// How its psychometric functions are fitted, a matter of the analysis.
+    #[serde(skip)]
+    pub fit: FitRules,
+}
+
+/// How the psychometric functions of a track are fitted, where the protocol says it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FitRules {
+    /// The scale of the levels; otherwise that of the family.
+    pub scale: Option<Spacing>,
+    /// The shape; otherwise a cumulative normal, over logarithms a Weibull function.
+    pub core: Option<Core>,
+    /// λ of maximum likelihood.
+    pub lapse: f64,
+}
+
+impl Default for FitRules {
+    fn default() -> Self {
+        Self {
+            scale: None,
+            core: None,
+            lapse: 0.02,
+        }
+    }
 }
 
 /// What a track compares.
@@ -312,6 +340,13 @@ impl Method {
 }
 
 impl FamilyRules {
+    /// What its levels are, with their unit, as the label of an axis.
+    pub fn dimension(&self) -> String {
+        let unit = self.unit.as_ref();
+        let unit = unit.map_or_else(String::new, |unit| format!(" ({unit})"));
+        format!("{}{unit}", self.id)
+    }
+
     /// The realization of a step of the ladder, from 0.
     pub fn realization(&self, step: usize) -> ModelId {
         named(&self.id, &(step + 1).to_string())
@@ -392,6 +427,15 @@ impl Protocol {
     /// A track by its id.
     pub fn track(&self, id: &PartId) -> Option<&TrackRules> {
         self.tracks.iter().find(|t| t.id == *id)
+    }
+
+    /// The scale and the shape of the functions of a track.
+    pub fn fit(&self, track: &TrackRules) -> (Spacing, Core) {
+        let family = track.family().and_then(|id| self.family(id));
+        let own = || family.map(|family| family.spacing);
+        let spacing = track.fit.scale.or_else(own).unwrap_or_default();
+        let core = track.fit.core.unwrap_or_else(|| spacing.usual_core());
+        (spacing, core)
     }
 
     /// A family by its id.

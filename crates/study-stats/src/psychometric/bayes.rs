@@ -8,7 +8,7 @@
 mod grid;
 mod rows;
 
-use super::{Core, Curve, Experiment, Level, NoThreshold, pooled, simplex};
+use super::{Core, Curve, Experiment, Level, NoThreshold, Spacing, pooled, simplex};
 use rows::row_term;
 use std::f64::consts::PI;
 
@@ -118,6 +118,24 @@ pub struct Posterior {
     pub gamma: Option<f64>,
     /// Posterior mean of η.
     pub eta: f64,
+    /// Posterior mean of e to the power of the threshold.
+    exponential: f64,
+}
+
+impl Posterior {
+    /// The threshold as a level: over logarithms too the mean is that of the level, not of its
+    /// logarithm, whose tail towards 0 is long.
+    pub fn threshold_level(&self, spacing: Spacing) -> Interval {
+        let mean = match spacing {
+            Spacing::Lin => self.threshold.mean,
+            Spacing::Log => self.exponential,
+        };
+        let (low, high) = self.threshold.ci95;
+        Interval {
+            mean,
+            ci95: (spacing.level(low), spacing.level(high)),
+        }
+    }
 }
 
 /// What is to be fitted, with levels added up.

@@ -46,6 +46,8 @@ pub struct Fit {
     pub threshold_se: Option<f64>,
     /// Standard error of the width.
     pub width_se: Option<f64>,
+    /// Covariance of threshold and width.
+    pub covariance: Option<f64>,
     /// Deviance.
     pub deviance: f64,
     /// Levels minus the two parameters.
@@ -307,11 +309,13 @@ impl Problem {
         }
         let curve = self.curve(&found.at);
         let factor = Cholesky::definite(&found.information);
-        let variances = factor.map(|f| f.inverse_diagonal());
+        let of_threshold = factor.as_ref().map(|f| f.solve(&[1.0, 0.0]));
+        let of_width = factor.as_ref().map(|f| f.solve(&[0.0, 1.0]));
         Ok(Fit {
             curve,
-            threshold_se: variances.as_ref().map(|v| v[0].sqrt() * self.range),
-            width_se: variances.as_ref().map(|v| v[1].sqrt() * curve.width),
+            threshold_se: of_threshold.as_ref().map(|v| v[0].sqrt() * self.range),
+            width_se: of_width.map(|v| v[1].sqrt() * curve.width),
+            covariance: of_threshold.map(|v| v[1] * self.range * curve.width),
             deviance: curve.deviance(&self.levels),
             df: self.levels.len() - 2,
             log_likelihood: found.value,

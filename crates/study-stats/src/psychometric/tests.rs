@@ -221,3 +221,44 @@ fn the_support_can_be_given() {
     assert!(width(&given) > 2.0 * width(&own));
     assert_eq!(Support::of([1.0, 1.0]), None);
 }
+
+/// Counts that follow a function of the logarithm: fitted there, the levels can be in any
+/// unit, and levels of 0 have no place.
+#[test]
+fn logarithms_are_a_scale_of_their_own() {
+    let rows = levels(&[
+        (0.0, 20.0, 40.0),
+        (0.05, 22.0, 40.0),
+        (0.1, 27.0, 40.0),
+        (0.2, 35.0, 40.0),
+        (0.4, 40.0, 40.0),
+    ]);
+    let placed = Spacing::Log.places(&rows);
+    assert_eq!(placed.len(), 4);
+    close(Spacing::Log.level(placed[2].level), 0.2, 1e-15);
+    assert_eq!(Spacing::Lin.places(&rows), rows);
+    let thousandfold: Vec<Level> = (rows.iter())
+        .map(|l| Level {
+            level: l.level * 1000.0,
+            ..*l
+        })
+        .collect();
+    let experiment = Experiment::ForcedChoice(0.5);
+    let of = |rows: &[Level]| {
+        let rows = Spacing::Log.places(rows);
+        posterior(Core::Norm, &rows, experiment, None).unwrap()
+    };
+    let (one, other) = (of(&rows), of(&thousandfold));
+    let level = |p: &Posterior| p.threshold_level(Spacing::Log);
+    close(level(&other).mean / level(&one).mean, 1000.0, 1e-6);
+    close(level(&other).ci95.0 / level(&one).ci95.0, 1000.0, 1e-6);
+    // The mean of the level is above the level of the mean, by Jensen's inequality.
+    let ratio = level(&one).mean / Spacing::Log.level(one.threshold.mean);
+    assert!((1.01..1.2).contains(&ratio), "{ratio}");
+    close(one.width.mean, other.width.mean, 1e-9);
+    // R 4.2.2: optim and optimHess of the same likelihood over log(level).
+    let fit = maximum_likelihood(Core::Norm, &placed, 0.5, 0.02).unwrap();
+    close(Spacing::Log.level(fit.curve.threshold), 0.122_554_572, 1e-6);
+    close(fit.curve.width, 1.736_495_7, 1e-5);
+    close(fit.covariance.unwrap(), -0.050_302_6, 1e-5);
+}

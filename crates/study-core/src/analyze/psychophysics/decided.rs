@@ -45,8 +45,9 @@ pub(crate) fn compared(chosen: &[Preference], tie: bool, alpha: f64) -> Compared
 /// have none.
 pub(crate) fn threshold(asked: Asked, levels: &[Level], settings: &TrialSettings) -> Option<f64> {
     let (experiment, _) = asked.experiment()?;
-    let found = posterior(settings.core, levels, experiment, settings.support);
-    found.ok().map(|p| p.threshold.mean)
+    let levels = settings.spacing.places(levels);
+    let found = posterior(settings.core, &levels, experiment, settings.support);
+    found.ok().map(|p| p.threshold_level(settings.spacing).mean)
 }
 
 /// The finding of thresholds of participants, by participant, track and value; `None` with

@@ -9,11 +9,11 @@ use crate::analyze::identifiers::group_id;
 use crate::analyze::values::Values;
 use crate::outcome::RatingRow;
 use crate::protocol::Protocol;
-use crate::protocol::parts::{Compared, Part, TrackRules, Vary};
+use crate::protocol::parts::{Part, TrackRules, Vary};
 use std::collections::{BTreeMap, BTreeSet};
 use study_base::text::PartId;
 use study_stats::describe::mean;
-use study_stats::psychometric::{Core, Level, Support, pooled};
+use study_stats::psychometric::{Core, Level, Spacing, Support, pooled};
 
 /// Each track is fitted by itself; the priors refer to the range of its own ladder.
 pub(super) fn of_tracks(
@@ -72,8 +72,12 @@ pub(super) fn of_tracks(
                     above_chance,
                 });
             }
-            data.levels
-                .extend(levels(asked, participant, condition, &counts));
+            data.levels.extend(levels(
+                asked,
+                (participant, condition),
+                &counts,
+                protocol.fit(rules),
+            ));
         }
         values.extend(found);
         // Whoever does not count has no track either.
@@ -113,11 +117,7 @@ pub(super) fn of_tracks(
     if let Some(first) = families.first()
         && families.iter().all(|f| f.id == first.id)
     {
-        let unit = first
-            .unit
-            .as_ref()
-            .map_or_else(String::new, |u| format!(" ({u})"));
-        data.dimension = Some(format!("{}{unit}", first.id));
+        data.dimension = Some(first.dimension());
     }
     Some(Found {
         task,
@@ -194,9 +194,9 @@ pub(super) fn sensitivity(
 /// The answers of a participant by level, without catch trials; `None` without levels.
 fn levels(
     asked: Asked,
-    participant: &str,
-    condition: &str,
+    (participant, condition): (&str, &str),
     counts: &[TrialCount],
+    (spacing, core): (Spacing, Core),
 ) -> Option<LevelData> {
     let own = counts.iter().filter(|c| c.participant == participant);
     let levels: Vec<Level> = own.filter_map(|trial| level(asked, trial)).collect();
@@ -204,6 +204,8 @@ fn levels(
         participant: participant.to_owned(),
         condition: condition.to_owned(),
         levels: pooled(&levels),
+        spacing,
+        core,
     })
 }
 
@@ -232,23 +234,17 @@ fn trial(part: &Part, asked: Asked, row: &RatingRow, condition: &str) -> Option<
 /// How the functions of a track are fitted: the priors refer to the range of the ladder,
 /// since an adaptive track stays near the threshold.
 pub(crate) fn settings(protocol: &Protocol, track: &TrackRules) -> TrialSettings {
-    let family = match &track.compared {
-        Compared::Levels { family, .. } => protocol.family(family),
-        Compared::Models { .. } => None,
-    };
-    let support = |levels: &[f64]| {
-        let steps = levels.windows(2).map(|pair| pair[1] - pair[0]);
-        Some(Support {
-            low: *levels.first()?,
-            high: *levels.last()?,
-            least: steps.fold(f64::INFINITY, f64::min),
-        })
+    let (spacing, core) = protocol.fit(track);
+    let family = track.family().and_then(|id| protocol.family(id));
+    let places = |levels: &[f64]| -> Option<Vec<f64>> {
+        levels.iter().map(|level| spacing.place(*level)).collect()
     };
     TrialSettings {
-        core: Core::Norm,
-        lambda: 0.02,
+        core,
+        spacing,
+        lambda: track.fit.lapse,
         standard: None,
-        support: family.and_then(|f| support(f.ladder.levels())),
+        support: family.and_then(|f| Support::of(places(f.ladder.levels())?)),
         repeats: 0,
         seed: protocol.study.seed,
     }

@@ -7,8 +7,8 @@ use crate::analyze::values::Values;
 use std::collections::BTreeMap;
 use study_stats::distribution::normal_quantile;
 use study_stats::psychometric::{
-    Core, Experiment, Fit, Interval, Level, NoThreshold, Support, deviance_p, free_lapse, group,
-    map, maximum_likelihood, pooled, posterior,
+    Core, Curve, Experiment, Fit, Interval, Level, NoThreshold, Spacing, Support, deviance_p,
+    free_lapse, group, map, maximum_likelihood, pooled, posterior,
 };
 
 /// Shares of ψ whose level is always given, beside the middle of the function.
@@ -30,6 +30,8 @@ pub struct FitCell {
 pub struct FitSettings {
     /// Shape.
     pub core: Core,
+    /// The scale of the levels. Thresholds are levels all the same; widths are on the scale.
+    pub spacing: Spacing,
     /// What an answer is.
     pub experiment: Experiment,
     /// γ of maximum likelihood.
@@ -40,7 +42,7 @@ pub struct FitSettings {
     pub lapse_most: Option<f64>,
     /// The standard of a comparison, for PSE, JND and Weber fraction.
     pub standard: Option<f64>,
-    /// The range that the priors refer to; `None`: that of the levels.
+    /// The range that the priors refer to, on the scale; `None`: that of the levels.
     pub support: Option<Support>,
     /// Simulated data sets for the p of the deviance; 0 for none, as in adaptive tracks.
     pub repeats: u32,
@@ -70,9 +72,8 @@ pub fn psychometric(cells: &[FitCell], settings: &FitSettings) -> Values {
             continue;
         }
         let all: Vec<Level> = cells.iter().flat_map(|c| c.levels.clone()).collect();
-        let levels = pooled(&all);
         let prefix = group_id("psy", &["pooled", condition]);
-        counts(&prefix, &levels, &mut values);
+        let levels = counts(&prefix, &all, settings.spacing, &mut values);
         let fit = maximum_likelihood(settings.core, &levels, settings.gamma, settings.lambda);
         likelihood(&prefix, &fit, settings, &mut values);
         summary(condition, "threshold", &likely, &mut values);
@@ -81,10 +82,22 @@ pub fn psychometric(cells: &[FitCell], settings: &FitSettings) -> Values {
     values
 }
 
-fn counts(prefix: &str, levels: &[Level], values: &mut Values) {
+/// The trials that are fitted, each level once and at its place on the scale.
+fn counts(prefix: &str, rows: &[Level], spacing: Spacing, values: &mut Values) -> Vec<Level> {
+    let trials = |levels: &[Level]| levels.iter().map(|l| l.trials).sum::<f64>();
+    let levels = pooled(&spacing.places(rows));
     let mut group = values.group(prefix, "");
     group.put("n_levels", levels.len() as f64);
-    group.put("n_trials", levels.iter().map(|l| l.trials).sum());
+    group.put("n_trials", trials(&levels));
+    if spacing == Spacing::Log {
+        group.put("log_scale", 1.0);
+    }
+    // Levels of 0 and below have no logarithm.
+    let left_out = trials(rows) - trials(&levels);
+    if left_out > 0.0 {
+        group.put("n_left_out", left_out);
+    }
+    levels
 }
 
 /// The functions of one cell; its thresholds by maximum likelihood and as posterior
@@ -95,9 +108,9 @@ fn one(
     settings: &FitSettings,
     values: &mut Values,
 ) -> (Option<f64>, Option<f64>) {
-    let levels = &pooled(rows);
     let prefix = &group_id("psy", names);
-    counts(prefix, levels, values);
+    let levels = &counts(prefix, rows, settings.spacing, values);
+    let level = |place: f64| settings.spacing.level(place);
     let fit = maximum_likelihood(settings.core, levels, settings.gamma, settings.lambda);
     likelihood(prefix, &fit, settings, values);
     if settings.repeats > 0 {
@@ -107,7 +120,7 @@ fn one(
         group.maybe("deviance_p_bootstrap", p.ok());
     }
     if let Some(standard) = settings.standard {
-        comparison(prefix, &fit, standard, values);
+        comparison(prefix, &fit, (settings.spacing, standard), values);
     }
     if let Some(most) = settings.lapse_most {
         let free = free_lapse(
@@ -119,14 +132,14 @@ fn one(
         );
         let mut group = values.group(format!("{prefix}/ml_lapse"), reason(&free));
         let curve = free.as_ref().ok().map(|f| f.curve);
-        group.maybe("threshold", curve.map(|c| c.threshold));
+        group.maybe("threshold", curve.map(|c| level(c.threshold)));
         group.maybe("width", curve.map(|c| c.width));
         group.maybe("lambda", curve.map(|c| c.lambda));
         group.maybe("gamma", curve.map(|c| c.gamma));
         group.maybe("deviance", free.ok().map(|f| f.deviance));
     }
     (
-        fit.ok().map(|f| f.curve.threshold),
+        fit.ok().map(|f| level(f.curve.threshold)),
         bayesian(prefix, levels, settings, values),
     )
 }
@@ -145,13 +158,14 @@ fn likelihood(
     values: &mut Values,
 ) {
     let found = fit.as_ref().ok();
+    let spacing = settings.spacing;
     let mut group = values.group(format!("{prefix}/ml"), reason(fit));
-    group.maybe("threshold", found.map(|f| f.curve.threshold));
+    group.maybe("threshold", found.map(|f| spacing.level(f.curve.threshold)));
     group.maybe("width", found.map(|f| f.curve.width));
     let flat = "the information about threshold and width is singular";
     let se = |se: Option<f64>| (found.is_none() || se.is_some(), se);
     for (name, (known, se)) in [
-        ("se_threshold", se(found.and_then(|f| f.threshold_se))),
+        ("se_threshold", se(found.and_then(|f| of_level(f, spacing)))),
         ("se_width", se(found.and_then(|f| f.width_se))),
     ] {
         match known {
@@ -169,24 +183,76 @@ fn likelihood(
     let middle = (middle * 1e4).round() / 1e4;
     for share in SHARES.into_iter().chain([middle]) {
         let why = "the function does not have this share";
-        group.put_or(&format!("level_at/{share}"), fit.curve.level_at(share), why);
+        let level = fit.curve.level_at(share).map(|at| spacing.level(at));
+        group.put_or(&format!("level_at/{share}"), level, why);
     }
 }
 
+/// The standard error of the threshold as a level: over logarithms, that of the logarithm
+/// times the level.
+fn of_level(fit: &Fit, spacing: Spacing) -> Option<f64> {
+    let factor = match spacing {
+        Spacing::Lin => 1.0,
+        Spacing::Log => spacing.level(fit.curve.threshold),
+    };
+    Some(fit.threshold_se? * factor)
+}
+
+/// Half the distance of the levels where S is .25 and .75, with its standard error.
+fn jnd(fit: &Fit, spacing: Spacing) -> (f64, Option<f64>) {
+    let curve = fit.curve;
+    if spacing == Spacing::Lin {
+        return (curve.jnd(), fit.jnd_se());
+    }
+    let quarter = |share| {
+        Curve {
+            gamma: 0.0,
+            lambda: 0.0,
+            ..curve
+        }
+        .level_at(share)
+        .unwrap_or(curve.threshold)
+    };
+    let [low, high] = [quarter(0.25), quarter(0.75)];
+    let [at_low, at_high] = [low, high].map(|at| spacing.level(at));
+    // Its derivatives in threshold and width, both on the scale.
+    let by_width = |at: f64, level: f64| 0.5 * level * (at - curve.threshold) / curve.width;
+    let (t, w) = (
+        0.5 * (at_high - at_low),
+        by_width(high, at_high) - by_width(low, at_low),
+    );
+    let se = || {
+        let (of_t, of_w, both) = (fit.threshold_se?, fit.width_se?, fit.covariance?);
+        let variance = (t * of_t).powi(2) + (w * of_w).powi(2) + 2.0 * t * w * both;
+        Some(variance.sqrt())
+    };
+    (t, se())
+}
+
 /// PSE, JND and Weber fraction of a comparison with `standard`.
-fn comparison(prefix: &str, fit: &Result<Fit, NoThreshold>, standard: f64, values: &mut Values) {
+fn comparison(
+    prefix: &str,
+    fit: &Result<Fit, NoThreshold>,
+    (spacing, standard): (Spacing, f64),
+    values: &mut Values,
+) {
     let found = fit.as_ref().ok();
     let mut group = values.group(prefix, reason(fit));
-    let pse = found.map(|f| f.curve.threshold);
+    let place = found.map(|f| f.curve.threshold);
+    let pse = place.map(|at| spacing.level(at));
     let se = found.and_then(|f| f.threshold_se);
-    let jnd = found.map(|f| f.curve.jnd());
+    let (jnd, se_jnd) = found.map(|f| jnd(f, spacing)).unzip();
     group.maybe("pse", pse);
-    group.maybe("se_pse", se);
+    group.maybe("se_pse", found.and_then(|f| of_level(f, spacing)));
     let half = se.zip(normal_quantile(0.975)).map(|(se, z)| se * z);
-    group.interval("pse_ci95", pse.zip(half).map(|(p, h)| (p - h, p + h)));
+    let ends = place.zip(half);
+    group.interval(
+        "pse_ci95",
+        ends.map(|(p, h)| (spacing.level(p - h), spacing.level(p + h))),
+    );
     group.maybe("constant_error", pse.map(|p| p - standard));
     group.maybe("jnd", jnd);
-    group.maybe("se_jnd", found.and_then(Fit::jnd_se));
+    group.maybe("se_jnd", se_jnd.flatten());
     let fraction = jnd.filter(|_| standard != 0.0).map(|j| j / standard);
     group.put_or(
         "weber_fraction",
@@ -206,7 +272,8 @@ fn bayesian(
     let mode = map(core, levels, experiment, settings.support);
     let found = mode.as_ref().ok();
     let mut group = values.group(format!("{prefix}/map"), reason(&mode));
-    group.maybe("threshold", found.map(|m| m.curve.threshold));
+    let level = |place: f64| settings.spacing.level(place);
+    group.maybe("threshold", found.map(|m| level(m.curve.threshold)));
     group.maybe("width", found.map(|m| m.curve.width));
     group.maybe("lambda", found.map(|m| m.curve.lambda));
     group.maybe("gamma", found.map(|m| m.curve.gamma));
@@ -214,10 +281,8 @@ fn bayesian(
     group.maybe("log_posterior_kernel", found.map(|m| m.log_kernel));
     let posterior = posterior(core, levels, experiment, settings.support);
     let found = posterior.as_ref().ok();
-    for (name, interval) in [
-        ("threshold", found.map(|p| p.threshold)),
-        ("width", found.map(|p| p.width)),
-    ] {
+    let threshold = found.map(|p| p.threshold_level(settings.spacing));
+    for (name, interval) in [("threshold", threshold), ("width", found.map(|p| p.width))] {
         let mut group = values.group(format!("{prefix}/posterior/{name}"), reason(&posterior));
         group.maybe("mean", interval.map(|i: Interval| i.mean));
         group.interval("ci95", interval.map(|i| i.ci95));
@@ -228,7 +293,7 @@ fn bayesian(
     if experiment == Experiment::YesNo {
         group.maybe("gamma/mean", found.and_then(|p| p.gamma));
     }
-    found.map(|p| p.threshold.mean)
+    threshold.map(|t| t.mean)
 }
 
 /// Thresholds of several participants, on natural logarithms.

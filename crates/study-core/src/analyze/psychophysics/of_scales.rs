@@ -8,7 +8,7 @@ use super::scales::{
 use crate::analyze::identifiers::group_id;
 use crate::analyze::{Rules, vaf};
 use crate::outcome::RatingRow;
-use crate::protocol::parts::{Part, Presentations};
+use crate::protocol::parts::{FamilyRules, Part, Presentations};
 use crate::protocol::{Protocol, Role};
 use std::collections::{BTreeMap, BTreeSet};
 use study_base::text::ModelId;
@@ -33,13 +33,18 @@ pub(super) fn of_magnitudes(
         })
     };
     let estimates: Vec<MagnitudeRow> = rows.iter().filter_map(estimate).collect();
+    let presented = |family: &&FamilyRules| own.models.iter().any(|m| family.level_of(m).is_some());
+    let family = protocol.families.iter().find(presented);
     Found {
         task: "magnitude",
         trials: estimates.len(),
         values: magnitude(&estimates),
         warnings: Vec::new(),
         names: Vec::new(),
-        data: PartData::default(),
+        data: PartData {
+            dimension: family.map(FamilyRules::dimension),
+            ..PartData::default()
+        },
     }
 }
 

@@ -12,7 +12,7 @@ use crate::protocol::parts::{Part, Task};
 use crate::protocol::{Answer, Protocol};
 use std::collections::BTreeMap;
 use study_base::text::{PartId, ParticipantId, QuestionId};
-use study_stats::psychometric::Level;
+use study_stats::psychometric::{Core, Level, Spacing};
 
 /// What a study is analyzed from.
 #[derive(Debug, Clone, Copy)]
@@ -86,6 +86,10 @@ pub struct LevelData {
     pub condition: String,
     /// By level, each once.
     pub levels: Vec<Level>,
+    /// The scale over which its function is fitted.
+    pub spacing: Spacing,
+    /// The shape of its function.
+    pub core: Core,
 }
 
 /// What is found of a part, before findings.

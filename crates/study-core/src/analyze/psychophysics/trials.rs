@@ -6,7 +6,7 @@ use super::fits::{FitCell, FitSettings, psychometric};
 use crate::analyze::values::Values;
 use std::collections::BTreeMap;
 use study_stats::detection::Answers;
-use study_stats::psychometric::{Core, Experiment, Level, Support};
+use study_stats::psychometric::{Core, Experiment, Level, Spacing, Support};
 
 /// How a trial is answered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -99,11 +99,13 @@ pub struct TrialCount {
 pub struct TrialSettings {
     /// Shape.
     pub core: Core,
+    /// The scale of the levels.
+    pub spacing: Spacing,
     /// λ of maximum likelihood.
     pub lambda: f64,
     /// The standard of a comparison.
     pub standard: Option<f64>,
-    /// The range that the priors refer to; `None`: that of the levels.
+    /// The range that the priors refer to, on the scale; `None`: that of the levels.
     pub support: Option<Support>,
     /// Simulated data sets for the p of the deviance; 0 for adaptive tracks.
     pub repeats: u32,
@@ -138,6 +140,7 @@ pub fn discrimination(asked: Asked, trials: &[TrialCount], settings: &TrialSetti
             &fits,
             &FitSettings {
                 core: settings.core,
+                spacing: settings.spacing,
                 experiment,
                 gamma,
                 lambda: settings.lambda,

@@ -1,11 +1,11 @@
 use super::super::{Assumptions, Scale, Vaf, merge, run_chunk};
 use super::*;
 use crate::procedure::{Constant, Rule};
-use crate::protocol::parts::Compared;
+use crate::protocol::parts::{Compared, FitRules};
 use study_base::text::{ModelId, PartId};
 use study_stats::distribution::normal_upper;
 use study_stats::power::covariate::Spread;
-use study_stats::psychometric::{Core, Support};
+use study_stats::psychometric::{Core, Spacing, Support};
 
 fn settings(part: PartWorld, tests: &[Test], studies: u64) -> Settings {
     Settings {
@@ -153,10 +153,12 @@ fn track(method: Method, compared: Compared, rule: Rule, truth: Truth) -> TrackW
             feedback: false,
             catch: 0.0,
             easy: 0.0,
+            fit: FitRules::default(),
         },
         ladder: ladder.unwrap(),
         settings: TrialSettings {
             core: Core::Norm,
+            spacing: Spacing::Lin,
             lambda: 0.02,
             standard: None,
             support: Some(Support {

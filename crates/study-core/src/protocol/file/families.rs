@@ -6,6 +6,7 @@ use crate::protocol::keys::{Id, Key, Kind, Word, Words, keys};
 use crate::protocol::parts::MAX_LEVELS;
 use crate::protocol::{FamilyRules, Vary};
 use study_base::diagnostic::Fault;
+use study_stats::psychometric::Spacing;
 
 pub(super) const FAMILIES: &[Key] = keys! {
     /// The name of the family. Its levels are the realizations `id.1`, `id.2` and so on.
@@ -21,20 +22,14 @@ pub(super) const FAMILIES: &[Key] = keys! {
     "range": Kind::NumberList, "[0.0, 3.0]", derived("`levels` lists them");
     /// The number of levels from the lowest to the highest.
     "steps": Kind::Whole(2, MAX_LEVELS as i64), "41", derived("`levels` lists them");
-    /// How the levels are spaced between the ends of `range`.
+    /// How the levels are spaced between the ends of `range`. Psychometric functions are fitted
+    /// over the same scale, unless the `fit` of a track says otherwise.
     "scale": Kind::Word(Spacing::WORDS), r#""log""#, default(r#""lin""#);
     /// The levels themselves, rising, instead of `range` and `steps`.
     "levels": Kind::NumberList, "[0.5, 1.0, 2.0]";
     /// The unit of the levels, for people.
     "unit": Kind::Text, r#""×""#;
 };
-
-/// How the levels of a ladder are spaced.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Spacing {
-    Lin,
-    Log,
-}
 
 impl Words for Spacing {
     const VALUES: &'static [(&'static str, Self)] = &[("lin", Self::Lin), ("log", Self::Log)];
@@ -69,14 +64,14 @@ pub(super) fn read(mut section: Section<'_, '_>) -> PartialFamily {
             section.fault_at("to", Fault::error(what));
         }
     }
-    let ladder = levels(&mut section).and_then(|levels| {
+    let ladder = levels(&mut section).and_then(|(levels, spacing)| {
         let ladder = Ladder::new(levels);
         if let Err(why) = &ladder {
             section.fault_at("levels", Fault::error(why.to_string()));
         }
-        ladder.ok()
+        Some((ladder.ok()?, spacing))
     });
-    if let (Some(ladder), Some(vary)) = (&ladder, vary) {
+    if let (Some((ladder, _)), Some(vary)) = (&ladder, vary) {
         outside(&section, vary, ladder);
     }
     let files = [("from", &from), ("to", &to)];
@@ -87,20 +82,22 @@ pub(super) fn read(mut section: Section<'_, '_>) -> PartialFamily {
         path: section.path().to_owned(),
         files: files.collect(),
         family: (|| {
+            let (ladder, spacing) = ladder?;
             Some(FamilyRules {
                 id: id?,
                 from: from?,
                 vary: vary?,
                 to,
-                ladder: ladder?,
+                ladder,
+                spacing,
                 unit,
             })
         })(),
     }
 }
 
-/// The levels, as they are listed or from `range`, `steps` and `scale`.
-fn levels(section: &mut Section<'_, '_>) -> Option<Vec<f64>> {
+/// The levels, as they are listed or from `range`, `steps` and `scale`, and how they are spaced.
+fn levels(section: &mut Section<'_, '_>) -> Option<(Vec<f64>, Spacing)> {
     let listed = section.numbers("levels");
     let range = section.numbers("range");
     let steps = section.whole::<u32>("steps");
@@ -119,7 +116,7 @@ fn levels(section: &mut Section<'_, '_>) -> Option<Vec<f64>> {
             section.fault_at("levels", Fault::error(what));
             return None;
         }
-        return Some(levels);
+        return Some((levels, scale));
     }
     let (Some(range), Some(steps)) = (range, steps) else {
         let hint = "such as range = [0.0, 3.0] with steps = 41, or levels = [0.5, 1.0, 2.0]";
@@ -157,7 +154,7 @@ fn levels(section: &mut Section<'_, '_>) -> Option<Vec<f64>> {
             (_, Spacing::Log) => low * libm::pow(high / low, along),
         }
     };
-    Some((0..steps).map(level).map(rounded).collect())
+    Some(((0..steps).map(level).map(rounded).collect(), scale))
 }
 
 /// A number to twelve digits, so that a level of the ladder can be named as it is read.

@@ -18,6 +18,7 @@ use study_base::diagnostic::Fault;
 use study_base::diagnostic::table::Document;
 use study_base::rng::Stream;
 use study_base::text::{ModelId, PartId, QuestionId};
+use study_stats::psychometric::Spacing;
 
 /// The answers to a pair.
 const FIRST_OR_SECOND: [&str; 3] = ["first", "second", "tie"];
@@ -396,6 +397,13 @@ impl Looked<'_> {
             self.fault(path, "procedure", Fault::error(why.to_string()));
             return None;
         }
+        if raw.fit.scale == Some(Spacing::Log) && ladder.first() <= 0.0 {
+            let first = ladder.first();
+            let what = format!("`{path}.fit`: the level {first} has no logarithm");
+            let hint = "fit over scale = \"lin\", or begin the ladder above 0";
+            self.fault(path, "fit", Fault::error(what).hint(hint));
+            return None;
+        }
         let catch = raw.catch.unwrap_or(match method {
             Method::YesNo => 0.2,
             Method::SameDifferent => 0.5,
@@ -409,6 +417,7 @@ impl Looked<'_> {
             feedback: raw.feedback,
             catch,
             easy: raw.easy,
+            fit: raw.fit,
         })
     }
 

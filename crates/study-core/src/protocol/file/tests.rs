@@ -526,6 +526,7 @@ fn any_text_is_read_without_a_panic() {
     assert!(parse("p", &bom).protocol.is_some());
 }
 
+mod fits;
 mod keys;
 mod parts;
 mod questionnaires;

@@ -3,10 +3,11 @@
 use super::section::{Section, Variant, shapes};
 use crate::procedure::{Function, Parameter, QuestPlus, Scale, Staircase, Stop};
 use crate::protocol::keys::{Id, Key, Kind, Shape, Variants, Word, Words, keys};
-use crate::protocol::{Compared, Method};
+use crate::protocol::{Compared, FitRules, Method};
 use std::ops::Bound;
 use study_base::diagnostic::Fault;
 use study_base::text::{ModelId, PartId};
+use study_stats::psychometric::{Core, Spacing};
 
 /// A share below one.
 const SHARE: Kind = Kind::Number((Bound::Included(0.0), Bound::Excluded(1.0)), "");
@@ -33,7 +34,37 @@ pub(super) const TRACKS: &[Key] = keys! {
     /// The share of trials at the top of the ladder, which show lapses. They move no staircase;
     /// QUEST+ learns from them.
     "easy": SHARE, "0.1", default("0");
+    /// How its psychometric functions are fitted. It can be changed while a study runs.
+    "fit": Kind::Table(FIT), "{ core = \"logistic\" }";
 };
+
+const FIT: &[Key] = keys! {
+    /// The scale of the levels over which a function is fitted. Over logarithms the threshold is
+    /// a level all the same, and the width is the logarithm of a ratio.
+    "scale": Kind::Word(Spacing::WORDS), r#""log""#, derived("the `scale` of the family");
+    /// The shape of the function.
+    "core": Kind::Word(Core::WORDS), r#""logistic""#, derived("`norm`; over logarithms `gumbel`");
+    /// The lapse rate of the fit by maximum likelihood. The posterior estimates it.
+    "lapse": Kind::Number((Bound::Included(0.0), Bound::Excluded(0.5)), ""), "0.01", default("0.02");
+};
+
+impl Words for Core {
+    const VALUES: &'static [(&'static str, Self)] = &[
+        ("norm", Self::Norm),
+        ("logistic", Self::Logistic),
+        ("gumbel", Self::Gumbel),
+        ("rgumbel", Self::ReversedGumbel),
+    ];
+    const WORDS: &'static [Word] = &[
+        Word::new("norm", "The cumulative normal."),
+        Word::new("logistic", "The logistic function."),
+        Word::new(
+            "gumbel",
+            "1 − exp(−exp(…)); over logarithms it is the Weibull function of the level.",
+        ),
+        Word::new("rgumbel", "exp(−exp(−…)), its mirror image."),
+    ];
+}
 
 static PROCEDURE: Variants = Variants {
     tag: "rule",
@@ -173,6 +204,7 @@ pub(super) struct RawTrack {
     pub(super) feedback: bool,
     pub(super) catch: Option<f64>,
     pub(super) easy: f64,
+    pub(super) fit: FitRules,
 }
 
 /// A rule whose defaults depend on family and method.
@@ -218,6 +250,18 @@ pub(super) fn read(mut section: Section<'_, '_>) -> RawTrack {
         let what = "`catch` and `easy` leave no other trials";
         section.fault_at("easy", Fault::error(what));
     }
+    let fitted = section.section("fit").map(fit).unwrap_or_default();
+    if section.value("fit").is_some()
+        && (matches!(compared, Some(Compared::Models { .. }))
+            || method == Some(Method::SameDifferent))
+    {
+        let what = format!(
+            "`{}.fit`: this track has no psychometric function",
+            section.path()
+        );
+        let hint = "leave `fit` out; its result is a d′";
+        section.fault_at("fit", Fault::error(what).hint(hint));
+    }
     RawTrack {
         path: section.path().to_owned(),
         id,
@@ -227,6 +271,16 @@ pub(super) fn read(mut section: Section<'_, '_>) -> RawTrack {
         feedback: section.flag("feedback").unwrap_or(false),
         catch,
         easy,
+        fit: fitted,
+    }
+}
+
+fn fit(mut section: Section<'_, '_>) -> FitRules {
+    let usual = FitRules::default();
+    FitRules {
+        scale: section.word("scale"),
+        core: section.word("core"),
+        lapse: section.number("lapse").unwrap_or(usual.lapse),
     }
 }
 

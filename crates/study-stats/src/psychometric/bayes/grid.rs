@@ -169,6 +169,7 @@ pub(super) fn integrate(problem: &Problem) -> Option<Posterior> {
             Experiment::YesNo => Some(grid.gamma.mean(|x| x)),
         },
         eta: grid.eta.mean(|x| x),
+        exponential: grid.threshold.mean(f64::exp),
     })
 }
 

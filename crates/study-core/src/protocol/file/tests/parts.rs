@@ -5,7 +5,7 @@ use crate::protocol::file::parse;
 use crate::protocol::{Answer, Compared, Protocol, Seat, Stimuli, Task};
 
 /// A study with a part of each kind.
-const PARTS: &str = r#"
+pub(super) const PARTS: &str = r#"
 format = "study-protocol/2"
 study = { id = "s", title = "t", seed = 1 }
 design = { participants = 4 }
@@ -69,7 +69,7 @@ standard = 1.0
 procedure = { rule = "quest+", trials = 40 }
 "#;
 
-fn good(text: &str) -> Protocol {
+pub(super) fn good(text: &str) -> Protocol {
     let parsed = parse("protocol.toml", text);
     let shown = parsed.findings.render(false);
     parsed.protocol.unwrap_or_else(|| panic!("{shown}"))
