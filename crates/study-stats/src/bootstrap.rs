@@ -295,8 +295,8 @@ fn weighted(rows: &[&[f64]], draws: &[u32]) -> Vec<f64> {
     sums
 }
 
-/// Enumerates the ways to draw `left` times from the rows from `row` on. `weight` is the
-/// number of sequences for each (S! / Π kᵢ!, at most 10¹⁰, exact).
+/// Enumerates the ways to draw `left` times from the rows from `row` on, two or more.
+/// `weight` is the number of sequences for each (S! / Π kᵢ!, at most 10¹⁰, exact).
 fn compose<R: AsRef<[f64]>>(
     rows: &[R],
     row: usize,
@@ -310,25 +310,32 @@ fn compose<R: AsRef<[f64]>>(
         return;
     }
     let own = rows[row].as_ref();
+    let last = (row + 2 == rows.len()).then(|| rows[row + 1].as_ref());
     let (done, next) = sums.split_at_mut(row + 1);
-    if row + 1 == rows.len() {
-        for ((n, s), v) in next[0].iter_mut().zip(&done[row]).zip(own) {
-            *n = s + left as f64 * v;
-        }
-        count(&next[0], weight);
-        return;
-    }
     next[0].copy_from_slice(&done[row]);
+    if let Some(last) = last {
+        let (sum, steps) = next.split_at_mut(1);
+        for (((n, step), v), l) in sum[0].iter_mut().zip(&mut steps[0]).zip(own).zip(last) {
+            *n += left as f64 * l;
+            *step = v - l;
+        }
+    }
     let mut ways = weight;
     for k in 0..=left {
         // ways = weight · C(left, k)
         if k > 0 {
             ways = ways * (left - k + 1) as u64 / k as u64;
-            for (n, v) in sums[row + 1].iter_mut().zip(own) {
+            let (sum, steps) = sums[row + 1..].split_at_mut(1);
+            let step = if last.is_some() { &steps[0] } else { own };
+            for (n, v) in sum[0].iter_mut().zip(step) {
                 *n += v;
             }
         }
-        compose(rows, row + 1, left - k, ways, sums, count);
+        match last {
+            // The last row is drawn as often as this one is not.
+            Some(_) => count(&sums[row + 1], ways),
+            None => compose(rows, row + 1, left - k, ways, sums, count),
+        }
     }
 }
 

@@ -36,7 +36,10 @@ const RULE: [(f64, f64); 3] = [
 /// Intervals on which the rule is applied.
 const PANELS: usize = 60;
 
-/// A node with a smaller weight changes no probability in double precision.
+/// P(Z > z) is below 10⁻²⁰ from here on, which changes no probability in double precision.
+const OUTSIDE: f64 = 9.3;
+
+/// A node with a smaller weight does not either.
 const NEGLIGIBLE: f64 = 1e-20;
 
 /// u = √(χ²(ν)/ν): values with the probabilities that stand for its density.
@@ -69,7 +72,8 @@ impl Scale {
 
     /// ∫ f(u) P(|Z + δ| > cu) du over the density f of u.
     fn rejected(&self, ncp: f64, critical: f64) -> f64 {
-        let at = |u: f64| normal_upper(critical * u - ncp) + normal_upper(critical * u + ncp);
+        let upper = |z: f64| if z < OUTSIDE { normal_upper(z) } else { 0.0 };
+        let at = |u: f64| upper(critical * u - ncp) + upper(critical * u + ncp);
         self.average(at).clamp(0.0, 1.0)
     }
 }

@@ -137,28 +137,27 @@ fn against_references(a: &Analysis) -> Vec<String> {
             _ => equivalence(a, best, reference),
         };
         let equivalence = equivalence.map_or_else(String::new, |e| format!(" {e}"));
-        found.push(format!("{}{equivalence}", difference(f, best, reference)));
+        let differ = match f.verdict {
+            Verdict::Yes => "they differ, ",
+            Verdict::NotShown | Verdict::Undefined(_) => "a difference is not shown, ",
+        };
+        let difference = difference(f, (best, reference), differ);
+        found.push(format!("{difference}{equivalence}"));
     }
     found
 }
 
-/// The difference of two realizations: `Yes, a differs from R: …`.
-fn difference(f: &Finding, first: &str, second: &str) -> String {
+/// The difference of two realizations, with `verdict` before its test.
+fn difference(f: &Finding, (first, second): (&str, &str), verdict: &str) -> String {
     let size = f
         .estimate
         .map_or_else(String::new, |e| sentences::estimate(&e, apa::two));
     let result = match (&f.test, f.reason()) {
-        (Some(test), _) => {
-            let differ = match f.verdict {
-                Verdict::Yes => "they differ",
-                Verdict::NotShown | Verdict::Undefined(_) => "a difference is not shown",
-            };
-            format!(
-                "{differ}, {} ({})",
-                sentences::tested(test, f.participants),
-                sentences::corrected(test)
-            )
-        }
+        (Some(test), _) => format!(
+            "{verdict}{} ({})",
+            sentences::tested(test, f.participants),
+            sentences::corrected(test)
+        ),
         (None, why) => format!("not tested: {}", why.unwrap_or_default()),
     };
     format!("{first} minus {second} over participants: {size}; {result}.")
@@ -189,19 +188,17 @@ pub(super) fn repeats(a: &Analysis) -> Option<Answer> {
         .filter(|f| matches!(f.question, Question::Repeat(_)))
         .collect();
     let (first, others) = all.split_first()?;
-    let sentence = |f: &Finding| match &f.names[..] {
-        [duplicate, original] => difference(f, duplicate, original),
-        _ => String::new(),
+    let sentence = |f: &Finding| {
+        let difference = match &f.names[..] {
+            [duplicate, original] => difference(f, (duplicate, original), ""),
+            _ => String::new(),
+        };
+        format!("{}: {difference}", sentences::verdict(&f.verdict))
     };
     let mut answer = Answer::new(
         "Are hidden duplicates rated differently from their originals?",
-        format!(
-            "{}: {}",
-            sentences::verdict(&first.verdict),
-            sentence(first)
-        ),
+        sentence(first),
     );
-    let verdict = |f: &&Finding| format!("{}: {}", sentences::verdict(&f.verdict), sentence(f));
-    answer.main.extend(others.iter().map(verdict));
+    answer.main.extend(others.iter().map(|f| sentence(f)));
     Some(answer)
 }
