@@ -236,7 +236,9 @@ async function play(lang, browser, keyboard) {
   const code = await Promise.race([ended, sleep(20000)]);
   if (code !== 0) found(`${lang}: the session ended with ${code}: ${said}`);
   const ratings = readFileSync(join(folder, "results/page/ratings.csv"), "utf8");
-  if (ratings.split(",ok,").length !== 3) found(`${lang}: ${ratings}`);
+  const [header, ...rows] = ratings.trim().split(/\r?\n/).map((line) => line.split(","));
+  const rated = rows.filter((row) => row[header.indexOf("status")] === "ok");
+  if (rows.length !== 2 || rated.length !== 2) found(`${lang}: ${ratings}`);
   await context.close();
   rmSync(folder, { recursive: true });
   return seen.size;

@@ -197,9 +197,14 @@ fn reason(error: &NoAbilities, items: &[&str]) -> String {
             format!("no comparison joins {}", groups.join(" with "))
         }
         NoAbilities::Unbounded(top) => {
+            let names: Vec<&str> = top.iter().map(|i| items[*i]).collect();
+            let ability = match top.len() {
+                1 => "its ability is",
+                _ => "their abilities are",
+            };
             format!(
-                "{} was never less preferred than the others: its ability is unbounded",
-                names(top)
+                "none of the others was ever preferred to {}: {ability} unbounded",
+                names.join(" or ")
             )
         }
         NoAbilities::NoPairs
