@@ -139,7 +139,11 @@ impl FormView<'_> {
         let mut answers = Vec::new();
         // Fields below a scale of boxes are aligned with its edges.
         let boxes = self.answer(0, tall).and_then(|a| a.edges(area));
-        let below = boxes.filter(|edges| edges.width >= 48).unwrap_or(area);
+        let below = boxes.filter(|edges| edges.width >= 48);
+        let below = below.map_or(area, |edges| Rect {
+            width: edges.width.min(TEXT),
+            ..edges
+        });
         for (at, height) in heights.iter().enumerate() {
             let area = if at > 0 { below } else { area };
             let title = (at > 0).then(|| {
@@ -278,6 +282,8 @@ impl FormView<'_> {
     }
 }
 
+/// Largest width of a text field and of its title, in cells.
+const TEXT: u16 = 72;
 /// Width of the experimenter's panel, in cells.
 const PANEL: u16 = 28;
 /// Lines of a question beside which the panel is shown.
@@ -321,7 +327,7 @@ impl Widget for &FormView<'_> {
                 let title = if self.compact() {
                     *title
                 } else {
-                    middle(*title, 72, 1)
+                    middle(*title, TEXT, 1)
                 };
                 left(buf, title, &Line::from(spans));
             }
