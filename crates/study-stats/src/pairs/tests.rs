@@ -183,6 +183,8 @@ fn ties_alone_have_no_abilities() {
         abilities(3, &tied, model),
         Err(NoAbilities::AllTied)
     ));
-    let once = [tied[0], tied[1], pair(2, 0, [1.0, 0.0, 2.0])];
-    assert!(abilities(3, &once, model).is_ok());
+    let once = [tied[0], tied[1], pair(2, 0, [1.0, 1.0, 2.0])];
+    // Nine ties of eleven: ν/(ν + 2) = 9/11.
+    let tie = abilities(3, &once, model).unwrap().tie.unwrap();
+    assert!((tie.estimate - 9f64.ln()).abs() < 1e-6, "{tie:?}");
 }
