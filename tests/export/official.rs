@@ -4,7 +4,9 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![allow(clippy::print_stderr, reason = "says what is missing on this machine")]
 
-use crate::studies::{export, files, grouped, hostile, japanese, new, real_study, rehearsed};
+use crate::studies::{
+    export, files, grouped, hostile, japanese, new, of_groups_and_sessions, real_study, rehearsed,
+};
 use crate::support::{copy_folder, repository};
 use serde_json::Value;
 use std::fs;
@@ -127,6 +129,11 @@ fn studies(home: &Path) -> Vec<(PathBuf, &'static [&'static str])> {
     let extended = PathBuf::from(repository("protocols/turn-signal-extended"));
     let pairs = of("pairs");
     let tracks = of("tracks");
+    let several = |kind: &str, participants| {
+        let folder = of(&format!("several-{kind}"));
+        let protocol = of_groups_and_sessions(kind, &folder);
+        (rehearsed(&protocol, participants, &folder, &[]), SIMULATED)
+    };
     vec![
         (rehearsed(&paper, 3, &of("paper"), &[]), SIMULATED),
         (
@@ -151,6 +158,10 @@ fn studies(home: &Path) -> Vec<(PathBuf, &'static [&'static str])> {
             rehearsed(&new("abx", &of("abx")), 3, &home.join("abx"), &[]),
             SIMULATED,
         ),
+        several("pairs", 8),
+        several("abx", 6),
+        several("magnitude", 6),
+        several("mushra", 6),
     ]
 }
 

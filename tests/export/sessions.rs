@@ -3,7 +3,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use crate::studies::{export, files, grouped, new, rehearsed};
+use crate::studies::{export, files, grouped, new, of_groups_and_sessions, rehearsed};
 use crate::support::{repository, study};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -155,6 +155,56 @@ fn the_headline_of_pairs_and_tracks_is_that_of_the_analysis() {
             .sum::<u64>();
         assert_eq!(used as u64, trials, "{kind}");
         assert_eq!(out.join("thresholds.csv").exists(), kind == "staircase");
+    }
+}
+
+/// So are those of groups and repeated sessions, of ratings, pairs, tracks and estimates.
+#[test]
+fn the_headline_of_groups_and_sessions_is_that_of_the_analysis() {
+    for (kind, part, expected) in [
+        (
+            "ratings",
+            "real",
+            &["groups/F", "groups_conditions/p_gg", "sessions/p", "retest/sem"][..],
+        ),
+        (
+            "pairs",
+            "more-real",
+            &["groups_conditions/F", "pairs/ability/lambda-0.9995"],
+        ),
+        (
+            "abx",
+            "",
+            &["groups/old|young/t", "sessions/F", "retest/icc_agreement"],
+        ),
+        ("magnitude", "", &["groups_conditions/F", "magnitude/exponent"]),
+    ] {
+        let home = tempfile::tempdir().unwrap();
+        let folder = match kind {
+            "ratings" => grouped(6, home.path()),
+            _ => rehearsed(&of_groups_and_sessions(kind, home.path()), 6, home.path(), &[]),
+        };
+        let (out, _) = export(&folder, "r", home.path(), "r", &SIMULATED);
+        let arguments = ["analyze", folder.to_str().unwrap(), "--json"];
+        let (code, text, err) = study(&[&arguments[..], &SIMULATED].concat(), home.path());
+        assert_eq!(code, 0, "{err}");
+        let analysis: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let parts = analysis["parts"].as_array().unwrap();
+        let own = &parts.iter().find(|p| part.is_empty() || p["part"] == part).unwrap()["values"];
+        let headline = table(&out.join("headline.csv"));
+        let mut compared = 0;
+        for row in &headline {
+            let Some((_, id)) = row["id"].split_once(':') else {
+                continue;
+            };
+            assert_eq!(row["value"].parse().ok(), own[id].as_f64(), "{kind} {id}");
+            compared += usize::from(!row["value"].is_empty());
+        }
+        assert!(compared > 3, "{kind}: {headline:?}");
+        for id in expected {
+            let ends = |row: &&Row| row["id"].ends_with(&format!(":{id}"));
+            assert!(headline.iter().any(|r| ends(&r)), "{kind} {id}: {headline:?}");
+        }
     }
 }
 

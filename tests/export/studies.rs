@@ -219,6 +219,17 @@ pub(crate) fn grouped(participants: usize, home: &Path) -> PathBuf {
     rehearsed(&folder, participants, home, &[])
 }
 
+/// A new study of a kind, with two groups and two sessions.
+pub(crate) fn of_groups_and_sessions(kind: &str, home: &Path) -> PathBuf {
+    let folder = new(kind, home);
+    let protocol = folder.join("protocol.toml");
+    let more = "\n[groups]\n[[groups.list]]\nid = \"young\"\n[[groups.list]]\nid = \"old\"\n\n\
+        [[sessions]]\nid = \"one\"\n[[sessions]]\nid = \"two\"\n";
+    let text = fs::read_to_string(&protocol).unwrap() + more;
+    fs::write(protocol, text).unwrap();
+    folder
+}
+
 /// A new study of a kind.
 pub(crate) fn new(kind: &str, home: &Path) -> PathBuf {
     let (code, _, err) = study(&["new", kind, "--kind", kind], home);

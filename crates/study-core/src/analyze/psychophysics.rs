@@ -22,10 +22,11 @@ mod tracks;
 mod trials;
 
 pub use detection::{Detection, Task, detection};
-pub(crate) use discriminations::settings as track_settings;
+pub(crate) use discriminations::{have_ratios, settings as track_settings};
 pub use findings::{PartFinding, PartQuestion};
 pub use fits::{FitCell, FitSettings, psychometric};
-pub use part_data::{LevelData, PartAnalysis, PartData, StudyData};
+pub use part_data::{LevelData, Measured, PartAnalysis, PartData, StudyData};
+pub(crate) use part_data::{asked, sessions_of};
 pub use preferences::{Choice, Preference, preferences};
 pub use scales::{MagnitudeRow, MushraRoles, MushraRow, magnitude, mushra};
 pub use study::parts;

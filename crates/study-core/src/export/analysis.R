@@ -83,7 +83,8 @@ kept <- function(kind) sub(paste0("^", kind, " "), "", grep(paste0("^", kind, " 
 if (has_ratings) {
   print(table(because = ratings$not_used_because, useNA = "no"))
   counted <- ratings[ratings$included & !is.na(ratings[[question]]) & ratings$status != "failed", ]
-  counted$rating <- counted[[question]]
+  option <- setting("share of")
+  counted$rating <- if (is.na(option)) counted[[question]] else (counted[[question]] == option) + 0
   counted$model <- droplevels(counted$model)
   repeats <- realizations$id[!is.na(realizations$duplicate_of)]
   tested <- counted[counted$role == "test" & !(counted$model %in% repeats), ]
@@ -190,9 +191,10 @@ if (enough) {
 #' ## Ordinal mixed model
 #'
 #' The ratings as ordered categories. `clmm` needs the standardized VAF: with the raw one
-#' its standard errors are off by up to 1 %, and at least three participants.
+#' its standard errors are off by up to 1 %, and at least three participants and categories.
 
-three <- enough && nlevels(droplevels(with_vaf$participant)) > 2
+three <- enough && nlevels(droplevels(with_vaf$participant)) > 2 &&
+  length(unique(with_vaf$rating)) > 2
 if (three && all(with_vaf$rating == round(with_vaf$rating))) {
   with_vaf$ordered <- ordered(with_vaf$rating)
   ordinal_fit <- clmm(ordered ~ vaf_z + (1 | participant) + (1 | model), data = with_vaf)
@@ -210,6 +212,233 @@ if (three && all(with_vaf$rating == round(with_vaf$rating))) {
   value["clmm_vaf_crossed/loglik"] <- as.numeric(logLik(ordinal_fit))
   value["clmm_vaf_crossed/lrt_chi2"] <-
     2 * as.numeric(logLik(ordinal_fit) - logLik(without))
+}
+
+#' ## Groups, sessions and mixed models of parts
+#'
+#' A part gives a number of each participant, condition and session. Groups are compared by
+#' Welch's tests over what all of them have, and by the interaction of group and condition;
+#' sessions by a linear mixed model and by intraclass correlations. Where levels have ratios, all
+#' of this is about natural logarithms.
+
+participant_group <- function(who) {
+  own <- match(who, as.character(ratings$participant))
+  if (is.null(ratings$group)) rep(NA_character_, length(who)) else as.character(ratings$group)[own]
+}
+sorted <- function(names) sort(unique(names), method = "radix")
+fitted_model <- function(formula, data) {
+  control <- lmerControl(optimizer = "bobyqa", optCtrl = list(rhobeg = 0.2, rhoend = 1e-9),
+                         check.conv.singular = "ignore")
+  tryCatch(anova(lmer(formula, data = data, control = control), type = 3, ddf = "Satterthwaite"),
+           error = function(why) NULL)
+}
+# The test of y ~ condition + (1 | participant), as the numbers of `group`.
+mixed_test <- function(put, group, data) {
+  if (any(!is.finite(data$y)) || length(unique(data$condition)) < 2) return(invisible())
+  table <- fitted_model(y ~ condition + (1 | participant), data)
+  if (is.null(table)) return(invisible())
+  print(table)
+  put(paste0(group, "/F"), table[["F value"]])
+  put(paste0(group, "/df1"), table[["NumDF"]])
+  put(paste0(group, "/df2"), table[["DenDF"]])
+  put(paste0(group, "/p"), table[["Pr(>F)"]])
+}
+of_part <- function(part) function(what, number) value[paste0(part, ":", what)] <<- number
+# Each participant's mean of `value` by condition, and by session if the part has several.
+means_of <- function(part, data) {
+  data <- data.frame(participant = as.character(data$participant),
+                     condition = as.character(data$condition), value = data$value,
+                     session = if (length(kept(paste("session", part))) > 1)
+                       as.character(data$session_id) else rep("", nrow(data)))
+  data <- aggregate(value ~ participant + condition + session, data = data, FUN = mean)
+  data$group <- participant_group(data$participant)
+  data
+}
+
+compare_groups <- function(put, cells, ratios, by_condition) {
+  cells <- cells[!is.na(cells$group), ]
+  groups <- sorted(cells$group)
+  if (length(groups) < 2) return(invisible())
+  where <- paste(cells$condition, cells$session, sep = "\r")
+  common <- sorted(Reduce(intersect, lapply(groups, function(g) where[cells$group == g])))
+  all <- tapply(cells$value, list(cells$participant, factor(where, levels = common)), mean)
+  all <- all[rowSums(is.na(all)) == 0, , drop = FALSE]
+  if (length(common) == 0 || nrow(all) == 0) return(invisible())
+  group <- participant_group(rownames(all))
+  shown <- if (ratios) exp else identity
+  if (!by_condition) {
+    x <- rowMeans(all)
+    test <- tryCatch(oneway.test(x ~ group), error = function(why) NULL)
+    if (!is.null(test)) {
+      print(test)
+      put("groups/F", test$statistic[[1]])
+      put("groups/df1", test$parameter[[1]])
+      put("groups/df2", test$parameter[[2]])
+      put("groups/p", test$p.value)
+    }
+    for (i in seq_along(groups)) {
+      own <- x[group == groups[i]]
+      put(paste0("groups/", groups[i], if (ratios) "/geometric_mean" else "/mean"), shown(mean(own)))
+      put(paste0("groups/", groups[i], if (ratios) "/geometric_sd" else "/sd"), shown(sd(own)))
+      for (j in seq_along(groups)) if (j > i) {
+        test <- tryCatch(t.test(own, x[group == groups[j]]), error = function(why) NULL)
+        if (is.null(test)) next
+        pair <- paste0("groups/", groups[i], "|", groups[j])
+        put(paste0(pair, if (ratios) "/ratio" else "/difference"),
+            shown(test$estimate[[1]] - test$estimate[[2]]))
+        put(paste0(pair, "/t"), test$statistic[[1]])
+        put(paste0(pair, "/df"), test$parameter[[1]])
+        put(paste0(pair, "/p"), test$p.value)
+      }
+    }
+  }
+  of_column <- sub("\r.*", "", colnames(all))
+  conditions <- sorted(of_column)
+  k <- length(conditions)
+  if (k < 2 || nrow(all) <= length(groups) || length(unique(group)) < length(groups)) return(invisible())
+  y <- vapply(conditions, function(c) rowMeans(all[, of_column == c, drop = FALSE]), numeric(nrow(all)))
+  fit <- lm(y ~ group)
+  test <- tryCatch(anova(fit, lm(y ~ 1), X = ~1, test = "Spherical"), error = function(why) NULL)
+  if (is.null(test)) return(invisible())
+  print(test)
+  contrasts <- contr.helmert(k)
+  contrasts <- sweep(contrasts, 2, sqrt(colSums(contrasts^2)), "/")
+  own <- crossprod(residuals(fit) %*% contrasts)
+  put("groups_conditions/F", test[2, "F"])
+  put("groups_conditions/df1", test[2, "num Df"])
+  put("groups_conditions/df2", test[2, "den Df"])
+  put("groups_conditions/p", test[2, "Pr(>F)"])
+  put("groups_conditions/eps_gg", sum(diag(own))^2 / ((k - 1) * sum(own^2)))
+  put("groups_conditions/p_gg", test[2, "G-G Pr"])
+}
+
+compare_sessions <- function(put, cells, sessions) {
+  # Of each participant what all of the participant's sessions have.
+  level <- do.call(rbind, lapply(split(cells, cells$participant), function(own) {
+    own <- own[own$condition %in% Reduce(intersect, split(own$condition, own$session)), ]
+    if (nrow(own) > 0) aggregate(value ~ participant + session, data = own, FUN = mean)
+  }))
+  mixed_test(put, "sessions", data.frame(y = level$value, condition = level$session,
+                                         participant = level$participant))
+  table <- tapply(level$value, list(level$participant, factor(level$session, levels = sessions)), mean)
+  table <- table[rowSums(is.na(table)) == 0, , drop = FALSE]
+  n <- nrow(table)
+  k <- ncol(table)
+  if (n < 2) return(invisible())
+  whole <- sum((table - mean(table))^2)
+  rows <- k * sum((rowMeans(table) - mean(table))^2)
+  columns <- n * sum((colMeans(table) - mean(table))^2)
+  error <- (whole - rows - columns) / ((n - 1) * (k - 1))
+  rows <- rows / (n - 1)
+  columns <- columns / (k - 1)
+  put("retest/icc_agreement",
+      (rows - error) / (rows + (k - 1) * error + k * (columns - error) / n))
+  put("retest/icc_consistency", (rows - error) / (rows + (k - 1) * error))
+  put("retest/sem", sqrt(max(error, 0)))
+}
+
+again <- function(part, cells, ratios = FALSE, by_condition = FALSE) {
+  if (ratios) cells$value <- log(cells$value)
+  if (nrow(cells) == 0 || any(!is.finite(cells$value))) return(invisible())
+  put <- of_part(part)
+  compare_groups(put, cells, ratios, by_condition)
+  sessions <- kept(paste("session", part))
+  if (length(sessions) > 1 && !by_condition) compare_sessions(put, cells, sessions)
+}
+
+# The answers of a part that count, to its own question.
+answers_of <- function(kind, part) {
+  answers <- ratings[ratings$included & ratings$part == part, ]
+  answers$value <- answers[[setting(paste(kind, part))]]
+  answers[!is.na(answers$value), ]
+}
+
+#' ## Ratings of groups and sessions
+
+for (part in kept("rating")) {
+  rated <- answers_of("rating", part)
+  repeats <- realizations$id[!is.na(realizations$duplicate_of)]
+  rated <- rated[rated$role == "test" & !(rated$model %in% repeats), ]
+  if (nrow(rated) == 0) next
+  rated$condition <- rated$model
+  again(part, means_of(part, rated))
+}
+
+#' ## Magnitude estimation
+#'
+#' Logarithms after modulus equalisation: a participant's mean of each realization or level, less
+#' the participant's mean over them, plus the mean of all participants. Of levels the power law;
+#' realizations are compared by a linear mixed model and with VAF.
+
+for (part in kept("magnitude")) {
+  given <- answers_of("magnitude", part)
+  given <- given[given$value > 0, ]
+  if (nrow(given) == 0) next
+  put <- of_part(part)
+  levels <- setting(paste("estimates", part)) == "levels"
+  original <- realizations$duplicate_of[match(given$model, realizations$id)]
+  given$condition <- if (levels) given$level else
+    ifelse(is.na(original), as.character(given$model), as.character(original))
+  given$log <- log10(given$value)
+  cells <- tapply(given$log, list(as.character(given$participant), given$condition), mean)
+  own <- rowMeans(cells, na.rm = TRUE)
+  means <- colMeans(cells - own + mean(own), na.rm = TRUE)
+  if (levels) {
+    x <- log10(as.numeric(names(means)))
+    line <- function(y) {
+      use <- is.finite(x) & !is.na(y)
+      if (sum(use) > 1) unname(coef(lm(y[use] ~ x[use]))) else c(NA, NA)
+    }
+    put("magnitude/exponent", line(means)[2])
+    put("magnitude/log10_coefficient", line(means)[1])
+    exponents <- apply(cells, 1, function(y) line(y)[2])
+    if (sum(!is.na(exponents)) > 1) print(t.test(exponents))
+    next
+  }
+  for (model in names(means)) put(paste0("magnitude/realization/", model, "/geometric_mean"), 10^means[[model]])
+  long <- as.data.frame(as.table(cells), stringsAsFactors = FALSE)
+  names(long) <- c("participant", "condition", "value")
+  long <- long[!is.na(long$value), ]
+  long$value <- long$value * log(10)
+  mixed_test(put, "magnitude_mixed", transform(long, y = value))
+  tests <- realizations$id[realizations$role == "test" & !is.na(realizations$vaf)]
+  models <- intersect(sorted(names(means)), as.character(tests))
+  vaf <- realizations$vaf[match(models, realizations$id)]
+  if (length(models) > 2 && sd(vaf) > 0 && sd(means[models]) > 0) {
+    found <- correlated(vaf, means[models])
+    put("magnitude/vaf/pearson/r", found$r)
+    put("magnitude/vaf/pearson/p_exact_two_sided", found$p_exact)
+  }
+  long$group <- participant_group(long$participant)
+  long$session <- ""
+  again(part, long, by_condition = TRUE)
+}
+
+#' ## Ratings beside a reference
+#'
+#' After ITU-R BS.1534-3 a participant is left out who rates the hidden reference below 90, or the
+#' mid anchor above 90, in more than 15 % of the trials.
+
+for (part in kept("mushra")) {
+  rated <- answers_of("mushra", part)
+  if (nrow(rated) == 0) next
+  put <- of_part(part)
+  who <- as.character(rated$participant)
+  broken <- function(wrong, role) {
+    own <- rated$role == role
+    if (!any(own)) return(character(0))
+    share <- tapply(wrong[own], who[own], mean)
+    names(share)[share * 100 > 15 + 1e-9]
+  }
+  screened <- c(broken(rated$value < 90, "hidden-reference"), broken(rated$value > 90, "mid-anchor"))
+  if (length(screened) > 0) cat("left out: ", paste(sorted(screened), collapse = ", "), "\n", sep = "")
+  rated <- rated[!(who %in% screened), ]
+  for (model in unique(as.character(rated$model))) {
+    own <- rated[rated$model == model, ]
+    put(paste0("mushra/", model, "/median"), median(own$value))
+    put(paste0("mushra/", model, "/mean"),
+        mean(tapply(own$value, as.character(own$participant), mean)))
+  }
 }
 
 #' ## Pairs
@@ -231,6 +460,12 @@ for (part in kept("pairs")) {
   answers$first <- item(1)
   answers$second <- item(2)
   ties <- setting(paste("ties", part)) == "ties" && any(answers$answer == "tie")
+  won <- ifelse(answers$answer == "first", 1, ifelse(answers$answer == "tie", 0.5, 0))
+  wins <- data.frame(participant = rep(as.character(answers$participant), 2),
+                     condition = c(answers$first, answers$second), value = c(won, 1 - won), session = "")
+  wins <- aggregate(value ~ participant + condition + session, data = wins, FUN = mean)
+  wins$group <- participant_group(wins$participant)
+  again(part, wins, by_condition = TRUE)
   if (!ties) answers <- answers[answers$answer != "tie", ]
   items <- sort(unique(c(answers$first, answers$second)), method = "radix")
   outcomes <- c("first", "second", if (ties) "tie")
@@ -267,7 +502,7 @@ for (part in kept("pairs")) {
   contrast <- cbind(contrast, matrix(0, length(items), ncol(weights) - length(items) + 1))
   ability <- as.vector(contrast %*% estimate)
   spread <- contrast %*% covariance %*% t(contrast)
-  put <- function(what, number) value[paste0(part, ":", what)] <<- number
+  put <- of_part(part)
   print(data.frame(item = items, ability = ability, se = sqrt(diag(spread))))
   for (i in seq_along(items)) {
     put(paste0("pairs/ability/", items[i]), ability[i])
@@ -299,52 +534,62 @@ for (part in kept("pairs")) {
 #'
 #' The thresholds of `thresholds.csv` (posterior means of `study analyze`) are compared by the
 #' linear mixed model of their logarithms; whether two realizations are told apart, by a t test
-#' of what is 0 by chance.
+#' of what is 0 by chance. `sensitivities.csv` has the d' by which groups and sessions are compared.
 
 for (part in kept("tracks")) {
   answers <- ratings[ratings$included & ratings$part == part & !is.na(ratings$correct), ]
-  put <- function(what, number) value[paste0(part, ":", what)] <<- number
+  put <- of_part(part)
   print(aggregate(cbind(share_correct = correct) ~ participant + track, data = answers, FUN = mean))
+  sessions <- kept(paste("session", part))
   tracks <- kept(paste("method", part))
   for (track in tracks[!(tracks %in% answers$track[!is.na(answers$level)])]) {
-    own <- answers[answers$track == track, ]
-    if (nrow(own) == 0) next
-    method <- setting(paste("method", part, track))
-    given <- as.character(own[[setting(paste("tracks", part))]])
-    words <- switch(method, "same-different" = c("different", "same"), "yes-no" = c("yes", "no"),
-                    c("first", "second"))
-    target <- ifelse(own$correct, given, ifelse(given == words[1], words[2], words[1]))
-    above <- vapply(split(seq_len(nrow(own)), droplevels(own$participant)), function(rows) {
-      if (method %in% c("3ifc", "odd-one-out")) return(mean(own$correct[rows]) - 1 / 3)
-      rate <- function(word) {
-        asked <- rows[target[rows] == word]
-        (sum(given[asked] == words[1]) + 0.5) / (length(asked) + 1)
+    for (session in if (length(sessions) > 1) sessions else NA) {
+      own <- answers[answers$track == track, ]
+      if (!is.na(session)) own <- own[own$session_id == session, ]
+      if (nrow(own) == 0) next
+      method <- setting(paste("method", part, track))
+      given <- as.character(own[[setting(paste("tracks", part))]])
+      words <- switch(method, "same-different" = c("different", "same"), "yes-no" = c("yes", "no"),
+                      c("first", "second"))
+      target <- ifelse(own$correct, given, ifelse(given == words[1], words[2], words[1]))
+      above <- vapply(split(seq_len(nrow(own)), droplevels(own$participant)), function(rows) {
+        if (method %in% c("3ifc", "odd-one-out")) return(mean(own$correct[rows]) - 1 / 3)
+        rate <- function(word) {
+          asked <- rows[target[rows] == word]
+          (sum(given[asked] == words[1]) + 0.5) / (length(asked) + 1)
+        }
+        z <- qnorm(rate(words[1])) - qnorm(rate(words[2]))
+        switch(method, "2ifc" = z / sqrt(2), "yes-no" = z, pnorm(z / 2) - 0.5)
+      }, 0)
+      if (length(above) > 1 && sd(above) > 0) {
+        found <- t.test(above)
+        print(found)
+        name <- if (is.na(session)) track else paste0(track, "@", session)
+        put(paste0("sdt_group/", name, "/above_chance/t"), unname(found$statistic))
+        put(paste0("sdt_group/", name, "/above_chance/p"), found$p.value)
       }
-      z <- qnorm(rate(words[1])) - qnorm(rate(words[2]))
-      switch(method, "2ifc" = z / sqrt(2), "yes-no" = z, pnorm(z / 2) - 0.5)
-    }, 0)
-    if (length(above) > 1 && sd(above) > 0) {
-      found <- t.test(above)
-      print(found)
-      put(paste0("sdt_group/", track, "/above_chance/t"), unname(found$statistic))
-      put(paste0("sdt_group/", track, "/above_chance/p"), found$p.value)
     }
   }
-  if (!file.exists("thresholds.csv")) next
-  found <- read_text("thresholds.csv")
-  found <- found[found$part == part, ]
-  found$threshold <- as.numeric(found$threshold)
-  if (length(unique(found$track)) < 2 || length(unique(found$participant)) < 2) next
-  found$y <- if (is.na(setting(paste("ratios", part)))) found$threshold else log(found$threshold)
-  fit <- lmer(y ~ track + (1 | participant), data = found,
-              control = lmerControl(optimizer = "bobyqa", optCtrl = list(rhobeg = 0.2, rhoend = 1e-9),
-                                    check.conv.singular = "ignore"))
-  table <- anova(fit, type = 3, ddf = "Satterthwaite")
-  print(table)
-  put("psy_mixed/F", table[["F value"]])
-  put("psy_mixed/df1", table[["NumDF"]])
-  put("psy_mixed/df2", table[["DenDF"]])
-  put("psy_mixed/p", table[["Pr(>F)"]])
+  estimates <- function(file, column) {
+    if (!file.exists(file)) return(NULL)
+    found <- read_text(file)
+    found <- found[found$part == part, ]
+    data.frame(participant = found$participant, condition = found$track,
+               value = as.numeric(found[[column]]), session_id = found$session)
+  }
+  thresholds <- estimates("thresholds.csv", "threshold")
+  ratios <- isTRUE(nrow(thresholds) > 0) && !is.na(setting(paste("ratios", part)))
+  all <- rbind(thresholds, estimates("sensitivities.csv", "d"))
+  if (is.null(all) || nrow(all) == 0) next
+  cells <- means_of(part, all)
+  if (isTRUE(nrow(thresholds) > 0)) {
+    own <- transform(cells, y = if (ratios) suppressWarnings(log(value)) else value)
+    if (all(is.finite(own$y))) {
+      own <- aggregate(y ~ participant + condition, data = own, FUN = mean)
+      mixed_test(put, "psy_mixed", own)
+    }
+  }
+  again(part, cells, ratios)
 }
 
 #' ## Comparison with `study analyze`
@@ -354,7 +599,7 @@ for (part in kept("tracks")) {
 
 headline <- read_text("headline.csv")
 if (has_ratings && !three) {
-  cat("fewer than three participants: the ordinal model is not compared\n")
+  cat("fewer than three participants or categories: the ordinal model is not compared\n")
   headline <- headline[!startsWith(headline$id, "clmm_"), ]
 }
 compared <- data.frame(id = headline$id, here = unname(value[headline$id]),

@@ -1,31 +1,36 @@
 //! The tables with an R script and a Quarto document, which come to the numbers of
 //! `study analyze`.
 
+mod headline;
+
 use super::table::{Field, Type, clean};
 use super::{Dialect, ExportError, Job, delimited, readme, telemetry};
-use crate::analyze::psychophysics::{LevelData, PartAnalysis, StudyData, parts};
-use crate::analyze::{Analysis, Include, Rules, analyze, group_id};
+use crate::analyze::psychophysics::{
+    PartAnalysis, StudyData, asked, have_ratios, parts, sessions_of,
+};
+use crate::analyze::{Analysis, Include, RowDecision, Rules, analyze};
+use crate::outcome::RatingRow;
 use crate::outcome::cell::Cell;
 use crate::outcome::ratings::Ratings;
+use crate::protocol::Protocol;
 use crate::protocol::columns::UsedColumn;
-use crate::protocol::parts::Task;
+use crate::protocol::parts::{Task, TrackRules};
+use headline::{of_part, of_ratings};
 use sha2::{Digest as _, Sha256};
 use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
+use study_base::text::PartId;
 
 /// The script. Lines that begin with `#'` are the text of the document. No text of a
 /// study is in it: it reads all of them from the tables.
 const SCRIPT: &str = include_str!("analysis.R");
 
-/// Most realizations with a VAF of which R goes through every permutation.
-const MAX_PERMUTED: f64 = 8.0;
-
 pub(super) fn write(job: &mut Job<'_>) -> Result<(), ExportError> {
     let dialect = Dialect::default();
     let mut tables = job.tables.clone();
     let analysis = analysis(job);
-    let parts = parts_of(job);
+    let parts = parts_of(job, analysis.as_ref());
     if analysis.is_some() || !parts.is_empty() {
         mark(job, analysis.as_ref(), &parts, &mut tables.ratings);
     }
@@ -41,24 +46,35 @@ pub(super) fn write(job: &mut Job<'_>) -> Result<(), ExportError> {
     let all: Vec<_> = tables.all().collect();
     job.file("dictionary.csv", &delimited::dictionary(&all, &dialect))?;
     job.file("labels.csv", &delimited::labels(&all, &dialect))?;
-    let thresholds = thresholds(&parts);
-    if !thresholds.is_empty() {
-        let head = ["part", "participant", "track", "threshold"].map(str::to_owned);
-        let lines = std::iter::once(head).chain(thresholds);
+    for (path, estimate, what) in [
+        (
+            "thresholds.csv",
+            "threshold",
+            "the threshold of each participant on each track, a posterior mean of `study analyze`",
+        ),
+        (
+            "sensitivities.csv",
+            "d",
+            "the d' of each participant on each track of two realizations, of `study analyze`",
+        ),
+    ] {
+        let found = estimates(job.source.protocol, &parts, estimate == "threshold");
+        if found.is_empty() {
+            continue;
+        }
+        let head = ["part", "participant", "track", estimate, "session"].map(str::to_owned);
+        let lines = std::iter::once(head).chain(found);
         let lines = lines.map(|line| line.map(Cow::Owned).to_vec());
         let bytes = delimited::lines(lines, &dialect);
-        job.file("thresholds.csv", &bytes)?;
-        sums.push(("thresholds.csv".to_owned(), sha256(&bytes)));
-        files.push((
-            "thresholds.csv".to_owned(),
-            "the threshold of each participant on each track, a posterior mean of `study analyze`",
-        ));
+        job.file(path, &bytes)?;
+        sums.push((path.to_owned(), sha256(&bytes)));
+        files.push((path.to_owned(), what));
     }
     let question = analysis.as_ref().map_or("", |a| a.question.as_str());
     let settings = settings(job, question, &parts, &sums);
     job.file("settings.csv", &settings)?;
-    let mut headline = analysis.as_ref().map_or_else(Vec::new, headline);
-    headline.extend(parts.iter().flat_map(headline_of_part));
+    let mut headline = analysis.as_ref().map_or_else(Vec::new, of_ratings);
+    headline.extend(parts.iter().flat_map(of_part));
     let head = ["id", "value", "tolerance"].map(Cow::Borrowed).to_vec();
     let lines = headline.into_iter().map(|(id, value, tolerance)| {
         vec![
@@ -111,12 +127,19 @@ fn sha256(bytes: &[u8]) -> String {
     text
 }
 
-/// The analysis of the exported rows; `None` if the primary question has no numbers or
-/// nothing was rated.
+/// The analysis of the exported rows; `None` if the primary question has no numbers, has
+/// estimates of magnitude, or nothing was rated.
 fn analysis(job: &Job<'_>) -> Option<Analysis> {
     let protocol = job.source.protocol;
-    let question = protocol.primary().filter(|q| q.kind.is_number())?;
-    let mut ratings = Ratings::from_rows(&job.selected.rows, &question.id, None);
+    let question = protocol.primary()?;
+    let share_of = protocol.analysis.share_of(&question.id);
+    let estimated = (protocol.parts.iter()).any(|part| {
+        matches!(part.task, Task::Magnitude(_)) && part.asks.first() == Some(&question.id)
+    });
+    if estimated || !(question.kind.is_number() || share_of.is_some()) {
+        return None;
+    }
+    let mut ratings = Ratings::from_rows(&job.selected.rows, &question.id, share_of);
     ratings.set_states(&job.selected.participants);
     ratings.set_duplicates(protocol.models.iter().filter_map(|m| {
         let original = m.duplicate_of.as_ref()?;
@@ -131,11 +154,11 @@ fn analysis(job: &Job<'_>) -> Option<Analysis> {
     (!ratings.is_empty()).then(|| analyze(&ratings, &rules))
 }
 
-/// The analyses of the parts of pairs and tracks. Of a part that several sessions have, the
-/// tracks of each session are conditions of their own, which R does not repeat.
-fn parts_of(job: &Job<'_>) -> Vec<PartAnalysis> {
+/// The analyses of the parts.
+fn parts_of(job: &Job<'_>, analysis: Option<&Analysis>) -> Vec<PartAnalysis> {
+    let protocol = job.source.protocol;
     let study = StudyData {
-        protocol: job.source.protocol,
+        protocol,
         rows: &job.selected.rows,
         intervals: &job.selected.intervals,
         participants: &job.selected.participants,
@@ -147,14 +170,49 @@ fn parts_of(job: &Job<'_>) -> Vec<PartAnalysis> {
         simulated: true,
     };
     let mut found = parts(&study, include);
-    let protocol = job.source.protocol;
     found.retain(|own| {
-        let task = protocol.part(&own.part).map(|p| &p.task);
-        matches!(task, Some(Task::Pairs(_) | Task::Discrimination { .. }))
-            && protocol.sessions.len() < 2
-            && own.trials > 0
+        let part = protocol.part(&own.part);
+        own.trials > 0 && part.is_some() && uses_the_same(job, analysis, own)
     });
     found
+}
+
+/// Whether the part rests on the rows that the analysis of ratings uses, if both are about one
+/// question. They differ if an exclusion rule judges all parts together.
+fn uses_the_same(job: &Job<'_>, analysis: Option<&Analysis>, own: &PartAnalysis) -> bool {
+    let rows = &job.selected.rows;
+    let used: BTreeSet<_> = own.used.iter().collect();
+    let decisions = decisions(rows, analysis);
+    let mut both = (rows.iter().zip(decisions)).filter(|(row, decision)| {
+        decision.is_some() && row.part.as_ref() == Some(&own.part) && is_asked(job, row, analysis)
+    });
+    both.all(|(row, decision)| {
+        let place = (row.participant.clone(), row.session, row.trial);
+        let rated = decision.is_some_and(|d| d.rating.is_some());
+        let included = decision.is_some_and(|d| d.excluded.is_none());
+        !rated || used.contains(&place) == included
+    })
+}
+
+/// Whether the part of a row asks the question of the analysis.
+fn is_asked(job: &Job<'_>, row: &RatingRow, analysis: Option<&Analysis>) -> bool {
+    let protocol = job.source.protocol;
+    let part = row.part.as_ref().and_then(|id| protocol.part(id));
+    let own = part.and_then(|part| asked(protocol, part));
+    own.is_none_or(|own| analysis.is_some_and(|a| a.question == own.as_str()))
+}
+
+/// What the analysis of ratings decided of each row; it has one for each rating of a realization
+/// that is no practice.
+fn decisions<'a>(
+    rows: &'a [RatingRow],
+    analysis: Option<&'a Analysis>,
+) -> impl Iterator<Item = Option<&'a RowDecision>> {
+    let mut decided = analysis.map_or(&[][..], |a| &a.rows[..]).iter();
+    rows.iter().map(move |row| {
+        let rated = row.model.is_some() && row.track.is_none() && !row.practice;
+        if rated { decided.next() } else { None }
+    })
 }
 
 /// Adds whether the analysis used each row, and why not.
@@ -165,14 +223,11 @@ fn mark(
     table: &mut super::table::Table<'_>,
 ) {
     let in_parts: BTreeSet<_> = parts.iter().flat_map(|part| &part.used).collect();
-    let mut decisions = analysis.map_or(&[][..], |a| &a.rows[..]).iter();
-    // The analysis has a row for each rating of a realization that is no practice.
-    let used: Vec<Option<Option<String>>> = (job.selected.rows.iter())
-        .map(|row| {
-            let rated = row.model.is_some() && row.track.is_none() && !row.practice;
-            let decision = if rated { decisions.next() } else { None };
+    let rows = &job.selected.rows;
+    let used: Vec<Option<Option<String>>> = (rows.iter().zip(decisions(rows, analysis)))
+        .map(|(row, decision)| {
             let place = (row.participant.clone(), row.session, row.trial);
-            match decision {
+            match decision.filter(|_| is_asked(job, row, analysis)) {
                 Some(decision) => Some(decision.excluded.as_ref().map(ToString::to_string)),
                 None => in_parts.contains(&&place).then_some(None),
             }
@@ -216,31 +271,43 @@ fn settings(
     put("question", question);
     put("tool_version", job.source.tool_version);
     let protocol = job.source.protocol;
+    if let Some(option) = protocol.primary().and_then(|q| protocol.analysis.share_of(&q.id)) {
+        put("share of", option);
+    }
     for part in parts.iter().filter_map(|own| protocol.part(&own.part)) {
-        let asked = part.asks.first().map_or("", |q| q.as_str());
+        let question = asked(protocol, part).map_or("", |q| q.as_str());
+        let kind = match part.task {
+            Task::Rating(_) => "rating",
+            Task::Magnitude(_) => "magnitude",
+            Task::Mushra(_) => "mushra",
+            Task::Pairs(_) => "pairs",
+            Task::Discrimination { .. } => "tracks",
+        };
+        put(&format!("{kind} {}", part.id), question);
+        for session in sessions_of(protocol, part).into_iter().flatten() {
+            put(&format!("session {} {session}", part.id), "true");
+        }
         match &part.task {
             Task::Pairs(pairs) => {
                 let ties = if pairs.tie { "ties" } else { "no ties" };
-                put(&format!("pairs {}", part.id), asked);
                 put(&format!("ties {}", part.id), ties);
             }
-            Task::Discrimination { tracks } => {
-                put(&format!("tracks {}", part.id), asked);
-                for track in tracks.iter().filter_map(|id| protocol.track(id)) {
-                    put(
-                        &format!("method {} {}", part.id, track.id),
-                        track.method.as_str(),
-                    );
+            Task::Magnitude(own) => {
+                let levels = own.models.iter().any(|m| protocol.level_of(m).is_some());
+                let of = if levels { "levels" } else { "realizations" };
+                put(&format!("estimates {}", part.id), of);
+            }
+            Task::Discrimination { .. } => {
+                let tracks = tracks(protocol, &part.id);
+                for track in &tracks {
+                    let method = track.method.as_str();
+                    put(&format!("method {} {}", part.id, track.id), method);
+                }
+                if have_ratios(protocol, &tracks) {
+                    put(&format!("ratios {}", part.id), "true");
                 }
             }
-            Task::Rating(_) | Task::Magnitude(_) | Task::Mushra(_) => {}
-        }
-    }
-    for part in parts {
-        let ratios = (part.values.iter())
-            .any(|(id, _)| id.starts_with("psy_mixed/") && id.ends_with("/geometric_mean"));
-        if ratios {
-            put(&format!("ratios {}", part.part), "true");
+            Task::Rating(_) | Task::Mushra(_) => {}
         }
     }
     for (path, sum) in sums {
@@ -249,100 +316,39 @@ fn settings(
     delimited::lines(records, &Dialect::default())
 }
 
-/// The tolerance, relative to a value above 1, of closed forms, of the linear mixed model,
-/// of abilities, and of the ordinal model.
-const CLOSED: &str = "1e-9";
-const LINEAR: &str = "2e-5";
-/// Of a likelihood that both maximize by Newton's method.
-const FITTED: &str = "1e-6";
-const ORDINAL: &str = "2e-3";
-
-/// The numbers that R has to come to.
-fn headline(analysis: &Analysis) -> Vec<(String, Option<f64>, &'static str)> {
-    let mut ids: Vec<(String, &'static str)> = Vec::new();
-    for realization in &analysis.realizations {
-        let group = group_id("desc", &[&realization.id]);
-        ids.extend(["n", "mean", "sd"].map(|what| (format!("{group}/{what}"), CLOSED)));
+/// The tracks of a part; none of another kind.
+fn tracks<'p>(protocol: &'p Protocol, part: &PartId) -> Vec<&'p TrackRules> {
+    match protocol.part(part).map(|part| &part.task) {
+        Some(Task::Discrimination { tracks }) => {
+            tracks.iter().filter_map(|id| protocol.track(id)).collect()
+        }
+        _ => Vec::new(),
     }
-    ids.extend(["n_models", "pearson/r", "pearson/p_t"].map(|w| (format!("corr/{w}"), CLOSED)));
-    let models = analysis.values.number("corr/n_models");
-    if models.is_some_and(|n| n <= MAX_PERMUTED) {
-        ids.push(("corr/pearson/p_exact_two_sided".to_owned(), CLOSED));
-    }
-    let linear = [
-        "slope",
-        "slope_se",
-        "slope_satterthwaite_df",
-        "slope_satterthwaite_p",
-    ];
-    let variances = ["var_subject", "var_model", "sigma2"];
-    ids.extend((linear.iter().chain(&variances)).map(|w| (format!("lmm_vaf_crossed/{w}"), LINEAR)));
-    let ordinal = [
-        "beta/vaf",
-        "se/vaf",
-        "sd_subject",
-        "sd_model",
-        "loglik",
-        "lrt_chi2",
-    ];
-    ids.extend(ordinal.map(|w| (format!("clmm_vaf_crossed/{w}"), ORDINAL)));
-    let values = &analysis.values;
-    (ids.into_iter())
-        .map(|(id, tolerance)| {
-            let value = values.number(&id);
-            (id, value, tolerance)
-        })
-        .collect()
 }
 
-/// The numbers of a part that R has to come to, with the part's id before theirs.
-fn headline_of_part(part: &PartAnalysis) -> Vec<(String, Option<f64>, &'static str)> {
-    let tolerance = |id: &str| {
-        let (group, what) = id.rsplit_once('/')?;
-        let of = |names: &[&str]| names.contains(&what);
-        let found = match group {
-            "pairs" => of(&["order", "order_se", "tie_log_nu", "tie_log_nu_se"]).then_some(FITTED),
-            "pairs/vaf/pearson" => of(&["r", "p_exact_two_sided"]).then_some(FITTED),
-            "psy_mixed" => of(&["F", "df1", "df2", "p"]).then_some(LINEAR),
-            _ if group == "pairs/ability" || group == "pairs/ability_se" => Some(FITTED),
-            _ if group.starts_with("pairs/") && group.contains('|') => {
-                of(&["difference", "se"]).then_some(FITTED)
-            }
-            _ if group.starts_with("sdt_group/") && group.ends_with("/above_chance") => {
-                of(&["t", "p"]).then_some(CLOSED)
-            }
-            _ => None,
-        };
-        found.filter(|_| {
-            what != "p_exact_two_sided"
-                || (part.values.number("pairs/vaf/n_models")).is_some_and(|n| n <= MAX_PERMUTED)
-        })
-    };
-    (part.values.iter())
-        .filter_map(|(id, _)| Some((id, tolerance(id)?)))
-        .map(|(id, tolerance)| {
-            let value = part.values.number(id);
-            (format!("{}:{id}", part.part), value, tolerance)
-        })
-        .collect()
-}
-
-/// The threshold of each participant on each track: part, participant, track, threshold.
-fn thresholds(parts: &[PartAnalysis]) -> Vec<[String; 4]> {
-    let of_part = |part: &PartAnalysis| -> Vec<[String; 4]> {
-        let one = |level: &LevelData| {
-            let group = group_id("psy", &[&level.participant, &level.condition]);
-            let value = part
-                .values
-                .number(&format!("{group}/posterior/threshold/mean"))?;
-            Some([
-                part.part.to_string(),
-                level.participant.clone(),
-                level.condition.clone(),
-                value.to_string(),
-            ])
-        };
-        part.data.levels.iter().filter_map(one).collect()
+/// The thresholds or the sensitivities of tracks: part, participant, track, estimate, session.
+fn estimates(
+    protocol: &Protocol,
+    parts: &[PartAnalysis],
+    thresholds: bool,
+) -> Vec<[String; 5]> {
+    let of_part = |part: &PartAnalysis| -> Vec<[String; 5]> {
+        let has_levels = |track: &&&TrackRules| track.family().is_some() == thresholds;
+        let tracks = tracks(protocol, &part.part);
+        let tracks: BTreeSet<&str> =
+            (tracks.iter().filter(has_levels)).map(|track| track.id.as_str()).collect();
+        let own = part.data.measured.iter();
+        own.filter(|m| tracks.contains(m.condition.as_str()))
+            .map(|m| {
+                [
+                    part.part.to_string(),
+                    m.participant.clone(),
+                    m.condition.clone(),
+                    m.value.to_string(),
+                    m.session.clone().unwrap_or_default(),
+                ]
+            })
+            .collect()
     };
     parts.iter().flat_map(of_part).collect()
 }

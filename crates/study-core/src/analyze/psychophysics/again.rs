@@ -5,6 +5,7 @@
 //! over what all sessions have.
 
 use super::over_participants::{NOT_POSITIVE, Threshold, mixed};
+use super::part_data::Measured;
 use crate::analyze::identifiers::{group_id, pair_id};
 use crate::analyze::values::Values;
 use std::collections::{BTreeMap, BTreeSet};
@@ -12,16 +13,6 @@ use study_stats::agreement::icc;
 use study_stats::between::{self, welch};
 use study_stats::describe::{mean, sd};
 use study_stats::paired::holm;
-
-/// A number of one participant in one condition and session.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Measured {
-    pub(super) participant: String,
-    pub(super) group: Option<String>,
-    pub(super) session: Option<String>,
-    pub(super) condition: String,
-    pub(super) value: f64,
-}
 
 /// Condition and session.
 type Cell<'a> = (&'a str, Option<&'a str>);

@@ -1,8 +1,10 @@
 //! The tracks of a part: functions, sensitivities, and what participants have in common.
 
-use super::again::{Measured, again};
+use super::again::again;
 use super::over_participants::{Threshold, Told, mixed, sensitivities};
-use super::part_data::{Found, LevelData, PartData, StudyData, chosen, groups, sessions_of};
+use super::part_data::{
+    Found, LevelData, Measured, PartData, StudyData, chosen, groups, sessions_of,
+};
 use super::tracks::{TrackName, of_session};
 use super::trials::{Asked, TrialCount, TrialSettings, discrimination, level};
 use crate::analyze::identifiers::group_id;
@@ -101,9 +103,8 @@ pub(super) fn of_tracks(
     sensitivities(&told, &mut values);
     let families = tracks.iter().filter_map(|t| protocol.family(t.family()?));
     let families: Vec<_> = families.collect();
-    let blends = families.iter().any(|f| f.vary == Vary::Blend);
     // Sensitivities have no ratios.
-    let ratios = !blends && !thresholds.is_empty();
+    let ratios = !thresholds.is_empty() && have_ratios(protocol, tracks);
     if !thresholds.is_empty() {
         mixed(
             "psy_mixed",
@@ -114,6 +115,7 @@ pub(super) fn of_tracks(
     }
     let ids: Vec<&str> = sessions.iter().flatten().map(|s| s.as_str()).collect();
     again(&measured, &ids, ratios, &mut values);
+    data.measured = measured;
     if let Some(first) = families.first()
         && families.iter().all(|f| f.id == first.id)
     {
@@ -127,6 +129,12 @@ pub(super) fn of_tracks(
         data,
         names,
     })
+}
+
+/// Whether the levels of these tracks have ratios, as those of a blend have not.
+pub(crate) fn have_ratios(protocol: &Protocol, tracks: &[&TrackRules]) -> bool {
+    let mut families = tracks.iter().filter_map(|t| protocol.family(t.family()?));
+    !families.any(|f| f.vary == Vary::Blend)
 }
 
 /// The threshold of each participant and track, over the sessions.

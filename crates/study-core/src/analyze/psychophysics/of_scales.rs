@@ -1,7 +1,7 @@
 //! Magnitude estimation and MUSHRA of a study.
 
-use super::again::{Measured, by_condition};
-use super::part_data::{Found, PartData, groups};
+use super::again::by_condition;
+use super::part_data::{Found, Measured, PartData, groups};
 use super::scales::{
     MagnitudeRow, MushraRoles, MushraRow, RealizationRow, magnitude, mushra, realizations,
 };

@@ -75,6 +75,23 @@ pub struct PartData {
     pub tracks: Vec<TrackData>,
     /// VAF of the compared realizations that have one.
     pub vaf: BTreeMap<String, f64>,
+    /// Thresholds and sensitivities, by which tracks, groups and sessions are compared.
+    pub measured: Vec<Measured>,
+}
+
+/// A number of one participant in one condition and session.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measured {
+    /// Participant. Untrusted.
+    pub participant: String,
+    /// Group of the participant, if the study has groups.
+    pub group: Option<String>,
+    /// Session, if several sessions have the part.
+    pub session: Option<String>,
+    /// Track or realization. Untrusted.
+    pub condition: String,
+    /// A threshold, a sensitivity, a mean rating.
+    pub value: f64,
 }
 
 /// Positive answers of one participant in one condition.
@@ -143,7 +160,7 @@ pub(super) fn chosen<'a>(part: &Part, row: &'a RatingRow) -> Option<&'a str> {
 
 /// The question that a part is about: the first, which is its own, but of ratings the
 /// primary one, if they ask it.
-pub(super) fn asked<'a>(protocol: &Protocol, part: &'a Part) -> Option<&'a QuestionId> {
+pub(crate) fn asked<'a>(protocol: &Protocol, part: &'a Part) -> Option<&'a QuestionId> {
     let is_rating = matches!(part.task, Task::Rating(_));
     let is_primary = |id: &&QuestionId| is_rating && **id == protocol.analysis.primary;
     let primary = part.asks.iter().find(is_primary);
@@ -160,7 +177,7 @@ pub(super) fn groups(rows: &[&RatingRow]) -> BTreeMap<String, String> {
 }
 
 /// The sessions that have a part, if there are several; else only `None`.
-pub(super) fn sessions_of<'a>(protocol: &'a Protocol, part: &Part) -> Vec<Option<&'a PartId>> {
+pub(crate) fn sessions_of<'a>(protocol: &'a Protocol, part: &Part) -> Vec<Option<&'a PartId>> {
     let has = |s: &&crate::protocol::SessionPlan| {
         s.parts
             .as_ref()

@@ -1,8 +1,8 @@
 //! Questionnaires of a study: `questionnaire/…`.
 
-use super::again::{Measured, again};
+use super::again::again;
 use super::findings::{PartFacts, of_groups_and_sessions};
-use super::part_data::{PartAnalysis, PartData, StudyData};
+use super::part_data::{Measured, PartAnalysis, PartData, StudyData};
 use crate::analyze::identifiers::group_id;
 use crate::analyze::select::{Include, Whose, state_counts};
 use crate::analyze::values::Values;

@@ -1,6 +1,6 @@
 //! The tracks and pairs of a study.
 
-use super::again::{Measured, again, by_condition};
+use super::again::{again, by_condition};
 use super::discriminations::of_tracks;
 use super::excluded;
 use super::findings::{
@@ -9,7 +9,7 @@ use super::findings::{
 };
 use super::of_scales::{of_magnitudes, of_mushra};
 use super::part_data::{
-    Found, Intervals, PartAnalysis, PartData, StudyData, asked, chosen, groups, sessions_of,
+    Found, Intervals, Measured, PartAnalysis, PartData, StudyData, asked, chosen, groups, sessions_of,
 };
 use super::preferences::{Choice, Preference, in_both_orders, preferences};
 use super::questionnaires::of_questionnaires;
