@@ -8,6 +8,8 @@ mod progress;
 mod report;
 mod trials;
 
+pub(in crate::cli) use parts::of_track;
+
 use super::load::Loaded;
 use super::{Console, Failure, study_folder};
 use crate::report::figures::Trace;
@@ -181,7 +183,11 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         if !parts.is_empty() && args.question.is_none() && unrated {
             let damage = study_folder::warnings(study, &sessions, Some(&loaded))?;
             study_folder::warn(study, &damage, console);
-            let source = source_of(study, &loaded.protocol);
+            let who = &derived.participants;
+            let source = Source {
+                preregistration: preregistration::of_parts(study, &sessions, &loaded, who, &parts)?,
+                ..source_of(study, &loaded.protocol)
+            };
             let details = Details {
                 parts: parts::reports(&loaded.protocol, &parts),
                 damage,

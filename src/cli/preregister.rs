@@ -11,8 +11,10 @@ use std::path::{Path, PathBuf};
 use study_base::text::{Untrusted, escaped_json};
 use study_core::analyze::{Include, Rules};
 use study_core::power::{Overrides, Plan, merge};
-use study_core::preregister::{FILE, FORMAT, Preregistration, complete_study, deciding};
-use study_core::protocol::Protocol;
+use study_core::preregister::{
+    FILE, FORMAT, Preregistration, complete_parts, complete_study, deciding,
+};
+use study_core::protocol::{Protocol, Task};
 use study_core::protocol::power::PowerPlan;
 
 /// The document for people.
@@ -50,12 +52,12 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let question = protocol.analysis.primary.clone();
     let mut ratings = complete_study(protocol, &question, n);
     analyze::describe_realizations(&mut ratings, &loaded);
-    let is_rating = (protocol.questions.iter()).any(|q| q.id == question && q.kind.is_number());
-    if !is_rating {
+    if !is_rated(protocol) {
         ratings = ratings.keep(|_| false);
     }
     let rules = Rules::of(protocol, question.as_str(), Include::default());
     let analysis = study_core::analyze::analyze(&ratings, &rules);
+    let parts = complete_parts(protocol, n);
     let (power, sentences) = power(protocol, args.studies)?;
     let facts = Preregistration {
         format: FORMAT.to_owned(),
@@ -64,7 +66,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         study: protocol.study.id.clone(),
         participants: n,
         question,
-        tests: deciding(&analysis),
+        tests: deciding(Some(&analysis), &parts),
         power,
         fingerprints: loaded.parts.fingerprints(),
         protocol: loaded.parts.clone(),
@@ -75,6 +77,8 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         document: &facts,
         protocol,
         analysis: &analysis,
+        parts: &parts,
+        tracks: protocol.tracks.iter().map(|track| analyze::of_track(protocol, track)).collect(),
         power: sentences,
     });
     let value = serde_json::to_value(&facts).map_err(|e| Failure::new(super::Kind::Bug, e))?;
@@ -90,6 +94,16 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     }
     console.say(format!("written: {}", shown(&folder.join(MARKDOWN))));
     console.out(format!("{}\n", facts.sha256))
+}
+
+/// Whether the primary question is analyzed as a rating: numbers other than estimates of
+/// magnitude, or the share of an answer.
+fn is_rated(protocol: &Protocol) -> bool {
+    let primary = &protocol.analysis.primary;
+    let estimated = (protocol.parts.iter())
+        .any(|part| matches!(part.task, Task::Magnitude(_)) && part.asks.first() == Some(primary));
+    let number = protocol.primary().is_some_and(|q| q.kind.is_number());
+    !estimated && (number || protocol.analysis.share_of(primary).is_some())
 }
 
 fn shown(path: &Path) -> String {

@@ -110,14 +110,17 @@ fn part(part: &PartAnalysis) -> Json {
 }
 
 /// The statistics of the parts of a study that are not ratings, `study-parts/1`.
-pub fn parts(path: &str, study: &str, parts: &[PartAnalysis]) -> String {
-    let document = json!({
+pub fn parts(source: &Source, parts: &[PartAnalysis]) -> String {
+    let mut document = json!({
         "format": "study-parts/1",
         "tool_version": env!("CARGO_PKG_VERSION"),
-        "path": path,
-        "study": study,
+        "path": source.path,
+        "study": source.study.as_deref().unwrap_or_default(),
         "parts": parts.iter().map(part).collect::<Vec<_>>(),
     });
+    if let Some(comparison) = &source.preregistration {
+        document["preregistration"] = super::comparison::json(comparison);
+    }
     format!("{document:#}\n")
 }
 

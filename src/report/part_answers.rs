@@ -35,22 +35,7 @@ pub(super) fn answered(part: &PartAnalysis) -> Vec<Answered> {
 
 fn answer(part: &PartAnalysis, f: &PartFinding) -> Answered {
     let verdict = sentences::verdict(&f.verdict);
-    let question = match &f.question {
-        PartQuestion::Preferred => "Is a realization preferred to another?".to_owned(),
-        PartQuestion::PreferenceVaf => "Does VAF predict which is preferred?".to_owned(),
-        PartQuestion::IntervalOrder => "Does the order of the intervals matter?".to_owned(),
-        PartQuestion::ToldApart(condition) => {
-            format!("{condition}: are standard and comparison told apart?")
-        }
-        PartQuestion::Thresholds => "Do thresholds differ between the conditions?".to_owned(),
-        PartQuestion::Magnitudes => "Do the estimates differ between realizations?".to_owned(),
-        PartQuestion::MagnitudeVaf => "Does VAF predict the estimates?".to_owned(),
-        PartQuestion::Groups => "Do the groups differ?".to_owned(),
-        PartQuestion::GroupsConditions => {
-            "Does what distinguishes the conditions depend on the group?".to_owned()
-        }
-        PartQuestion::Sessions => "Do the sessions differ?".to_owned(),
-    };
+    let question = asked(&f.question);
     let decided = || format!("{verdict}: {}.", result(part, f));
     let mut more: Vec<String> = f.caveats.iter().map(sentences::caveat).collect();
     if f.question == PartQuestion::Sessions {
@@ -66,6 +51,39 @@ fn answer(part: &PartAnalysis, f: &PartFinding) -> Answered {
         question,
         short: sentences::undefined(f).unwrap_or_else(decided),
         more,
+    }
+}
+
+/// The question of a finding.
+fn asked(question: &PartQuestion) -> String {
+    match question {
+        PartQuestion::Preferred => "Is a realization preferred to another?".to_owned(),
+        PartQuestion::PreferenceVaf => "Does VAF predict which is preferred?".to_owned(),
+        PartQuestion::IntervalOrder => "Does the order of the intervals matter?".to_owned(),
+        PartQuestion::ToldApart(condition) => {
+            format!("{condition}: are standard and comparison told apart?")
+        }
+        PartQuestion::Thresholds => "Do thresholds differ between the conditions?".to_owned(),
+        PartQuestion::Magnitudes => "Do the estimates differ between realizations?".to_owned(),
+        PartQuestion::MagnitudeVaf => "Does VAF predict the estimates?".to_owned(),
+        PartQuestion::Groups => "Do the groups differ?".to_owned(),
+        PartQuestion::GroupsConditions => {
+            "Does what distinguishes the conditions depend on the group?".to_owned()
+        }
+        PartQuestion::Sessions => "Do the sessions differ?".to_owned(),
+    }
+}
+
+/// A question and the test that decides it, for a preregistration.
+pub(super) fn declared(part: &PartAnalysis, f: &PartFinding) -> String {
+    let question = format!("Part `{}`: {}", part.part, asked(&f.question));
+    match &f.test {
+        Some(test) => format!(
+            "{question} Decided by: {}; level {}.",
+            sentences::corrected(test),
+            sentences::level(test.level)
+        ),
+        None => format!("{question} No test: {}.", f.reason().unwrap_or_default()),
     }
 }
 

@@ -15,8 +15,10 @@ pub use page::{head, results};
 pub use paragraph::paragraph;
 
 use super::apa;
-use study_base::text::counted;
-use study_core::power::{self, Cell, CellResult, Plan, Reach, Scale, Smallest, Test, Vaf};
+use study_base::text::{PartId, counted};
+use study_core::power::{
+    self, Cell, CellResult, LeftOut, Plan, Reach, Scale, Smallest, Test, Vaf,
+};
 use study_stats::power::covariate::Expected;
 use study_stats::power::detectable_correlation;
 
@@ -146,6 +148,7 @@ impl Report {
                     .to_owned(),
             );
         }
+        found.extend(left_out(&plan.left_out));
         if let Some(most) = plan.max_session_min {
             for shape in plan.shapes() {
                 if let Some(minutes) = plan.too_long(shape) {
@@ -218,6 +221,40 @@ impl Report {
             );
         }
     }
+}
+
+/// What of the protocol is not simulated.
+fn left_out(left: &LeftOut) -> Vec<String> {
+    let mut found = Vec::new();
+    let what = match (left.groups, left.sessions) {
+        (true, true) => Some("groups and sessions are"),
+        (true, false) => Some("groups are"),
+        (false, true) => Some("several sessions are"),
+        (false, false) => None,
+    };
+    if let Some(what) = what {
+        found.push(format!(
+            "{what} not simulated: this is the power of all participants as one group in one session, \
+             and not that of a difference between them"
+        ));
+    }
+    let ids = |parts: &[PartId]| {
+        let ids: Vec<&str> = parts.iter().map(PartId::as_str).collect();
+        ids.join(", ")
+    };
+    if !left.parts.is_empty() {
+        found.push(format!(
+            "not simulated here: part {}; --part names the one to simulate",
+            ids(&left.parts)
+        ));
+    }
+    if !left.never.is_empty() {
+        found.push(format!(
+            "the power of magnitude estimation and MUSHRA is not computed: part {}",
+            ids(&left.never)
+        ));
+    }
+    found
 }
 
 /// A bar up to the power, with a mark at the ceiling.

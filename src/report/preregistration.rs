@@ -1,12 +1,16 @@
 //! The preregistration as a document.
 
 use super::html::{declared_test, exclusion};
-use super::{apa, sentences};
+use super::{apa, part_answers, sentences};
 use serde_json::json;
 use study_base::text::{Untrusted, capital, counted};
 use study_core::analyze::Analysis;
+use study_core::analyze::psychophysics::PartAnalysis;
 use study_core::preregister::Preregistration;
-use study_core::protocol::{Order, Protocol, Question, QuestionKind, Role, Unfinished};
+use study_core::protocol::parts::{IntervalOrder, Part, Presentations, Task};
+use study_core::protocol::{
+    Assign, Order, Protocol, Question, QuestionKind, Role, SessionPlan, Unfinished,
+};
 
 /// What the document says besides its facts.
 #[derive(Debug, Clone)]
@@ -17,6 +21,10 @@ pub struct Content<'a> {
     pub protocol: &'a Protocol,
     /// The analysis of a complete study, whose tests are declared.
     pub analysis: &'a Analysis,
+    /// Those of its parts.
+    pub parts: &'a [PartAnalysis],
+    /// What each track compares, and how. Untrusted.
+    pub tracks: Vec<String>,
     /// Sentences on power and sensitivity.
     pub power: Vec<String>,
 }
@@ -58,6 +66,10 @@ pub fn markdown(c: &Content<'_>) -> String {
         let (what, test) = declared_test(c.analysis, f)?;
         Some(format!("{what}: {test}."))
     }));
+    for part in c.parts {
+        let own = part.findings.iter();
+        tests.extend(own.map(|f| part_answers::declared(part, f)));
+    }
     if tests.len() == 1 {
         tests.push(
             "The primary question is no rating of realizations: thresholds and preferences are \
@@ -108,11 +120,32 @@ fn text(raw: &str) -> String {
 
 fn design(c: &Content<'_>) -> Vec<String> {
     let (d, p) = (c.document, c.protocol);
-    let mut lines = vec![format!(
-        "{}, {} of each realization.",
-        counted(d.participants as usize, "participant", "participants"),
-        counted(p.design.repetitions as usize, "repetition", "repetitions")
-    )];
+    let people = counted(d.participants as usize, "participant", "participants");
+    let mut lines = vec![match p.parts.is_empty() {
+        true => format!(
+            "{people}, {} of each realization.",
+            counted(p.design.repetitions as usize, "repetition", "repetitions")
+        ),
+        false => format!("{people}."),
+    }];
+    lines.extend(groups(p));
+    let session = |s: &SessionPlan| {
+        let gap = match s.min_gap_h > 0.0 {
+            true => format!(" (at least {} h after the one before)", s.min_gap_h),
+            false => String::new(),
+        };
+        let parts = s.parts.iter().flatten().map(|id| format!("`{id}`"));
+        let parts: Vec<String> = parts.collect();
+        let only = match parts.is_empty() {
+            true => String::new(),
+            false => format!(" with {}", parts.join(", ")),
+        };
+        format!("`{}`{only}{gap}", s.id)
+    };
+    let sessions: Vec<String> = p.sessions.iter().map(session).collect();
+    if !sessions.is_empty() {
+        lines.push(format!("Sessions of each participant: {}.", sessions.join(", ")));
+    }
     let named = |m: &study_core::protocol::ModelEntry| match m.vaf {
         Some(vaf) => format!("`{}` (VAF {})", m.id, apa::share(vaf, 4)),
         None => format!("`{}`", m.id),
@@ -130,17 +163,80 @@ fn design(c: &Content<'_>) -> Vec<String> {
         });
     }
     for part in &p.parts {
-        lines.push(format!("Part `{}`.", part.id));
+        lines.push(format!("Part `{}`: {}.", part.id, trials(p, part)));
     }
-    let order = match &p.design.order {
+    lines.extend(c.tracks.iter().map(|track| text(track)));
+    let seed = p.study.seed;
+    lines.push(match p.parts.is_empty() {
+        true => format!(
+            "Order of the trials: {}; all orders follow from the seed {seed} (`study schedule`).",
+            order(&p.design.order)
+        ),
+        false => format!("All orders follow from the seed {seed} (`study schedule`)."),
+    });
+    lines
+}
+
+fn order(order: &Order) -> String {
+    match order {
         Order::File(_) => "a prepared file".to_owned(),
         order => json!(order).as_str().unwrap_or_default().to_owned(),
+    }
+}
+
+/// The groups, with what distinguishes them.
+fn groups(p: &Protocol) -> Option<String> {
+    let groups = p.groups.as_ref()?;
+    let one = |g: &study_core::protocol::GroupRules| {
+        let ids = |ids: Vec<&str>| match ids.is_empty() {
+            true => String::new(),
+            false => format!(" with `{}`", ids.join("`, `")),
+        };
+        let parts = g.parts.iter().flatten().map(|id| id.as_str());
+        let models = g.models.iter().flatten().map(|id| id.as_str());
+        let only = ids(parts.chain(models).collect());
+        format!("`{}`{only} (share {})", g.id, g.share)
     };
-    lines.push(format!(
-        "Order of the trials: {order}; all orders follow from the seed {} (`study schedule`).",
-        p.study.seed
-    ));
-    lines
+    let all: Vec<String> = groups.list.iter().map(one).collect();
+    let assigned = match groups.assign {
+        Assign::Row => "assigned by row in permuted blocks",
+        Assign::Given => "given by the experimenter",
+    };
+    Some(format!("Groups: {}; {assigned}.", all.join(", ")))
+}
+
+/// What the trials of a part are.
+fn trials(p: &Protocol, part: &Part) -> String {
+    let each = |own: &Presentations, what: &str| {
+        format!(
+            "{what} of {}, {} each, order {}",
+            match own.models.iter().all(|m| p.level_of(m).is_some()) {
+                true => counted(own.models.len(), "level", "levels"),
+                false => counted(own.models.len(), "realization", "realizations"),
+            },
+            counted(own.repetitions as usize, "trial", "trials"),
+            order(&own.order)
+        )
+    };
+    match &part.task {
+        Task::Rating(own) => each(own, "rating"),
+        Task::Magnitude(own) => each(own, "magnitude estimation"),
+        Task::Mushra(own) => each(&own.presentations, "rating beside a reference"),
+        Task::Pairs(pairs) => format!(
+            "{}, {} each, {}, {}",
+            counted(pairs.pairs.len(), "pair of realizations", "pairs of realizations"),
+            counted(pairs.repetitions as usize, "trial", "trials"),
+            match pairs.interval_order {
+                IntervalOrder::Balanced => "in both orders in turn",
+                IntervalOrder::Random => "their order drawn for each trial",
+            },
+            if pairs.tie { "“no difference” is an answer" } else { "no ties" }
+        ),
+        Task::Discrimination { tracks } => {
+            let ids: Vec<String> = tracks.iter().map(|id| format!("`{id}`")).collect();
+            format!("{} {}", if ids.len() == 1 { "track" } else { "tracks" }, ids.join(", "))
+        }
+    }
 }
 
 fn questions(p: &Protocol) -> Vec<String> {

@@ -8,12 +8,14 @@ pub(super) mod layout;
 mod trials;
 
 use super::answers::{answers, conditional};
+use super::comparison;
 use super::plot::{Axis, bars};
 use super::{Source, apa, sentences};
 use layout::{Grid, Paint, pad, wrap};
 use study_base::text::{Untrusted, counted, cut_middle};
 use study_core::analyze::{Analysis, RealizationSummary, group_id};
 use study_core::outcome::Role;
+use study_core::preregister::Comparison;
 pub use trials::{part, trials};
 use unicode_width::UnicodeWidthStr as _;
 
@@ -58,11 +60,8 @@ pub fn page(source: &Source, a: &Analysis, page: Page) -> String {
         out += &paint.warn("No rating is included: there is nothing to analyse.\n\n");
     }
     out += &all_answers(a, width, paint);
-    if let Some(comparison) = &source.preregistration {
-        let sentence = super::comparison::sentence(comparison);
-        out += &paint.strong("Preregistration");
-        out.push('\n');
-        out += &wrap(&Untrusted(&sentence).to_string(), width, "  ", "  ");
+    if let Some(found) = &source.preregistration {
+        out += &preregistered(found, page);
         out.push('\n');
     }
     if !source.sites.is_empty() {
@@ -90,6 +89,14 @@ pub fn page(source: &Source, a: &Analysis, page: Page) -> String {
     }
     out += &counts(a, width);
     out
+}
+
+/// How the study compares with its preregistration.
+pub fn preregistered(found: &Comparison, page: Page) -> String {
+    let sentence = comparison::sentence(found);
+    let mut out = Paint(page.colour).strong("Preregistration");
+    out.push('\n');
+    out + &wrap(&Untrusted(&sentence).to_string(), page.width.clamp(60, 100), "  ", "  ")
 }
 
 /// Comments by realization.

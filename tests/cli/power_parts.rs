@@ -145,3 +145,29 @@ fn tracks_have_power_by_their_own_rule_and_fit() {
         assert!(code != 0 && err.contains(what), "{err}");
     }
 }
+
+/// What a protocol has and the simulation has not is said.
+#[test]
+fn what_is_not_simulated_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    for kind in ["magnitude", "mushra"] {
+        let protocol = new(kind, dir);
+        let (code, _, err) = study(&["power", &protocol], dir);
+        assert_eq!(code, 1, "{err}");
+        for part in ["not magnitude estimation and MUSHRA", "--scale continuous"] {
+            assert!(err.contains(part), "{err}");
+        }
+    }
+    let pairs = new("pairs", dir);
+    let protocol = dir.join("pairs/protocol.toml");
+    let more = "\n[groups]\n[[groups.list]]\nid = \"a\"\n[[groups.list]]\nid = \"b\"\n\n\
+        [[sessions]]\nid = \"one\"\n[[sessions]]\nid = \"two\"\n";
+    let text = fs::read_to_string(&protocol).unwrap() + more;
+    fs::write(&protocol, text).unwrap();
+    let (code, page, err) = study(&["power", &pairs, "--studies", "100"], dir);
+    assert_eq!(code, 0, "{err}");
+    assert!(page.contains("groups and sessions are not simulated"), "{page}");
+    let (_, json, _) = study(&["power", &pairs, "--studies", "100", "--json"], dir);
+    assert!(json.contains("groups and sessions are not simulated"), "{json}");
+}

@@ -138,3 +138,119 @@ fn a_changed_protocol_is_noticed() {
     assert!(said.contains("design.repetitions: 3 → 2"), "{said}");
     assert!(said.contains("\"matches\": false"));
 }
+
+/// A new study of a kind with two groups and two sessions, in the folder `p`.
+fn of_parts(kind: &str, folder: &Path, participants: u32) {
+    let (code, _, said) = study(&["new", "p", "--kind", kind], folder);
+    assert_eq!(code, 0, "{said}");
+    let mut text = read(folder, "p/protocol.toml");
+    for (key, value) in [("participants", participants), ("seed", 7)] {
+        let start = format!("{key} = ");
+        let line = text.lines().find(|l| l.starts_with(&start)).unwrap().to_owned();
+        text = text.replace(&line, &format!("{start}{value}"));
+    }
+    let text = text
+        + "\n[groups]\n[[groups.list]]\nid = \"young\"\n[[groups.list]]\nid = \"old\"\n\n\
+           [[sessions]]\nid = \"one\"\n[[sessions]]\nid = \"two\"\n";
+    fs::write(folder.join("p/protocol.toml"), text).unwrap();
+}
+
+/// Questions, deciding tests, planned number and power of pairs, and the comparison of a study
+/// without ratings, which a changed rule breaks.
+#[test]
+fn pairs_of_groups_and_sessions_are_declared_and_compared() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    of_parts("pairs", at, 12);
+    let (code, _, said) = preregister(at, &[]);
+    assert_eq!(code, 0, "{said}");
+    let text = read(at, "p/preregistration.md");
+    for part in [
+        "* 12 participants.",
+        "Groups: `young` (share 1), `old` (share 1); assigned by row in permuted blocks.",
+        "Sessions of each participant: `one`, `two`.",
+        "Part `more-real`: 3 pairs of realizations, 2 trials each, in both orders in turn, “no difference” is an answer.",
+        "(choice of 3, primary)",
+        "α = .05",
+        "Part `more-real`: Is a realization preferred to another? Decided by: z test, participants as \
+         clusters, Holm's correction over 3 pairs; level .05.",
+        "Does VAF predict which is preferred? Decided by: permutation test, exact; level .05.",
+        "In 200 simulated studies (seed ",
+        "`preferred` at α = .050 was a yes in",
+        "Groups and sessions are not simulated",
+    ] {
+        assert!(text.contains(part), "{part}\n{text}");
+    }
+    let facts: Json = serde_json::from_str(&read(at, "p/preregistration.json")).unwrap();
+    let tests = facts["tests"].as_array().unwrap();
+    let declared = |question: &str| tests.iter().find(|t| t["question"] == question).unwrap();
+    assert_eq!(declared("preferred")["part"], "more-real");
+    assert_eq!(declared("preferred")["comparisons"], 3);
+    assert_eq!(declared("groups-conditions")["test"], "between-within");
+    assert!(facts["power"]["design"]["tests"]["preferred"]["power"].is_f64(), "{}", facts["power"]);
+
+    let run = |arguments: &[&str]| {
+        let (code, out, said) = study(arguments, at);
+        assert_eq!(code, 0, "{arguments:?}: {said}");
+        out
+    };
+    run(&["rehearse", "p", "--participants", "12", "--out", "results"]);
+    let json = || -> Json { serde_json::from_str(&run(&["analyze", "results", "--json"])).unwrap() };
+    let found = json();
+    assert_eq!(found["preregistration"]["matches"], true, "{}", found["preregistration"]);
+    assert_eq!(found["preregistration"]["sha256"], facts["sha256"]);
+    let terminal = run(&["analyze", "results"]);
+    assert!(terminal.contains("the study matches it"), "{terminal}");
+    let page = "results/p/analysis/report.html";
+    assert!(read(at, page).contains("the study matches it"));
+    let text = read(at, "p/protocol.toml").replace("primary = ", "alpha = 0.01\nprimary = ");
+    fs::write(at.join("p/protocol.toml"), text).unwrap();
+    run(&["amend", "results", "p", "--reason", "stricter"]);
+    let deviations = json()["preregistration"]["deviations"].to_string();
+    for part in [
+        "alpha: none → 0.01",
+        "part `more-real`, `preferred`: p is held against 0.01; 0.05 was declared",
+    ] {
+        assert!(deviations.contains(part), "{part}: {deviations}");
+    }
+    run(&["analyze", "results"]);
+    assert!(read(at, page).contains("the study deviates"));
+}
+
+/// Tracks are described with their rule, and their tests are those of a complete study.
+#[test]
+fn tracks_and_estimates_are_declared() {
+    for (kind, sentences) in [
+        (
+            "staircase",
+            &[
+                "Part `more-friction`: tracks `low`, `high`.",
+                "Track low (2ifc): friction at ",
+                "down staircase that stops after",
+                "Do thresholds differ between the conditions? Decided by: linear mixed model",
+                "Do the groups differ? Decided by: Welch's",
+                "Do the sessions differ? Decided by: linear mixed model",
+                "`thresholds` at α = .050 was a yes in",
+            ][..],
+        ),
+        (
+            "abx",
+            &["abx@one: are standard and comparison told apart? Decided by: t test over participants"],
+        ),
+        (
+            "magnitude",
+            &["magnitude estimation of ", "Power was not computed:"],
+        ),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let at = folder.path();
+        of_parts(kind, at, 4);
+        let arguments = ["preregister", "p", "--date", "2026-03-01", "--studies", "100"];
+        let (code, _, said) = study(&arguments, at);
+        assert_eq!(code, 0, "{said}");
+        let text = read(at, "p/preregistration.md");
+        for part in sentences {
+            assert!(text.contains(part), "{part}\n{text}");
+        }
+    }
+}

@@ -25,7 +25,7 @@ mod tally;
 pub use expected::{Floor, Reach, Smallest, candidates, closed, design, floor, reach, smallest};
 pub use parts::{PairsWorld, PartWorld, TrackWorld, TracksWorld, Truth};
 pub use pilot::{Parameters, Pilot, PilotError};
-pub use plan::{Overrides, Pace, Plan, PlanError};
+pub use plan::{LeftOut, Overrides, Pace, Plan, PlanError};
 pub use tally::{CellResult, Chunk, Tally, TestResult, enough, merge, run_chunk};
 
 pub use crate::protocol::power::{PowerLink as Link, PowerTest as Test, PowerVaf as Vaf};

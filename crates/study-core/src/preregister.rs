@@ -6,18 +6,18 @@
 //! is asked, with drawn numbers in the place of ratings, because its choice depends on the
 //! design and never on a rating.
 
-use crate::analyze::{Analysis, Rules};
-use crate::outcome::Status;
-use crate::outcome::ratings::{Origin, Ratings, Realization, Subject};
+mod complete;
+
+pub use complete::{complete_parts, complete_study};
+
+use crate::analyze::psychophysics::{PartAnalysis, PartFinding};
+use crate::analyze::{Analysis, Finding};
 use crate::protocol::difference::{self, Change};
 use crate::protocol::fingerprint::{Fingerprints, Parts, digest};
-use crate::protocol::parts::Task;
-use crate::protocol::{ModelEntry, Protocol, Role};
 use chrono::{DateTime, FixedOffset, NaiveDate};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use study_base::rng::Stream;
-use study_base::text::QuestionId;
+use study_base::text::{PartId, QuestionId};
 use thiserror::Error;
 
 /// Name and version of the format.
@@ -26,12 +26,12 @@ pub const FORMAT: &str = "study-preregistration/1";
 /// The document beside a protocol, which a study freezes with it.
 pub const FILE: &str = "preregistration.json";
 
-/// More participants choose no other test.
-const ENOUGH: u32 = 1000;
-
 /// A test that is declared to decide.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Declared {
+    /// The part that the question is about; none of ratings.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub part: Option<PartId>,
     /// Identifier of the question.
     pub question: String,
     /// Identifier of the test.
@@ -112,84 +112,26 @@ impl Preregistration {
     }
 }
 
-/// The tests that decided an analysis.
-pub fn deciding(a: &Analysis) -> Vec<Declared> {
-    let one = |f: &crate::analyze::Finding| {
-        let test = f.test.as_ref()?;
-        Some(Declared {
-            question: f.question.id(),
-            test: test.kind.as_str().to_owned(),
-            level: test.level,
-            comparisons: test.comparisons,
-        })
-    };
-    a.findings.iter().filter_map(one).collect()
+/// The tests that decided an analysis of ratings, if there is one, and those of parts.
+pub fn deciding(ratings: Option<&Analysis>, parts: &[PartAnalysis]) -> Vec<Declared> {
+    let of_ratings = ratings.iter().flat_map(|a| &a.findings);
+    let of_ratings = of_ratings.filter_map(|f| declared(None, f, f.question.id()));
+    let of_parts = parts.iter().flat_map(|own| {
+        let one = |f: &PartFinding| declared(Some(&own.part), f, f.question.id());
+        own.findings.iter().filter_map(one).collect::<Vec<_>>()
+    });
+    of_ratings.chain(of_parts).collect()
 }
 
-/// A complete study of a protocol with drawn numbers in the place of ratings.
-pub fn complete_study(protocol: &Protocol, question: &QuestionId, participants: u32) -> Ratings {
-    let scale = Rules::of(
-        protocol,
-        question.as_str(),
-        crate::analyze::Include::default(),
-    )
-    .scale;
-    let (low, high) = scale.unwrap_or((1.0, 7.0));
-    let part = protocol.parts.iter().find_map(|part| match &part.task {
-        Task::Rating(own) => Some(own),
-        _ => None,
-    });
-    let repetitions = part.map_or(protocol.design.repetitions, |own| own.repetitions);
-    let presented = |m: &&ModelEntry| {
-        m.role != Role::Practice && part.is_none_or(|own| own.models.contains(&m.id))
-    };
-    let mut models: Vec<_> = protocol.models.iter().filter(presented).collect();
-    let participants = participants.min(ENOUGH);
-    models.sort_by(|a, b| a.id.as_str().cmp(b.id.as_str()));
-    let mut made = Ratings {
-        question: question.to_string(),
-        subjects: (0..participants)
-            .map(|i| Subject {
-                id: format!("{i:06}"),
-                state: None,
-                reason: String::new(),
-                site: None,
-            })
-            .collect(),
-        models: (models.iter())
-            .map(|m| Realization {
-                id: m.id.to_string(),
-                role: m.role,
-                duplicate_of: None,
-                covariates: m.covariates.clone(),
-            })
-            .collect(),
-        ..Ratings::default()
-    };
-    let mut draws = Stream::new(protocol.study.seed, &["preregister/1"]);
-    let mut trials: Vec<usize> = (0..models.len()).collect();
-    for subject in 0..participants {
-        let mut position = 0;
-        for repetition in 1..=repetitions {
-            draws.shuffle(&mut trials);
-            for &model in &trials {
-                position += 1;
-                made.subject.push(subject);
-                made.model.push(Some(model as u32));
-                made.repetition.push(repetition);
-                made.rating.push(Some(low + (high - low) * draws.unit()));
-                made.vaf.push(models[model].vaf);
-                made.trial_index.push(Some(position));
-                made.origin.push(Origin::Real);
-                made.status.push(Status::Ok);
-                made.corrected.push(false);
-                made.attempt.push(Some(1));
-                made.strokes.push(None);
-                made.source_row.push(made.subject.len() as u32);
-            }
-        }
-    }
-    made
+fn declared<Q>(part: Option<&PartId>, f: &Finding<Q>, question: String) -> Option<Declared> {
+    let test = f.test.as_ref()?;
+    Some(Declared {
+        part: part.cloned(),
+        question,
+        test: test.kind.as_str().to_owned(),
+        level: test.level,
+        comparisons: test.comparisons,
+    })
 }
 
 /// How a study compares with its preregistration.
@@ -210,8 +152,14 @@ pub struct Comparison {
 pub struct Conduct<'a> {
     /// The newest protocol.
     pub protocol: &'a Parts,
-    /// The analysis.
-    pub analysis: &'a Analysis,
+    /// The question that was analysed.
+    pub question: &'a str,
+    /// The tests that decided.
+    pub tests: &'a [Declared],
+    /// Real participants whose session is finished; `None` before the first of them came.
+    pub finished: Option<usize>,
+    /// The planned number of participants.
+    pub planned: u32,
     /// When the first session of a real participant began.
     pub first_session: Option<DateTime<FixedOffset>>,
     /// The version of the protocol with which the document was frozen.
@@ -242,24 +190,28 @@ pub fn compare(document: &Preregistration, done: &Conduct<'_>) -> Comparison {
             document.date
         ));
     }
-    let counts = &done.analysis.counts;
-    if counts.finished != document.participants as usize && counts.real() > 0 {
-        let so_far = if counts.interim() { " so far" } else { "" };
+    if let Some(finished) = done.finished
+        && finished != document.participants as usize
+    {
+        let interim = finished < done.planned as usize;
+        let so_far = if interim { " so far" } else { "" };
         found.push(format!(
-            "participants: {} were planned, {} finished{so_far}",
-            document.participants, counts.finished
+            "participants: {} were planned, {finished} finished{so_far}",
+            document.participants
         ));
     }
     let changes = difference::changes(&document.protocol, done.protocol);
     found.extend(changes.iter().map(change));
-    if done.analysis.question == document.question.as_str() {
-        found.extend(other_tests(document, done.analysis));
-    } else {
+    let same = done.question == document.question.as_str();
+    if !same {
         found.push(format!(
             "this analysis is of `{}`; `{}` was declared",
-            done.analysis.question, document.question
+            done.question, document.question
         ));
     }
+    let compared = |test: &&Declared| same || test.part.is_some();
+    let tests = document.tests.iter().filter(compared);
+    found.extend(tests.filter_map(|test| other_test(test, done.tests)));
     Comparison {
         date: document.date,
         sha256: document.sha256.clone(),
@@ -281,39 +233,36 @@ fn change(change: &Change) -> String {
     }
 }
 
-/// Declared tests that did not decide.
-fn other_tests(document: &Preregistration, a: &Analysis) -> Vec<String> {
-    let done = deciding(a);
-    let differs = |declared: &Declared| {
-        let own = done.iter().find(|d| d.question == declared.question);
-        let (question, test) = (&declared.question, &declared.test);
-        match own {
-            None => Some(format!(
-                "`{question}`: no test decided; `{test}` was declared"
-            )),
-            Some(own) if own.test != *test => Some(format!(
-                "`{question}`: `{}` decided; `{test}` was declared",
-                own.test
-            )),
-            Some(own) if (own.level - declared.level).abs() > 1e-12 => Some(format!(
-                "`{question}`: p is held against {}; {} was declared",
-                own.level, declared.level
-            )),
-            Some(own) if own.comparisons != declared.comparisons => Some(format!(
-                "`{question}`: corrected for {} tests; {} were declared",
-                own.comparisons, declared.comparisons
-            )),
-            Some(_) => None,
-        }
+/// How a declared test differs from the one that decided.
+fn other_test(declared: &Declared, done: &[Declared]) -> Option<String> {
+    let alike = |d: &&Declared| d.question == declared.question && d.part == declared.part;
+    let test = &declared.test;
+    let question = match &declared.part {
+        Some(part) => format!("part `{part}`, `{}`", declared.question),
+        None => format!("`{}`", declared.question),
     };
-    document.tests.iter().filter_map(differs).collect()
+    match done.iter().find(alike) {
+        None => Some(format!("{question}: no test decided; `{test}` was declared")),
+        Some(own) if own.test != *test => {
+            Some(format!("{question}: `{}` decided; `{test}` was declared", own.test))
+        }
+        Some(own) if (own.level - declared.level).abs() > 1e-12 => Some(format!(
+            "{question}: p is held against {}; {} was declared",
+            own.level, declared.level
+        )),
+        Some(own) if own.comparisons != declared.comparisons => Some(format!(
+            "{question}: corrected for {} tests; {} were declared",
+            own.comparisons, declared.comparisons
+        )),
+        Some(_) => None,
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analyze::{Include, analyze};
-    use crate::protocol::example;
+    use crate::analyze::{Include, Rules, analyze};
+    use crate::protocol::{Protocol, example};
     use crate::protocol::fingerprint::parts;
     use std::collections::BTreeMap;
 
@@ -339,7 +288,7 @@ mod tests {
             study: protocol.study.id.clone(),
             participants: n,
             question: protocol.analysis.primary.clone(),
-            tests: deciding(&analysed(protocol, n)),
+            tests: deciding(Some(&analysed(protocol, n)), &complete_parts(protocol, n)),
             power: Value::Null,
             fingerprints: parts.fingerprints(),
             protocol: parts,
@@ -361,7 +310,10 @@ mod tests {
         let analysis = analysed(protocol, participants);
         let done = Conduct {
             protocol: &parts_of(protocol),
-            analysis: &analysis,
+            question: &analysis.question,
+            tests: &deciding(Some(&analysis), &complete_parts(protocol, participants)),
+            finished: Some(participants as usize),
+            planned: protocol.design.participants,
             first_session: DateTime::parse_from_rfc3339("2026-03-02T09:00:00Z").ok(),
             frozen_with: 1,
         };
@@ -384,7 +336,7 @@ mod tests {
             *rating = Some(1.0 + (i * i % 7) as f64);
         }
         let rules = Rules::of(&protocol, "realism", Include::default());
-        assert_eq!(deciding(&analyze(&ratings, &rules)), read.tests);
+        assert_eq!(deciding(Some(&analyze(&ratings, &rules)), &[]), read.tests);
     }
 
     #[test]

@@ -5,7 +5,7 @@ use super::{Args, Place, include, write_files};
 use crate::cli::{Console, Failure, study_folder};
 use crate::report::figures::{Drawn, of_part};
 use crate::report::html::{self, Details, PartReport};
-use crate::report::text::{Page, part};
+use crate::report::text::{Page, part, preregistered};
 use crate::report::{Source, csv, json};
 use study_base::text::counted;
 use study_core::analyze::psychophysics::{PartAnalysis, StudyData, parts};
@@ -75,11 +75,7 @@ pub(super) fn show(
             source.path
         )));
     }
-    let document = json::parts(
-        &source.path,
-        source.study.as_deref().unwrap_or_default(),
-        parts,
-    );
+    let document = json::parts(source, parts);
     let write = |dir: &std::path::Path| {
         let mut files = vec![
             Output {
@@ -107,6 +103,13 @@ pub(super) fn show(
         return console.document(document);
     }
     pages(&source.title, parts, console)?;
+    if let Some(comparison) = &source.preregistration {
+        let page = Page {
+            width: console.width,
+            colour: console.colour,
+        };
+        console.out(preregistered(comparison, page))?;
+    }
     match written {
         Some((dir, Ok(()))) => {
             console.say(format!("report: {}", dir.join("report.html").display()))
@@ -194,7 +197,8 @@ fn trials(protocol: &Protocol, part: &Part) -> String {
     text.join(" ")
 }
 
-fn of_track(protocol: &Protocol, track: &TrackRules) -> String {
+/// What a track compares, and by which rule.
+pub(in crate::cli) fn of_track(protocol: &Protocol, track: &TrackRules) -> String {
     let compared = match &track.compared {
         Compared::Models { models } => format!("{} against the standard {}", models[1], models[0]),
         Compared::Levels { family, standard } => {

@@ -5,17 +5,28 @@ use super::super::{Failure, study_folder};
 use super::Analysed;
 use crate::report::comparison::sentence;
 use study_base::text::Untrusted;
-use study_core::analyze::{Analysis, Warning};
-use study_core::preregister::{Comparison, Conduct, FILE, Preregistration, compare};
+use study_core::analyze::Warning;
+use study_core::analyze::psychophysics::PartAnalysis;
+use study_core::outcome::{ParticipantRow, State};
+use study_core::preregister::{
+    Comparison, Conduct, Declared, FILE, Preregistration, compare, deciding,
+};
 use study_core::protocol::Seat;
 use study_core::store::{SessionData, StudyFolder};
+
+/// What an analysis says of its own conduct.
+struct Done<'a> {
+    question: &'a str,
+    tests: Vec<Declared>,
+    finished: Option<usize>,
+}
 
 /// The document of the earliest version that has one, compared with what was done.
 fn comparison(
     study: &StudyFolder,
     sessions: &[SessionData],
     newest: &Loaded,
-    analysis: &Analysis,
+    done: &Done<'_>,
 ) -> Result<Option<Comparison>, Failure> {
     for version in &study.manifest().versions {
         if !version.files.contains_key(FILE) {
@@ -48,7 +59,10 @@ fn comparison(
             &document,
             &Conduct {
                 protocol: &newest.parts,
-                analysis,
+                question: done.question,
+                tests: &done.tests,
+                finished: done.finished,
+                planned: newest.protocol.design.participants,
                 first_session: began.min(),
                 frozen_with: version.version,
             },
@@ -64,7 +78,13 @@ pub(super) fn add(
     newest: &Loaded,
     to: &mut Analysed,
 ) -> Result<(), Failure> {
-    let Some(found) = comparison(study, sessions, newest, &to.analysis)? else {
+    let analysis = &to.analysis;
+    let done = Done {
+        question: &analysis.question,
+        tests: deciding(Some(analysis), &analysis.parts),
+        finished: Some(analysis.counts.finished).filter(|_| analysis.counts.real() > 0),
+    };
+    let Some(found) = comparison(study, sessions, newest, &done)? else {
         return Ok(());
     };
     if !found.deviations.is_empty() {
@@ -80,4 +100,23 @@ pub(super) fn add(
     to.details.conduct.push(sentence(&found));
     to.source.preregistration = Some(found);
     Ok(())
+}
+
+/// The comparison of a study whose primary question is no rating.
+pub(super) fn of_parts(
+    study: &StudyFolder,
+    sessions: &[SessionData],
+    newest: &Loaded,
+    participants: &[ParticipantRow],
+    parts: &[PartAnalysis],
+) -> Result<Option<Comparison>, Failure> {
+    let real = |p: &&ParticipantRow| !p.pilot && !p.simulated;
+    let finished = participants.iter().filter(real);
+    let finished = finished.filter(|p| p.state == State::Done).count();
+    let done = Done {
+        question: newest.protocol.analysis.primary.as_str(),
+        tests: deciding(None, parts),
+        finished: Some(finished).filter(|_| participants.iter().any(|p| real(&p))),
+    };
+    comparison(study, sessions, newest, &done)
 }

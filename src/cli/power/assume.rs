@@ -307,6 +307,10 @@ pub(super) fn plan(
             PlanError::FewRealizations(_) => "add realizations with a VAF to [[models]]",
             PlanError::NoMargin(_) => "equivalence_margin states which difference is negligible",
             PlanError::NoPilot => "add --from RESULTS, or thresholds: logit:-2,-1,…",
+            PlanError::NoPower(_) => {
+                "logarithms of estimates, and points from 0 to 100, are like ratings with --scale \
+                 continuous in a protocol with a rating part (docs/power.md)"
+            }
             PlanError::NoPart(_) | PlanError::NoRatings(_) => "--part names one of [[parts]]",
             _ => "the assumptions are flags, or keys of [power] in the protocol",
         };

@@ -43,6 +43,9 @@ pub(super) fn head(
                 span { (counted(trials, "trial", "trials")) } " "
                 span { (counted(parts.len(), "part", "parts")) }
             }
+            @if let Some(comparison) = &source.preregistration {
+                p { (safe(&crate::report::comparison::sentence(comparison))) }
+            }
             @if !details.damage.is_empty() {
                 ul { @for text in &details.damage { li { (safe(text)) } } }
             }

@@ -163,7 +163,7 @@ fn difference(group: &str, sites: usize, of: impl Fn(usize) -> Vec<f64>, values:
 
 #[cfg(test)]
 mod tests {
-    use crate::analyze::{Question, Rules, analyze};
+    use crate::analyze::{Question, Rules, TestKind, analyze};
     use crate::outcome::ratings::Ratings;
 
     /// A site whose participants rated three realizations with VAF .6, .75, .8.
@@ -212,6 +212,90 @@ mod tests {
         assert!(!yes(Question::SiteLevel));
         // What the sites have in common rests on all seven.
         assert_eq!(a.finding(&Question::Differ).unwrap().participants, 7);
+    }
+
+    /// Three unequal sites, two repetitions; a participant of the second did not rate all. R 4.2.2:
+    /// the interaction is that of lmer(cell mean ~ site * model + (1 | participant)) with lmerTest
+    /// 3.1.3 (1e-7, where its search stops), whose p is uncorrected, and of
+    /// anova(lm(Y ~ site), lm(Y ~ 1), X = ~1, test = "Spherical"), which has both (1e-9); slopes and
+    /// means by anova(lm(… ~ site)) (1e-9). What decides is p with the correction.
+    #[test]
+    fn the_deciding_tests_of_three_sites_agree_with_r() {
+        let site = |rows: &[&[f64]]| {
+            let mut csv = "subject,model,repetition,rating,vaf\n".to_owned();
+            for (i, row) in rows.iter().enumerate() {
+                for (k, rating) in row.iter().enumerate() {
+                    let (j, vaf) = (k / 2, [0.62, 0.7, 0.81, 0.9][k / 2]);
+                    csv += &format!("P{i},m{j},{},{rating},{vaf}\n", k % 2 + 1);
+                }
+            }
+            Ratings::read_csv("site.csv", csv.as_bytes(), None).unwrap()
+        };
+        let a = site(&[
+            &[4.0, 4.5, 3.5, 4.5, 4.5, 5.0, 5.0, 6.0],
+            &[2.5, 2.5, 3.0, 3.0, 3.5, 3.5, 3.0, 3.0],
+            &[2.5, 2.5, 2.0, 2.0, 3.0, 2.5, 3.0, 2.5],
+            &[3.5, 3.5, 4.5, 4.0, 5.0, 5.0, 5.5, 5.5],
+            &[4.0, 4.0, 4.5, 4.0, 4.5, 6.0, 5.5, 4.5],
+        ]);
+        let b = site(&[
+            &[4.5, 5.5, 4.5, 4.5, 4.5, 4.0, 5.5, 5.5],
+            &[4.5, 4.5, 5.5, 4.0, 4.5, 4.5, 5.0, 5.0],
+            &[3.5, 4.0, 4.5, 4.0, 4.0, 4.5, 4.5, 4.5],
+            &[3.5, 3.0, 4.5, 4.0, 4.0, 4.5, 4.5, 4.0],
+            &[1.0, 7.0, 1.0, 7.0, 2.0, 6.0],
+        ]);
+        let c = site(&[
+            &[3.0, 3.0, 4.0, 5.0, 3.5, 3.5, 4.5, 5.0],
+            &[3.0, 2.5, 3.5, 4.0, 3.5, 4.5, 5.0, 4.0],
+            &[3.0, 3.0, 5.0, 4.5, 5.5, 6.0, 5.5, 5.5],
+            &[3.5, 3.5, 3.5, 3.5, 5.0, 5.5, 6.0, 6.0],
+            &[3.0, 3.0, 3.5, 2.5, 4.5, 4.0, 5.5, 5.0],
+            &[2.5, 2.0, 3.0, 2.5, 5.0, 5.5, 5.0, 4.5],
+        ]);
+        let of = |alpha: f64| {
+            let sites = [("a", a.clone()), ("b", b.clone()), ("c", c.clone())];
+            let sites = sites.map(|(name, table)| (name.to_owned(), table));
+            let rules = Rules {
+                alpha,
+                ..Rules::default()
+            };
+            analyze(&Ratings::pooled(&sites), &rules)
+        };
+        let found = of(0.05);
+        let close = |id: &str, expected: f64, tolerance: f64| {
+            let value = found.values.number(id).unwrap_or_else(|| panic!("{id}"));
+            assert!((value / expected - 1.0).abs() < tolerance, "{id}: {value}");
+        };
+        close("site_realizations/F", 3.609_557_299_215_888, 1e-7);
+        close("site_realizations/p", 6.632_647_172_204_91e-3, 1e-7);
+        close("site_realizations/F", 3.609_557_290_856_49, 1e-9);
+        close("site_realizations/p_gg", 1.242_956_289_688e-2, 1e-9);
+        close("site_level/F", 0.736_310_063_984_012, 1e-9);
+        close("site_level/p", 0.499_315_546_597_2, 1e-9);
+        close("site_vaf/F", 10.661_998_859_042_3, 1e-9);
+        close("site_vaf/p", 2.180_443_812_713_09e-3, 1e-9);
+        // Between both p of the interaction the corrected one decides; the slopes decide about VAF.
+        let strict = of(0.01);
+        for (question, id, kind, yes) in [
+            (
+                Question::SiteRealizations,
+                "site_realizations/p_gg",
+                TestKind::BetweenWithin,
+                [true, false],
+            ),
+            (Question::SiteVaf, "site_vaf/p", TestKind::BetweenSites, [true, true]),
+            (Question::SiteLevel, "site_level/p", TestKind::BetweenSites, [false, false]),
+        ] {
+            for (analysis, yes) in [&found, &strict].into_iter().zip(yes) {
+                let finding = analysis.finding(&question).unwrap();
+                let test = finding.test.as_ref().unwrap();
+                assert_eq!((test.kind, finding.is_yes()), (kind, yes), "{id}");
+                assert_eq!(Some(test.p), analysis.values.number(id), "{id}");
+                assert_eq!(finding.participants, 15, "{id}");
+                assert!(finding.caveats.iter().any(|c| c.code == "complete-only"));
+            }
+        }
     }
 
     /// Without a factor there is nothing about sites; a site of one participant still has

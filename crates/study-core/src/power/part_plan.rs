@@ -1,7 +1,7 @@
 //! From a part of pairs or tracks to settings: defaults, then `[power]`, then flags.
 
 use super::parts::{PairsWorld, PartWorld, TrackWorld, TracksWorld, Truth};
-use super::plan::{Defaults, numbers, slope, targets, tests};
+use super::plan::{Defaults, LeftOut, numbers, slope, targets, tests};
 use super::{Assumptions, Cell, Overrides, Pace, Plan, PlanError, Scale, Settings, Test, Vaf};
 use crate::analyze::ALPHA;
 use crate::analyze::psychophysics::track_settings;
@@ -137,6 +137,7 @@ fn plan(protocol: &Protocol, flags: &Overrides, part: &Part) -> Result<Plan, Pla
         targets: targets((base, over)),
         defaults: defaults.0,
         exclusions: protocol.analysis.exclude.len(),
+        left_out: LeftOut::of(protocol, Some(&part.id)),
         within: over.within.or(base.within),
         max_session_min: over.max_session_min.or(base.max_session_min),
         pace: Pace::of_part(protocol, part, own.realizations),

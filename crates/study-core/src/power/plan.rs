@@ -34,7 +34,10 @@ pub enum PlanError {
     #[error("there is no part `{0}`")]
     NoPart(PartId),
     /// Another kind of part.
-    #[error("the power of part `{0}` is not computed: it has no pairs and no tracks")]
+    #[error(
+        "the power of part `{0}` is not computed: ratings, pairs and tracks are simulated, but not \
+         magnitude estimation and MUSHRA"
+    )]
     NoPower(PartId),
     /// A pilot of ratings for another part.
     #[error("a pilot has estimates for ratings, not for part `{0}`: state its assumptions")]
@@ -131,12 +134,45 @@ pub struct Plan {
     pub defaults: Vec<String>,
     /// Exclusion rules of the protocol, which are not simulated.
     pub exclusions: usize,
+    /// What else of the protocol is not.
+    pub left_out: LeftOut,
     /// Half-width of the interval of the power at which a cell has enough studies.
     pub within: Option<f64>,
     /// The longest session, min.
     pub max_session_min: Option<f64>,
     /// What is known of the duration of a session.
     pub pace: Pace,
+}
+
+/// What is not simulated.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct LeftOut {
+    /// Whether the study has groups: what differs between them.
+    pub groups: bool,
+    /// Whether it has several sessions: all but one.
+    pub sessions: bool,
+    /// Other parts that can be simulated.
+    pub parts: Vec<PartId>,
+    /// Parts of magnitude estimation and MUSHRA.
+    pub never: Vec<PartId>,
+}
+
+impl LeftOut {
+    pub(super) fn of(protocol: &Protocol, simulated: Option<&PartId>) -> Self {
+        let mut found = Self {
+            groups: protocol.groups.is_some(),
+            sessions: protocol.sessions.len() > 1,
+            ..Self::default()
+        };
+        for part in protocol.parts.iter().filter(|part| Some(&part.id) != simulated) {
+            match part.task {
+                Task::Pairs(_) | Task::Discrimination { .. } => found.parts.push(part.id.clone()),
+                Task::Magnitude(_) | Task::Mushra(_) => found.never.push(part.id.clone()),
+                Task::Rating(_) => {}
+            }
+        }
+        found
+    }
 }
 
 /// The duration of a session, from the estimate of `study check`.
@@ -341,6 +377,7 @@ impl Plan {
             targets,
             defaults: defaults.0,
             exclusions: protocol.analysis.exclude.len(),
+            left_out: LeftOut::of(protocol, None),
             within: over.within.or(base.within),
             max_session_min: over.max_session_min.or(base.max_session_min),
             pace: Pace::of(protocol, own.realizations),
