@@ -14,8 +14,8 @@ use study_core::power::{Overrides, Plan, merge};
 use study_core::preregister::{
     FILE, FORMAT, Preregistration, complete_parts, complete_study, deciding,
 };
-use study_core::protocol::{Protocol, Task};
 use study_core::protocol::power::PowerPlan;
+use study_core::protocol::{Protocol, Task};
 
 /// The document for people.
 const MARKDOWN: &str = "preregistration.md";
@@ -78,7 +78,11 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         protocol,
         analysis: &analysis,
         parts: &parts,
-        tracks: protocol.tracks.iter().map(|track| analyze::of_track(protocol, track)).collect(),
+        tracks: protocol
+            .tracks
+            .iter()
+            .map(|track| analyze::of_track(protocol, track))
+            .collect(),
         power: sentences,
     });
     let value = serde_json::to_value(&facts).map_err(|e| Failure::new(super::Kind::Bug, e))?;

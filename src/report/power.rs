@@ -17,7 +17,7 @@ pub use paragraph::paragraph;
 use super::apa;
 use study_base::text::{PartId, counted};
 use study_core::power::{
-    self, Cell, CellResult, LeftOut, Plan, Reach, Scale, Smallest, Test, Vaf,
+    self, Cell, CellResult, LeftOut, Plan, Reach, Scale, Smallest, Test, TestResult, Vaf,
 };
 use study_stats::power::covariate::Expected;
 use study_stats::power::detectable_correlation;
@@ -196,6 +196,19 @@ impl Report {
                 apa::bare_p(floor.smallest_p)
             ));
         }
+        let permuted = |t: &&TestResult| matches!(t.test, Test::Verdict | Test::Permutation);
+        let deciding = self.result(&plan.own).and_then(|r| r.tests.first());
+        if let Some(own) = deciding.filter(permuted)
+            && let Some(closed) = self.closed(&plan.own)
+            && closed.power > own.interval.1 + 0.05
+        {
+            found.push(format!(
+                "the permutation test, which decides, has {} and Pearson's t {}: it has less power where \
+                 one VAF lies far from the others, and where ratings are lost",
+                apa::share(own.power, 3),
+                apa::share(closed.power, 3)
+            ));
+        }
         if plan.own.realizations == 3 {
             found.push("three realizations leave one degree of freedom".to_owned());
         }
@@ -305,7 +318,15 @@ fn reached(reach: &Reach) -> String {
             apa::share(*power, 3),
             if *sure { ", sure" } else { "" }
         ),
-        Reach::MoreThan(n) => format!("more than {n} participants"),
+        Reach::MoreThan {
+            participants,
+            enough: Some(enough),
+        } if *enough > participants + 1 => format!("{} to {enough} participants", participants + 1),
+        Reach::MoreThan {
+            enough: Some(enough),
+            ..
+        } => format!("{enough} participants"),
+        Reach::MoreThan { participants, .. } => format!("more than {participants} participants"),
         Reach::Ceiling(ceiling) => format!("not reachable: the ceiling is {}", percent(*ceiling)),
         Reach::Limit(most) => format!("more than {most} participants"),
         Reach::NoSmallP(p) => format!("not reachable: the smallest p is {}", apa::bare_p(*p)),

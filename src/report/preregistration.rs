@@ -144,7 +144,10 @@ fn design(c: &Content<'_>) -> Vec<String> {
     };
     let sessions: Vec<String> = p.sessions.iter().map(session).collect();
     if !sessions.is_empty() {
-        lines.push(format!("Sessions of each participant: {}.", sessions.join(", ")));
+        lines.push(format!(
+            "Sessions of each participant: {}.",
+            sessions.join(", ")
+        ));
     }
     let named = |m: &study_core::protocol::ModelEntry| match m.vaf {
         Some(vaf) => format!("`{}` (VAF {})", m.id, apa::share(vaf, 4)),
@@ -224,17 +227,29 @@ fn trials(p: &Protocol, part: &Part) -> String {
         Task::Mushra(own) => each(&own.presentations, "rating beside a reference"),
         Task::Pairs(pairs) => format!(
             "{}, {} each, {}, {}",
-            counted(pairs.pairs.len(), "pair of realizations", "pairs of realizations"),
+            counted(
+                pairs.pairs.len(),
+                "pair of realizations",
+                "pairs of realizations"
+            ),
             counted(pairs.repetitions as usize, "trial", "trials"),
             match pairs.interval_order {
                 IntervalOrder::Balanced => "in both orders in turn",
                 IntervalOrder::Random => "their order drawn for each trial",
             },
-            if pairs.tie { "“no difference” is an answer" } else { "no ties" }
+            if pairs.tie {
+                "“no difference” is an answer"
+            } else {
+                "no ties"
+            }
         ),
         Task::Discrimination { tracks } => {
             let ids: Vec<String> = tracks.iter().map(|id| format!("`{id}`")).collect();
-            format!("{} {}", if ids.len() == 1 { "track" } else { "tracks" }, ids.join(", "))
+            format!(
+                "{} {}",
+                if ids.len() == 1 { "track" } else { "tracks" },
+                ids.join(", ")
+            )
         }
     }
 }

@@ -96,7 +96,12 @@ pub fn preregistered(found: &Comparison, page: Page) -> String {
     let sentence = comparison::sentence(found);
     let mut out = Paint(page.colour).strong("Preregistration");
     out.push('\n');
-    out + &wrap(&Untrusted(&sentence).to_string(), page.width.clamp(60, 100), "  ", "  ")
+    out + &wrap(
+        &Untrusted(&sentence).to_string(),
+        page.width.clamp(60, 100),
+        "  ",
+        "  ",
+    )
 }
 
 /// Comments by realization.

@@ -318,6 +318,13 @@ fn slurm_scripts_are_written_and_nothing_is_submitted() {
     }
     assert_eq!(shell(&read("merge.sbatch"), dir), 0);
     assert_eq!(read("power.json"), whole);
+    // Nothing is written over it, or into a folder of something else.
+    for dir_name in ["my job", "."] {
+        let again = [&SMALL[..], &["--slurm", dir_name]].concat();
+        let (code, _, err) = power(&again, dir);
+        assert_eq!((code, err.contains("is not empty")), (1, true), "{err}");
+    }
+    assert_eq!(read("power.sbatch"), array);
 }
 
 fn shell(script: &str, dir: &Path) -> i32 {

@@ -69,6 +69,11 @@ fn pairs_have_power_by_their_own_analysis() {
         (&["--part", "other"], "there is no part `other`"),
         (&["--realizations", "8"], "realizations of part `more-real`"),
         (&["--slope", "1", "--from", "x"], "x"),
+        (&["--track", "d=1"], "`--track` means nothing for pairs"),
+        (
+            &["--sd", "residual=1"],
+            "`--sd residual` means nothing for pairs",
+        ),
     ] {
         let (code, _, err) = run(more);
         assert!(code != 0 && err.contains(what), "{err}");
@@ -140,6 +145,16 @@ fn tracks_have_power_by_their_own_rule_and_fit() {
         ),
         (&staircase, &["--repetitions", "2"], "repetitions of part"),
         (&abx, &["--track", "d=-1"], "0 or more"),
+        (
+            &abx,
+            &["--slope", "1"],
+            "`--slope` means nothing for tracks",
+        ),
+        (
+            &staircase,
+            &["--ties", "0.1"],
+            "`--ties` means nothing for tracks",
+        ),
     ] {
         let (code, _, err) = study(&[&["power", protocol], more].concat(), dir);
         assert!(code != 0 && err.contains(what), "{err}");
@@ -167,7 +182,13 @@ fn what_is_not_simulated_is_said() {
     fs::write(&protocol, text).unwrap();
     let (code, page, err) = study(&["power", &pairs, "--studies", "100"], dir);
     assert_eq!(code, 0, "{err}");
-    assert!(page.contains("groups and sessions are not simulated"), "{page}");
+    assert!(
+        page.contains("groups and sessions are not simulated"),
+        "{page}"
+    );
     let (_, json, _) = study(&["power", &pairs, "--studies", "100", "--json"], dir);
-    assert!(json.contains("groups and sessions are not simulated"), "{json}");
+    assert!(
+        json.contains("groups and sessions are not simulated"),
+        "{json}"
+    );
 }

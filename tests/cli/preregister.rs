@@ -146,7 +146,11 @@ fn of_parts(kind: &str, folder: &Path, participants: u32) {
     let mut text = read(folder, "p/protocol.toml");
     for (key, value) in [("participants", participants), ("seed", 7)] {
         let start = format!("{key} = ");
-        let line = text.lines().find(|l| l.starts_with(&start)).unwrap().to_owned();
+        let line = text
+            .lines()
+            .find(|l| l.starts_with(&start))
+            .unwrap()
+            .to_owned();
         text = text.replace(&line, &format!("{start}{value}"));
     }
     let text = text
@@ -187,7 +191,11 @@ fn pairs_of_groups_and_sessions_are_declared_and_compared() {
     assert_eq!(declared("preferred")["part"], "more-real");
     assert_eq!(declared("preferred")["comparisons"], 3);
     assert_eq!(declared("groups-conditions")["test"], "between-within");
-    assert!(facts["power"]["design"]["tests"]["preferred"]["power"].is_f64(), "{}", facts["power"]);
+    assert!(
+        facts["power"]["design"]["tests"]["preferred"]["power"].is_f64(),
+        "{}",
+        facts["power"]
+    );
 
     let run = |arguments: &[&str]| {
         let (code, out, said) = study(arguments, at);
@@ -195,9 +203,14 @@ fn pairs_of_groups_and_sessions_are_declared_and_compared() {
         out
     };
     run(&["rehearse", "p", "--participants", "12", "--out", "results"]);
-    let json = || -> Json { serde_json::from_str(&run(&["analyze", "results", "--json"])).unwrap() };
+    let json =
+        || -> Json { serde_json::from_str(&run(&["analyze", "results", "--json"])).unwrap() };
     let found = json();
-    assert_eq!(found["preregistration"]["matches"], true, "{}", found["preregistration"]);
+    assert_eq!(
+        found["preregistration"]["matches"], true,
+        "{}",
+        found["preregistration"]
+    );
     assert_eq!(found["preregistration"]["sha256"], facts["sha256"]);
     let terminal = run(&["analyze", "results"]);
     assert!(terminal.contains("the study matches it"), "{terminal}");
@@ -235,7 +248,9 @@ fn tracks_and_estimates_are_declared() {
         ),
         (
             "abx",
-            &["abx@one: are standard and comparison told apart? Decided by: t test over participants"],
+            &[
+                "abx@one: are standard and comparison told apart? Decided by: t test over participants",
+            ],
         ),
         (
             "magnitude",
@@ -245,7 +260,14 @@ fn tracks_and_estimates_are_declared() {
         let folder = tempfile::tempdir().unwrap();
         let at = folder.path();
         of_parts(kind, at, 4);
-        let arguments = ["preregister", "p", "--date", "2026-03-01", "--studies", "100"];
+        let arguments = [
+            "preregister",
+            "p",
+            "--date",
+            "2026-03-01",
+            "--studies",
+            "100",
+        ];
         let (code, _, said) = study(&arguments, at);
         assert_eq!(code, 0, "{said}");
         let text = read(at, "p/preregistration.md");

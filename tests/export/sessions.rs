@@ -165,7 +165,12 @@ fn the_headline_of_groups_and_sessions_is_that_of_the_analysis() {
         (
             "ratings",
             "real",
-            &["groups/F", "groups_conditions/p_gg", "sessions/p", "retest/sem"][..],
+            &[
+                "groups/F",
+                "groups_conditions/p_gg",
+                "sessions/p",
+                "retest/sem",
+            ][..],
         ),
         (
             "pairs",
@@ -177,12 +182,21 @@ fn the_headline_of_groups_and_sessions_is_that_of_the_analysis() {
             "",
             &["groups/old|young/t", "sessions/F", "retest/icc_agreement"],
         ),
-        ("magnitude", "", &["magnitude/exponent", "magnitude/log10_coefficient"]),
+        (
+            "magnitude",
+            "",
+            &["magnitude/exponent", "magnitude/log10_coefficient"],
+        ),
     ] {
         let home = tempfile::tempdir().unwrap();
         let folder = match kind {
             "ratings" => grouped(6, home.path()),
-            _ => rehearsed(&of_groups_and_sessions(kind, home.path()), 6, home.path(), &[]),
+            _ => rehearsed(
+                &of_groups_and_sessions(kind, home.path()),
+                6,
+                home.path(),
+                &[],
+            ),
         };
         let (out, _) = export(&folder, "r", home.path(), "r", &SIMULATED);
         let arguments = ["analyze", folder.to_str().unwrap(), "--json"];
@@ -190,7 +204,10 @@ fn the_headline_of_groups_and_sessions_is_that_of_the_analysis() {
         assert_eq!(code, 0, "{err}");
         let analysis: serde_json::Value = serde_json::from_str(&text).unwrap();
         let parts = analysis["parts"].as_array().unwrap();
-        let own = &parts.iter().find(|p| part.is_empty() || p["part"] == part).unwrap()["values"];
+        let own = &parts
+            .iter()
+            .find(|p| part.is_empty() || p["part"] == part)
+            .unwrap()["values"];
         let headline = table(&out.join("headline.csv"));
         let mut compared = 0;
         for row in &headline {
@@ -203,7 +220,10 @@ fn the_headline_of_groups_and_sessions_is_that_of_the_analysis() {
         assert!(compared > 1, "{kind}: {headline:?}");
         for id in expected {
             let ends = |row: &&Row| row["id"].ends_with(&format!(":{id}"));
-            assert!(headline.iter().any(|r| ends(&r)), "{kind} {id}: {headline:?}");
+            assert!(
+                headline.iter().any(|r| ends(&r)),
+                "{kind} {id}: {headline:?}"
+            );
         }
     }
 }

@@ -242,10 +242,13 @@ fn other_test(declared: &Declared, done: &[Declared]) -> Option<String> {
         None => format!("`{}`", declared.question),
     };
     match done.iter().find(alike) {
-        None => Some(format!("{question}: no test decided; `{test}` was declared")),
-        Some(own) if own.test != *test => {
-            Some(format!("{question}: `{}` decided; `{test}` was declared", own.test))
-        }
+        None => Some(format!(
+            "{question}: no test decided; `{test}` was declared"
+        )),
+        Some(own) if own.test != *test => Some(format!(
+            "{question}: `{}` decided; `{test}` was declared",
+            own.test
+        )),
         Some(own) if (own.level - declared.level).abs() > 1e-12 => Some(format!(
             "{question}: p is held against {}; {} was declared",
             own.level, declared.level
@@ -262,8 +265,8 @@ fn other_test(declared: &Declared, done: &[Declared]) -> Option<String> {
 mod tests {
     use super::*;
     use crate::analyze::{Include, Rules, analyze};
-    use crate::protocol::{Protocol, example};
     use crate::protocol::fingerprint::parts;
+    use crate::protocol::{Protocol, example};
     use std::collections::BTreeMap;
 
     fn parts_of(protocol: &Protocol) -> Parts {

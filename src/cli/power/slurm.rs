@@ -19,6 +19,13 @@ pub(super) fn write(
     tasks: Option<u64>,
     console: &mut Console,
 ) -> Result<(), Failure> {
+    // Files of others are not touched, and an array is submitted again, not written again.
+    if fs::read_dir(dir).is_ok_and(|mut items| items.next().is_some()) {
+        return Err(
+            Failure::input(format!("{}: the folder is not empty", shown(dir)))
+                .hint("choose a new one; `sh DIR/submit.sh` resumes an array that is there"),
+        );
+    }
     let all = units.len() as u64;
     let tasks = tasks.unwrap_or(MOST_TASKS).min(all).max(1);
     // The slowest design is the largest one.

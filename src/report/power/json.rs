@@ -159,7 +159,9 @@ fn smallest(report: &Report) -> Vec<Value> {
                 sure,
             } => (Some(participants), Some(power), Some(sure), None),
             Reach::Ceiling(ceiling) => (None, None, None, Some(ceiling)),
-            Reach::MoreThan(_) | Reach::Limit(_) | Reach::NoSmallP(_) => (None, None, None, None),
+            Reach::MoreThan { .. } | Reach::Limit(_) | Reach::NoSmallP(_) => {
+                (None, None, None, None)
+            }
         };
         json!({
             "target": s.target,

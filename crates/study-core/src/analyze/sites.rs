@@ -284,8 +284,18 @@ mod tests {
                 TestKind::BetweenWithin,
                 [true, false],
             ),
-            (Question::SiteVaf, "site_vaf/p", TestKind::BetweenSites, [true, true]),
-            (Question::SiteLevel, "site_level/p", TestKind::BetweenSites, [false, false]),
+            (
+                Question::SiteVaf,
+                "site_vaf/p",
+                TestKind::BetweenSites,
+                [true, true],
+            ),
+            (
+                Question::SiteLevel,
+                "site_level/p",
+                TestKind::BetweenSites,
+                [false, false],
+            ),
         ] {
             for (analysis, yes) in [&found, &strict].into_iter().zip(yes) {
                 let finding = analysis.finding(&question).unwrap();

@@ -271,7 +271,10 @@ fn settings(
     put("question", question);
     put("tool_version", job.source.tool_version);
     let protocol = job.source.protocol;
-    if let Some(option) = protocol.primary().and_then(|q| protocol.analysis.share_of(&q.id)) {
+    if let Some(option) = protocol
+        .primary()
+        .and_then(|q| protocol.analysis.share_of(&q.id))
+    {
         put("share of", option);
     }
     for part in parts.iter().filter_map(|own| protocol.part(&own.part)) {
@@ -327,16 +330,13 @@ fn tracks<'p>(protocol: &'p Protocol, part: &PartId) -> Vec<&'p TrackRules> {
 }
 
 /// The thresholds or the sensitivities of tracks: part, participant, track, estimate, session.
-fn estimates(
-    protocol: &Protocol,
-    parts: &[PartAnalysis],
-    thresholds: bool,
-) -> Vec<[String; 5]> {
+fn estimates(protocol: &Protocol, parts: &[PartAnalysis], thresholds: bool) -> Vec<[String; 5]> {
     let of_part = |part: &PartAnalysis| -> Vec<[String; 5]> {
         let has_levels = |track: &&&TrackRules| track.family().is_some() == thresholds;
         let tracks = tracks(protocol, &part.part);
-        let tracks: BTreeSet<&str> =
-            (tracks.iter().filter(has_levels)).map(|track| track.id.as_str()).collect();
+        let tracks: BTreeSet<&str> = (tracks.iter().filter(has_levels))
+            .map(|track| track.id.as_str())
+            .collect();
         let own = part.data.measured.iter();
         own.filter(|m| tracks.contains(m.condition.as_str()))
             .map(|m| {

@@ -75,8 +75,13 @@ pub enum Reach {
         /// Whether the interval of the power is above the target.
         sure: bool,
     },
-    /// More than so many, which the closed form takes for enough.
-    MoreThan(usize),
+    /// More than the closed form takes for enough.
+    MoreThan {
+        /// The most that were simulated around that number, and were too few.
+        participants: usize,
+        /// The fewest of the other simulated designs with the target.
+        enough: Option<usize>,
+    },
     /// No number of participants: the power with endlessly many.
     Ceiling(f64),
     /// None up to the largest number that is considered, although the ceiling is higher.
@@ -171,13 +176,14 @@ pub fn smallest(
             if let Reach::Participants { participants, .. } = reach {
                 let own = |r: &&CellResult| {
                     (r.cell.realizations, r.cell.repetitions) == (realizations, repetitions)
-                        && r.cell.participants.abs_diff(participants) <= 1
+                        && r.cell.participants + 1 >= participants
                 };
                 // Without simulation the closed form decides.
                 let mut near: Vec<&CellResult> = results.iter().filter(own).collect();
                 near.sort_by_key(|r| r.cell.participants);
                 let enough = |r: &&CellResult| r.tests.first().is_some_and(|t| t.power >= target);
-                let first = near.into_iter().find(enough);
+                let found = near.into_iter().find(enough);
+                let first = found.filter(|r| r.cell.participants <= participants + 1);
                 reach = match first.and_then(|r| Some((r.cell.participants, r.tests.first()?))) {
                     Some((participants, test)) => Reach::Participants {
                         participants,
@@ -185,7 +191,10 @@ pub fn smallest(
                         sure: test.interval.0 >= target,
                     },
                     None if results.is_empty() => reach,
-                    None => Reach::MoreThan(participants + 1),
+                    None => Reach::MoreThan {
+                        participants: participants + 1,
+                        enough: found.map(|r| r.cell.participants),
+                    },
                 };
             }
             found.push(Smallest {

@@ -43,11 +43,43 @@ impl Plan {
     /// # Errors
     /// If the two contradict each other, or too few realizations have a VAF.
     pub fn of(protocol: &Protocol, flags: &Overrides) -> Result<Self, PlanError> {
-        match meant(protocol, flags.part.as_ref())? {
+        let part = meant(protocol, flags.part.as_ref())?;
+        let (what, pairs, tracks) = match part.map(|part| &part.task) {
+            Some(Task::Pairs(_)) => ("pairs", true, false),
+            Some(Task::Discrimination { .. }) => ("tracks", false, true),
+            _ => ("ratings", false, false),
+        };
+        if let Some(flag) = unused(&flags.plan, pairs, tracks) {
+            return Err(PlanError::Unused(flag, what));
+        }
+        match part {
             Some(part) => plan(protocol, flags, part),
             None => Self::of_ratings(protocol, flags),
         }
     }
+}
+
+/// A flag that was given and is not one of pairs, of tracks, or else of ratings.
+fn unused(over: &PowerPlan, pairs: bool, tracks: bool) -> Option<&'static str> {
+    let ratings = !pairs && !tracks;
+    let sd = &over.sd;
+    let flags = [
+        ("slope", over.slope.is_some(), !tracks),
+        ("rho", over.rho.is_some(), !tracks),
+        ("smallest", over.smallest.is_some(), ratings),
+        ("mean", over.mean.is_some(), ratings),
+        ("scale", over.scale.is_some(), ratings),
+        ("vaf", over.vaf.is_some(), ratings),
+        ("reference", over.reference.is_some(), ratings),
+        ("ties", over.ties.is_some(), pairs),
+        ("track", over.track != PowerTrack::default(), tracks),
+        ("sd participant", sd.participant.is_some(), !pairs),
+        ("sd realization", sd.realization.is_some(), !tracks),
+        ("sd residual", sd.residual.is_some(), ratings),
+        ("sd slope", sd.slope.is_some(), ratings),
+    ];
+    let found = flags.into_iter().find(|(_, given, used)| *given && !used);
+    found.map(|(flag, ..)| flag)
 }
 
 /// The plan of a part.

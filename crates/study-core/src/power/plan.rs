@@ -51,6 +51,9 @@ pub enum PlanError {
     /// A test of a part for ratings.
     #[error("`{0}` is no test of ratings, but of a part of pairs or tracks")]
     NotOfRatings(&'static str),
+    /// A flag that changes nothing.
+    #[error("`--{0}` means nothing for {1}: leave it out")]
+    Unused(&'static str, &'static str),
     /// Trials of a track are asked until there is an answer.
     #[error("missing trials of tracks are not simulated: leave missing out")]
     MissingOfTracks,
@@ -164,7 +167,11 @@ impl LeftOut {
             sessions: protocol.sessions.len() > 1,
             ..Self::default()
         };
-        for part in protocol.parts.iter().filter(|part| Some(&part.id) != simulated) {
+        for part in protocol
+            .parts
+            .iter()
+            .filter(|part| Some(&part.id) != simulated)
+        {
             match part.task {
                 Task::Pairs(_) | Task::Discrimination { .. } => found.parts.push(part.id.clone()),
                 Task::Magnitude(_) | Task::Mushra(_) => found.never.push(part.id.clone()),

@@ -235,7 +235,7 @@ pub fn merge<'c>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Assumptions, Link, Scale, Vaf, closed};
+    use super::super::{Assumptions, Link, Reach, Scale, Vaf, closed};
     use super::*;
     use study_stats::power::covariate::Spread;
 
@@ -290,6 +290,56 @@ mod tests {
     fn agrees(found: f64, expected: f64, mcse: f64, n: f64) {
         let allowed = 4.0 * (mcse * mcse + found * (1.0 - found) / n).sqrt();
         assert!((found - expected).abs() <= allowed, "{found}, {expected}");
+    }
+
+    /// Where simulation finds more participants necessary than the closed form, another simulated
+    /// design bounds their number.
+    #[test]
+    fn the_smallest_design_is_bounded_by_another_one() {
+        let settings = settings(0.5, 0.3, ROUNDED, &UNEVEN_8);
+        let Some(Reach::Participants {
+            participants: n, ..
+        }) = super::super::reach(&settings, 8, 1, 0.8, 200)
+        else {
+            panic!("8 realizations are enough");
+        };
+        let made = |(participants, power): (usize, f64)| CellResult {
+            cell: Cell {
+                realizations: 8,
+                repetitions: 1,
+                participants,
+            },
+            tests: vec![TestResult {
+                test: Test::Verdict,
+                rejected: 0,
+                studies: 1000,
+                power,
+                interval: (power - 0.03, power + 0.03),
+                mcse: 0.01,
+                type_s: None,
+                type_m: None,
+                undefined: BTreeMap::new(),
+            }],
+            boundary_share: 0.0,
+            half_width: None,
+        };
+        let reach = |cells: &[(usize, f64)]| {
+            let results: Vec<CellResult> = cells.iter().copied().map(made).collect();
+            let found = super::super::smallest(&settings, &results, &[(8, 1)], &[0.8], 200);
+            found[0].reach.clone()
+        };
+        let few = [(n - 1, 0.7), (n, 0.78), (n + 1, 0.79)];
+        let more = |enough| Reach::MoreThan {
+            participants: n + 1,
+            enough,
+        };
+        assert_eq!(reach(&few), more(None));
+        let all = [&few[..], &[(n + 30, 0.95), (n + 10, 0.9)]].concat();
+        assert_eq!(reach(&all), more(Some(n + 10)));
+        let found = reach(&[(n, 0.81), (n + 10, 0.9)]);
+        assert!(
+            matches!(found, Reach::Participants { participants, sure: false, .. } if participants == n)
+        );
     }
 
     /// Rates of 40 000 studies each, simulated in numpy with the closed forms of its own.

@@ -6,9 +6,7 @@ use crate::analyze::{Include, Rules};
 use crate::outcome::ratings::{Origin, Ratings, Realization, Subject};
 use crate::outcome::{IntervalRow, RatingRow, Status};
 use crate::protocol::parts::{Pairs, Part, Presentations, Task, TrackRules};
-use crate::protocol::{
-    Answer, DeviceKind, GroupRules, ModelEntry, Protocol, QuestionKind, Role,
-};
+use crate::protocol::{Answer, DeviceKind, GroupRules, ModelEntry, Protocol, QuestionKind, Role};
 use std::collections::BTreeMap;
 use study_base::rng::Stream;
 use study_base::text::{ModelId, PartId, ParticipantId, QuestionId};
@@ -186,14 +184,22 @@ impl Made<'_> {
         let Some(question) = crate::analyze::psychophysics::asked(protocol, part) else {
             return;
         };
-        let kind = protocol.questions.iter().find(|q| q.id == *question).map(|q| &q.kind);
+        let kind = protocol
+            .questions
+            .iter()
+            .find(|q| q.id == *question)
+            .map(|q| &q.kind);
         for repetition in 1..=own.repetitions {
             for id in own.models.iter().filter(|id| who.rates(id)) {
                 let model = protocol.model(id);
                 let role = model.map_or(Role::Test, |m| m.role);
                 let drawn = self.draws.unit();
                 // Nobody is screened who finds the reference.
-                let share = if role == Role::HiddenReference { 1.0 } else { drawn };
+                let share = if role == Role::HiddenReference {
+                    1.0
+                } else {
+                    drawn
+                };
                 let answer = match kind {
                     Some(QuestionKind::Rating { from, to, .. }) => {
                         Answer::Rating(from + ((to - from) as f64 * share).round() as i64)
@@ -222,7 +228,11 @@ impl Made<'_> {
             let both = |pair: &&[ModelId; 2]| pair.iter().all(|id| who.rates(id));
             for pair in pairs.pairs.iter().filter(both) {
                 let first = usize::from((repetition + who.number) % 2 == 1);
-                let choice = if self.draws.unit() < 0.5 { "first" } else { "second" };
+                let choice = if self.draws.unit() < 0.5 {
+                    "first"
+                } else {
+                    "second"
+                };
                 let Some(question) = part.asks.first() else {
                     return;
                 };
@@ -276,14 +286,22 @@ impl Made<'_> {
                 0 | 1 => 0.5,
                 n => place as f64 / (n - 1) as f64,
             };
-            let share = if is_catch { 0.8 } else { guess + (0.97 - guess) * along };
+            let share = if is_catch {
+                0.8
+            } else {
+                guess + (0.97 - guess) * along
+            };
             let correct = self.draws.unit() < share;
             let right = match is_catch {
                 true => 1,
                 false if track.method.catch_sequences().is_empty() => trial % words.len(),
                 false => 0,
             };
-            let given = if correct { right } else { (right + 1) % words.len() };
+            let given = if correct {
+                right
+            } else {
+                (right + 1) % words.len()
+            };
             let answer = Answer::Choice(vec![words[given].to_owned()]);
             let row = self.row(part, who, answer, question);
             row.track = Some(track.id.clone());

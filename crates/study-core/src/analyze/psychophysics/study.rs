@@ -9,7 +9,8 @@ use super::findings::{
 };
 use super::of_scales::{of_magnitudes, of_mushra};
 use super::part_data::{
-    Found, Intervals, Measured, PartAnalysis, PartData, StudyData, asked, chosen, groups, sessions_of,
+    Found, Intervals, Measured, PartAnalysis, PartData, StudyData, asked, chosen, groups,
+    sessions_of,
 };
 use super::preferences::{Choice, Preference, in_both_orders, preferences};
 use super::questionnaires::of_questionnaires;

@@ -63,7 +63,9 @@ pub(super) fn of_part(part: &PartAnalysis) -> Vec<Number> {
     };
     let one = |id: &str| {
         let (group, what) = id.rsplit_once('/')?;
-        let of_vaf = group.strip_suffix("/pearson").filter(|_| what == "p_exact_two_sided");
+        let of_vaf = group
+            .strip_suffix("/pearson")
+            .filter(|_| what == "p_exact_two_sided");
         let tolerance = tolerance(part.task, group, what)?;
         of_vaf.is_none_or(permuted).then_some(tolerance)
     };
@@ -84,7 +86,9 @@ fn tolerance(task: &str, group: &str, what: &str) -> Option<&'static str> {
     let (first, name) = group.split_once('/').unwrap_or((group, ""));
     let pair = name.contains('|');
     match (first, name) {
-        ("pairs", "") => of(&["order", "order_se", "tie_log_nu", "tie_log_nu_se"]).then_some(FITTED),
+        ("pairs", "") => {
+            of(&["order", "order_se", "tie_log_nu", "tie_log_nu_se"]).then_some(FITTED)
+        }
         ("pairs", "ability" | "ability_se") => Some(FITTED),
         ("pairs", "vaf/pearson") => of(&["r", "p_exact_two_sided"]).then_some(FITTED),
         ("pairs", _) if pair => of(&["difference", "se"]).then_some(FITTED),
@@ -99,15 +103,9 @@ fn tolerance(task: &str, group: &str, what: &str) -> Option<&'static str> {
         }
         ("sdt_group", name) if name.ends_with("/above_chance") => of(&["t", "p"]).then_some(CLOSED),
         ("groups", "") => of(&TEST).then_some(CLOSED),
-        ("groups", _) if pair => {
-            of(&["difference", "ratio", "t", "df", "p"]).then_some(CLOSED)
-        }
-        ("groups", _) => {
-            of(&["mean", "sd", "geometric_mean", "geometric_sd"]).then_some(CLOSED)
-        }
-        ("groups_conditions", "") => {
-            (of(&TEST) || of(&["eps_gg", "p_gg"])).then_some(CLOSED)
-        }
+        ("groups", _) if pair => of(&["difference", "ratio", "t", "df", "p"]).then_some(CLOSED),
+        ("groups", _) => of(&["mean", "sd", "geometric_mean", "geometric_sd"]).then_some(CLOSED),
+        ("groups_conditions", "") => (of(&TEST) || of(&["eps_gg", "p_gg"])).then_some(CLOSED),
         ("retest", "") => of(&["icc_agreement", "icc_consistency", "sem"]).then_some(CLOSED),
         _ => None,
     }
