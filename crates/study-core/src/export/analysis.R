@@ -161,6 +161,8 @@ suppressPackageStartupMessages({
   library(lmerTest)
   library(ordinal)
 })
+control <- lmerControl(optimizer = "bobyqa", optCtrl = list(rhobeg = 0.2, rhoend = 1e-9),
+                       check.conv.singular = "ignore")
 enough <- nrow(with_vaf) > 0 && length(means) > 2 && sd(vaf) > 0 &&
   nlevels(droplevels(with_vaf$participant)) > 1
 if (enough) {
@@ -172,8 +174,6 @@ if (enough) {
   } else {
     rating ~ vaf_z + (1 | participant) + (1 | model)
   }
-  control <- lmerControl(optimizer = "bobyqa", optCtrl = list(rhobeg = 0.2, rhoend = 1e-9),
-                         check.conv.singular = "ignore")
   linear <- lmer(formula, data = with_vaf, control = control)
   print(summary(linear))
   slope <- coef(summary(linear))["vaf_z", ]
@@ -226,22 +226,16 @@ participant_group <- function(who) {
   if (is.null(ratings$group)) rep(NA_character_, length(who)) else as.character(ratings$group)[own]
 }
 sorted <- function(names) sort(unique(names), method = "radix")
-fitted_model <- function(formula, data) {
-  control <- lmerControl(optimizer = "bobyqa", optCtrl = list(rhobeg = 0.2, rhoend = 1e-9),
-                         check.conv.singular = "ignore")
-  tryCatch(anova(lmer(formula, data = data, control = control), type = 3, ddf = "Satterthwaite"),
-           error = function(why) NULL)
-}
+tried <- function(test) tryCatch(test, error = function(why) NULL)
 # The test of y ~ condition + (1 | participant), as the numbers of `group`.
 mixed_test <- function(put, group, data) {
   if (any(!is.finite(data$y)) || length(unique(data$condition)) < 2) return(invisible())
-  table <- fitted_model(y ~ condition + (1 | participant), data)
+  table <- tried(anova(lmer(y ~ condition + (1 | participant), data = data, control = control),
+                       type = 3, ddf = "Satterthwaite"))
   if (is.null(table)) return(invisible())
   print(table)
-  put(paste0(group, "/F"), table[["F value"]])
-  put(paste0(group, "/df1"), table[["NumDF"]])
-  put(paste0(group, "/df2"), table[["DenDF"]])
-  put(paste0(group, "/p"), table[["Pr(>F)"]])
+  columns <- c(F = "F value", df1 = "NumDF", df2 = "DenDF", p = "Pr(>F)")
+  for (what in names(columns)) put(paste0(group, "/", what), table[[columns[[what]]]])
 }
 of_part <- function(part) function(what, number) value[paste0(part, ":", what)] <<- number
 # Each participant's mean of `value` by condition, and by session if the part has several.
@@ -268,20 +262,18 @@ compare_groups <- function(put, cells, ratios, by_condition) {
   shown <- if (ratios) exp else identity
   if (!by_condition) {
     x <- rowMeans(all)
-    test <- tryCatch(oneway.test(x ~ group), error = function(why) NULL)
+    test <- tried(oneway.test(x ~ group))
     if (!is.null(test)) {
       print(test)
-      put("groups/F", test$statistic[[1]])
-      put("groups/df1", test$parameter[[1]])
-      put("groups/df2", test$parameter[[2]])
-      put("groups/p", test$p.value)
+      found <- c(F = test$statistic[[1]], df1 = test$parameter[[1]], df2 = test$parameter[[2]], p = test$p.value)
+      for (what in names(found)) put(paste0("groups/", what), found[[what]])
     }
     for (i in seq_along(groups)) {
       own <- x[group == groups[i]]
       put(paste0("groups/", groups[i], if (ratios) "/geometric_mean" else "/mean"), shown(mean(own)))
       put(paste0("groups/", groups[i], if (ratios) "/geometric_sd" else "/sd"), shown(sd(own)))
       for (j in seq_along(groups)) if (j > i) {
-        test <- tryCatch(t.test(own, x[group == groups[j]]), error = function(why) NULL)
+        test <- tried(t.test(own, x[group == groups[j]]))
         if (is.null(test)) next
         pair <- paste0("groups/", groups[i], "|", groups[j])
         put(paste0(pair, if (ratios) "/ratio" else "/difference"),
@@ -298,18 +290,15 @@ compare_groups <- function(put, cells, ratios, by_condition) {
   if (k < 2 || nrow(all) <= length(groups) || length(unique(group)) < length(groups)) return(invisible())
   y <- vapply(conditions, function(c) rowMeans(all[, of_column == c, drop = FALSE]), numeric(nrow(all)))
   fit <- lm(y ~ group)
-  test <- tryCatch(anova(fit, lm(y ~ 1), X = ~1, test = "Spherical"), error = function(why) NULL)
+  test <- tried(anova(fit, lm(y ~ 1), X = ~1, test = "Spherical"))
   if (is.null(test)) return(invisible())
   print(test)
   contrasts <- contr.helmert(k)
   contrasts <- sweep(contrasts, 2, sqrt(colSums(contrasts^2)), "/")
   own <- crossprod(residuals(fit) %*% contrasts)
-  put("groups_conditions/F", test[2, "F"])
-  put("groups_conditions/df1", test[2, "num Df"])
-  put("groups_conditions/df2", test[2, "den Df"])
-  put("groups_conditions/p", test[2, "Pr(>F)"])
+  columns <- c(F = "F", df1 = "num Df", df2 = "den Df", p = "Pr(>F)", p_gg = "G-G Pr")
+  for (what in names(columns)) put(paste0("groups_conditions/", what), test[2, columns[[what]]])
   put("groups_conditions/eps_gg", sum(diag(own))^2 / ((k - 1) * sum(own^2)))
-  put("groups_conditions/p_gg", test[2, "G-G Pr"])
 }
 
 compare_sessions <- function(put, cells, sessions) {
@@ -326,19 +315,16 @@ compare_sessions <- function(put, cells, sessions) {
   k <- ncol(table)
   if (n < 2) return(invisible())
   whole <- sum((table - mean(table))^2)
-  rows <- k * sum((rowMeans(table) - mean(table))^2)
-  columns <- n * sum((colMeans(table) - mean(table))^2)
-  error <- (whole - rows - columns) / ((n - 1) * (k - 1))
-  rows <- rows / (n - 1)
-  columns <- columns / (k - 1)
-  put("retest/icc_agreement",
-      (rows - error) / (rows + (k - 1) * error + k * (columns - error) / n))
+  rows <- k * sum((rowMeans(table) - mean(table))^2) / (n - 1)
+  columns <- n * sum((colMeans(table) - mean(table))^2) / (k - 1)
+  error <- whole / (n - 1) / (k - 1) - rows / (k - 1) - columns / (n - 1)
+  put("retest/icc_agreement", (rows - error) / (rows + (k - 1) * error + k * (columns - error) / n))
   put("retest/icc_consistency", (rows - error) / (rows + (k - 1) * error))
   put("retest/sem", sqrt(max(error, 0)))
 }
 
 again <- function(part, cells, ratios = FALSE, by_condition = FALSE) {
-  if (ratios) cells$value <- log(cells$value)
+  if (ratios) cells$value <- suppressWarnings(log(cells$value))
   if (nrow(cells) == 0 || any(!is.finite(cells$value))) return(invisible())
   put <- of_part(part)
   compare_groups(put, cells, ratios, by_condition)
@@ -391,8 +377,6 @@ for (part in kept("magnitude")) {
     }
     put("magnitude/exponent", line(means)[2])
     put("magnitude/log10_coefficient", line(means)[1])
-    exponents <- apply(cells, 1, function(y) line(y)[2])
-    if (sum(!is.na(exponents)) > 1) print(t.test(exponents))
     next
   }
   for (model in names(means)) put(paste0("magnitude/realization/", model, "/geometric_mean"), 10^means[[model]])
