@@ -110,7 +110,7 @@ pub fn markdown(c: &Content<'_>) -> String {
 fn text(raw: &str) -> String {
     let mut out = String::new();
     for c in Untrusted(raw).to_string().chars() {
-        if "\\`*_[]<>#|&".contains(c) {
+        if "\\`*_[]<>#|&$".contains(c) {
             out.push('\\');
         }
         out.push(c);
