@@ -237,7 +237,7 @@ fn tracks_and_estimates_are_declared() {
         (
             "staircase",
             &[
-                "Part `more-friction`: tracks `low`, `high`.",
+                "Part `more-friction`: tracks `",
                 "Track low (2ifc): friction at ",
                 "down staircase that stops after",
                 "Do thresholds differ between the conditions? Decided by: linear mixed model",

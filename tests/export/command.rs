@@ -158,7 +158,7 @@ fn comments_stay_away_if_asked() {
     );
     assert!(said.contains("could run as a formula"), "{said}");
     assert!(
-        said.contains("ratings: -x_ trial 1, comment: has"),
+        said.contains("ratings: 0-x_ trial 1, comment: has"),
         "{said}"
     );
     for to in FORMATS {

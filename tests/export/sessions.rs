@@ -190,10 +190,10 @@ fn the_headline_of_groups_and_sessions_is_that_of_the_analysis() {
     ] {
         let home = tempfile::tempdir().unwrap();
         let folder = match kind {
-            "ratings" => grouped(6, home.path()),
+            "ratings" => grouped(4, home.path()),
             _ => rehearsed(
                 &of_groups_and_sessions(kind, home.path()),
-                6,
+                4,
                 home.path(),
                 &[],
             ),

@@ -19,7 +19,7 @@ pub(crate) const TITLE: &str =
     "=1+1 \"); quit(status = 0); (\" </script> `r quit()` ../x \u{202e}RTL\tTab # 研究";
 
 /// Ids that programs take for something else.
-pub(crate) const IDS: [&str; 5] = ["NA", "1e5", "TRUE", "001", "-x_"];
+pub(crate) const IDS: [&str; 5] = ["NA", "1e5", "TRUE", "001", "0-x_"];
 
 /// The folder of a study in `home/results` whose sessions are those of a rehearsal of the
 /// protocol, by real participants with these ids. `change` sees every event and says
@@ -226,7 +226,12 @@ pub(crate) fn of_groups_and_sessions(kind: &str, home: &Path) -> PathBuf {
     let more = "\n[groups]\n[[groups.list]]\nid = \"young\"\n[[groups.list]]\nid = \"old\"\n\n\
         [[sessions]]\nid = \"one\"\n[[sessions]]\nid = \"two\"\n";
     let text = fs::read_to_string(&protocol).unwrap() + more;
-    fs::write(protocol, text).unwrap();
+    // So that a rehearsal takes seconds.
+    fs::write(
+        protocol,
+        text.replace("repetitions = 40", "repetitions = 6"),
+    )
+    .unwrap();
     folder
 }
 
