@@ -72,7 +72,7 @@ pub fn markdown(c: &Content<'_>) -> String {
     }
     if tests.len() == 1 {
         tests.push(
-            "The primary question is no rating of realizations: thresholds and preferences are \
+            "The primary question is no rating of realizations: thresholds, preferences and magnitudes are \
              estimated, and no test decides."
                 .to_owned(),
         );
