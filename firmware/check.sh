@@ -4,6 +4,9 @@
 #   firmware/check.sh c          the example in C on a pseudo-terminal
 #   firmware/check.sh emulator   the STM32F4 image in qemu-system-arm
 #
+# Where the system permits it, the device runs at real-time priority: it has a processor of
+# its own, and must not wait for other programs.
+#
 # Exit status: 0 all clauses passed, 77 a tool is missing, else the clauses failed.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -17,20 +20,23 @@ cleanup() {
 }
 trap cleanup EXIT
 
+soon=
+if chrt -f 5 true 2>/dev/null; then soon="chrt -f 5"; fi
+
 case "${1-}" in
   c)
     command -v cc >/dev/null || { echo "no C compiler here" >&2; exit 77; }
     cargo build --locked -q -p study-device
     cc -std=c99 -Wall -Wextra -pedantic -Werror -O2 -I firmware/c/include firmware/c/examples/pty.c \
       "$target_dir/debug/libstudy_device.a" -lm -lpthread -ldl -o "$work/device"
-    "$work/device" > "$work/said" &
+    $soon "$work/device" > "$work/said" &
     ;;
   emulator)
     command -v qemu-system-arm >/dev/null || { echo "no qemu-system-arm here" >&2; exit 77; }
     cargo build --locked -q --release -p study-firmware --example stm32f4 --target "$thumb"
     # While it calculates, the emulated clock counts instructions, 8 ns each: a period of
     # 250 us has 31,250 of them, as with a Cortex-M4 at 168 MHz.
-    qemu-system-arm -M netduinoplus2 -display none -monitor none -icount shift=3 -serial pty \
+    $soon qemu-system-arm -M netduinoplus2 -display none -monitor none -icount shift=3 -serial pty \
       -kernel "$target_dir/$thumb/release/examples/stm32f4" > "$work/said" 2>&1 &
     ;;
   *) echo "usage: firmware/check.sh c | emulator" >&2; exit 2 ;;

@@ -2,7 +2,7 @@
 
 use super::{Console, Failure};
 use crate::device::host::HostSettings;
-use crate::device::link::{LinkedDevice, Priority};
+use crate::device::link::{LinkedDevice, Priority, priority};
 use crate::device::manual::{Manual, WithManual};
 use crate::device::process::{HELLO_TIMEOUT, Opened, Opening, ProcessDevice};
 use crate::device::serial::{BAUD, SerialOpener};
@@ -233,6 +233,8 @@ impl SerialPortArgs {
     /// Opens the device behind a serial port.
     pub(super) fn open_serial(&self, settings: HostSettings) -> Result<LinkedDevice, Failure> {
         let opener = self.serial()?;
+        // Heartbeats are sent only while this thread polls.
+        priority::raise_nice();
         LinkedDevice::open(Box::new(opener), settings).map_err(|e| port_failure(&e))
     }
 }

@@ -1,5 +1,6 @@
 //! `study run`: a session in the terminal.
 
+mod ending;
 mod page;
 mod unsaved;
 
@@ -21,8 +22,8 @@ use study_core::protocol::DeviceKind;
 use study_core::session::roster::Newcomer;
 use study_core::session::{Config, Ending, MAX_OPERATOR, Roster};
 use study_core::store::{
-    Copies, Frozen, Plan, SeatKind, SessionData, StoreError, StudyFolder, check_new_id, layout,
-    next_row, next_session, participants,
+    Copies, Frozen, Plan, SeatKind, SessionData, StudyFolder, check_new_id, layout, next_row,
+    next_session, participants,
 };
 
 /// Arguments of `study run`.
@@ -239,7 +240,14 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             receipt.seq, receipt.hash
         ))?;
     }
-    finish(console, &study, &protocol, &ended.ending, &resume)
+    finish(
+        console,
+        &study,
+        &protocol,
+        &participant,
+        &ended.ending,
+        &resume,
+    )
 }
 
 /// The protocol of the working folder.
@@ -452,16 +460,17 @@ fn finish(
     console: &mut Console,
     study: &StudyFolder,
     protocol: &study_core::protocol::Protocol,
-    ending: &Ending,
+    participant: &str,
+    how: &Ending,
     resume: &str,
 ) -> Result<(), Failure> {
-    let written = match ending {
-        Ending::Nothing => Ok(()),
-        _ => study.refresh(protocol).map(drop),
+    let written = match how {
+        Ending::Nothing => Ok(None),
+        _ => study.refresh(protocol).map(Some),
     };
     let folder = study.saved_in();
     let shown = folder.display();
-    match ending {
+    match how {
         Ending::Finished => console.out(format!(
             "The session is finished and saved in {shown}.\nNext: study status {shown} · study analyze {shown}\n"
         )),
@@ -473,22 +482,12 @@ fn finish(
         )),
         Ending::Nothing => console.out("Nothing was recorded.\n"),
     }?;
-    written.map_err(|e| unwritten(&e, &folder))
-}
-
-/// The failure to report if the tables could not be written after a session.
-fn unwritten(why: &StoreError, folder: &std::path::Path) -> Failure {
-    let rebuild = format!("`study verify {} --rebuild`", folder.display());
-    let failure = Failure::results(format!(
-        "the answers are safe in the journals; the tables could not be written: {why}"
-    ));
-    failure.hint(match why {
-        e if e.is_full() => format!("free some disk space, then run {rebuild}"),
-        e => match e.hint() {
-            Some(hint) => hint,
-            None => format!("resolve this, then run {rebuild}"),
-        },
-    })
+    let derived = written.map_err(|e| ending::unwritten(&e, &folder))?;
+    let warning = derived.and_then(|d| ending::wrong_forces(d.wrong_forces(participant)));
+    if let Some(warning) = warning {
+        console.say(warning);
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -499,6 +498,7 @@ mod tests {
     use std::rc::Rc;
     use study_core::outcome::State;
     use study_core::protocol::Seat;
+    use study_core::store::StoreError;
 
     #[derive(Clone, Default)]
     struct Written(Rc<RefCell<Vec<u8>>>);
@@ -533,6 +533,7 @@ mod tests {
             &mut console,
             &study,
             &loaded.protocol,
+            "P01",
             &ending,
             "study run X",
         )
@@ -588,7 +589,9 @@ mod tests {
             path: "results/x/.ratings.csv.tmp".into(),
             source: std::io::ErrorKind::StorageFull.into(),
         };
-        let hint = unwritten(&full, Path::new("results/x")).hint.unwrap();
+        let hint = ending::unwritten(&full, Path::new("results/x"))
+            .hint
+            .unwrap();
         assert_eq!(
             hint,
             "free some disk space, then run `study verify results/x --rebuild`"

@@ -146,6 +146,9 @@ pub struct Host {
     silent_since: Option<Duration>,
     /// When the user interface last polled.
     alive_at: Option<Duration>,
+    /// For how long it did not poll before a heartbeat that was not sent, at most; since the
+    /// last load.
+    unpolled: Option<Duration>,
     settings: HostSettings,
     failure: Option<String>,
     health: Health,
@@ -248,6 +251,7 @@ impl Host {
             until: at + REST_TIMEOUT,
         });
         self.stage = Stage::Loading { since: at };
+        (self.late, self.unpolled) = (Lateness::default(), None);
         self.next_heartbeat = Some(at);
         self.send_heartbeat(at);
         self.next_request(at);
@@ -275,7 +279,7 @@ impl Host {
         };
         (self.received, self.lost, self.reported) = (0, 0, (0, 0));
         self.arrivals = Arrivals::default();
-        self.late = Lateness::default();
+        (self.late, self.unpolled) = (Lateness::default(), None);
         self.stage = Stage::Starting;
         self.send(Request::Play(play), at);
         Ok(())
@@ -463,6 +467,10 @@ impl Host {
             (Some(stall), Some(alive_at)) => at.saturating_sub(alive_at) < stall,
             (Some(_), None) => false,
         };
+        if !alive && self.stage.armed() {
+            let since = self.alive_at.unwrap_or_default();
+            self.unpolled = self.unpolled.max(Some(at.saturating_sub(since)));
+        }
         let (true, Some(device)) = (alive, &self.identity) else {
             return;
         };

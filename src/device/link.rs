@@ -11,6 +11,8 @@ pub mod memory;
 pub mod priority;
 #[cfg(unix)]
 pub mod pty;
+#[cfg(unix)]
+pub mod relay;
 
 use super::host::{Health, Host, HostSettings};
 use super::{Device, DeviceError, Identity, Report, Stimulus};
@@ -223,6 +225,7 @@ impl LinkedDevice {
                     link: None,
                     reopen_at: Duration::ZERO,
                     status_at: Duration::ZERO,
+                    turn_at: Duration::ZERO,
                     epoch: 0,
                 };
                 worker.use_link(link);
@@ -349,6 +352,8 @@ struct LinkWorker {
     reopen_at: Duration,
     /// Time of the last update of the status.
     status_at: Duration,
+    /// Time of the last turn of the loop.
+    turn_at: Duration,
     epoch: u64,
 }
 
@@ -360,12 +365,9 @@ impl LinkWorker {
                 return self.close();
             }
             self.run_commands();
-            let began = self.shared.now();
             let alive_at = Duration::from_nanos(self.shared.alive_ns.load(Ordering::Relaxed));
             self.host.keep_alive(alive_at);
             self.transfer();
-            let took = self.shared.now().saturating_sub(began);
-            self.host.was_late(took.saturating_sub(POLL_INTERVAL));
             self.update_status();
             for report in self.host.take_reports() {
                 if let Report::Lost(why) = &report {
@@ -380,7 +382,8 @@ impl LinkWorker {
 
     fn use_link(&mut self, link: Box<dyn Link>) {
         self.link = Some(link);
-        self.host.connected(self.shared.now());
+        self.turn_at = self.shared.now();
+        self.host.connected(self.turn_at);
         self.write();
     }
 
@@ -394,6 +397,9 @@ impl LinkWorker {
         match link.read(&mut buffer, POLL_INTERVAL) {
             Ok(n) => {
                 let now = self.shared.now();
+                let took = now.saturating_sub(self.turn_at);
+                self.turn_at = now;
+                self.host.was_late(took.saturating_sub(POLL_INTERVAL));
                 self.host.receive(&buffer[..n], now);
                 self.host.advance(now);
                 self.write();

@@ -53,7 +53,7 @@ pub(crate) struct Tally {
     /// Extremes of those that are ok.
     least_vaf: Option<f64>,
     gain: Option<[f64; 2]>,
-    largest: [f64; 3],
+    largest: [f64; 4],
 }
 
 impl Tally {
@@ -70,6 +70,7 @@ impl Tally {
                     found.rendered_bias_n,
                     found.rendered_delay_ms,
                     found.rendered_error_n,
+                    found.rendered_error_share,
                 ];
                 for (most, here) in self.largest.iter_mut().zip(here) {
                     *most = most.max(here.unwrap_or(0.0).abs());
@@ -93,10 +94,10 @@ impl Tally {
 
 impl fmt::Display for Tally {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [bias_n, delay_ms, error_n] = self.largest;
+        let [bias_n, delay_ms, error_n, share] = self.largest;
         writeln!(
             f,
-            "{:?}; VAF from {:.5}, gain {:.3?}, bias {bias_n:.3} N, delay {delay_ms:.2} ms, error {error_n:.3} N",
+            "{:?}; VAF from {:.5}, gain {:.3?}, bias {bias_n:.3} N, delay {delay_ms:.2} ms, error {error_n:.3} N, {share:.4} of the force",
             self.counts,
             self.least_vaf.unwrap_or(1.0),
             self.gain.unwrap_or([1.0; 2]),
@@ -149,10 +150,11 @@ fn the_right_device_is_not_accused() {
                 panic!("{n} {id}: {:?}", heard.failed);
             };
             let known = [Fault::Watchdog, Fault::Stroke].map(Fault::as_str);
-            assert!(known.contains(&why.as_str()), "{n} {id}: {why}");
+            let why = known.into_iter().find(|known| why.starts_with(known));
+            let why = why.unwrap_or_else(|| panic!("{n} {id}: {:?}", heard.failed));
             assert!(bad || why != known[0], "without a bad line: {n} {id}");
             println!("{n} {id}: {why} after {} samples", heard.samples.len());
-            *ended_early.entry(why.clone()).or_default() += 1;
+            *ended_early.entry(why.to_owned()).or_default() += 1;
             continue;
         };
         tally.add(&format!("{n} {id}"), n / tables, &found);

@@ -9,9 +9,9 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use study::device::firmware::{Firmware, Options, Wrong, WrongLoads};
 use study::device::host::HostSettings;
-use study::device::link::LinkedDevice;
 use study::device::link::memory::Noise;
 use study::device::link::pty::Simulator;
+use study::device::link::{LinkedDevice, priority};
 use study::device::serial::SerialOpener;
 use study::device::{Device, Report, Stimulus};
 use study_core::outcome::{Defect, Sample, Verdict};
@@ -62,6 +62,7 @@ impl Served {
         let over = Arc::new(AtomicBool::new(false));
         let ended = Arc::clone(&over);
         let thread = std::thread::spawn(move || {
+            priority::raise();
             while !ended.load(Ordering::Relaxed) {
                 simulator.step();
             }
@@ -121,6 +122,8 @@ fn the_clock_of_a_simulated_device_on_a_port_is_not_judged() {
 #[test]
 #[ignore = "minutes: cargo test --release --test device port -- --ignored --nocapture"]
 fn the_right_device_is_not_accused_on_a_port() {
+    // as the user interface of a session
+    priority::raise_nice();
     let tables = shipped();
     let (mut tally, mut ended_early) = (Tally::default(), BTreeMap::<String, u32>::new());
     let mut late_ms: f64 = 0.0;

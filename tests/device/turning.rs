@@ -113,6 +113,8 @@ fn half_of_the_force_from_the_seventh_trial_on_marks_the_trials() {
         };
         assert_eq!((row.status, verdict(row)), (Status::Ok, Some(expected)));
     }
+    assert_eq!(derived.wrong_forces("SIM001"), [9, 15]);
+    assert_eq!(derived.wrong_forces("SIM002"), [0, 0]);
     let said = "Force of the playbacks: 6 ok, 9 flag\n";
     let status = status(&folder);
     assert!(status.contains(said), "{status}");

@@ -292,11 +292,26 @@ pub struct RenderingRules {
     pub max_delay_ms: f64,
     /// Largest difference of commanded and table's force that lasts 20 ms, N.
     pub max_error_n: f64,
+    /// Largest rms difference of commanded and table's force over rms force of the table, in
+    /// the whole playback, in each direction and in each stretch of 2 s; also of the mean
+    /// difference. Fingerprints of studies with the default are those of earlier releases.
+    #[serde(skip_serializing_if = "is_default_share")]
+    pub max_error_share: f64,
     /// Largest mean size of measured minus commanded force, N.
     pub max_measured_error_n: f64,
     /// What a wrong playback is; `None`: a fault if the force passed its limit, was that
     /// of another table or had the wrong sign, else a flag.
     pub on_fault: Option<OnFault>,
+}
+
+const DEFAULT_ERROR_SHARE: f64 = 0.075;
+
+#[allow(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde passes a reference"
+)]
+fn is_default_share(share: &f64) -> bool {
+    *share == DEFAULT_ERROR_SHARE
 }
 
 impl Default for RenderingRules {
@@ -307,6 +322,7 @@ impl Default for RenderingRules {
             max_bias_n: 0.2,
             max_delay_ms: 5.0,
             max_error_n: 0.5,
+            max_error_share: DEFAULT_ERROR_SHARE,
             max_measured_error_n: 0.5,
             on_fault: None,
         }

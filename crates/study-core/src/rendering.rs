@@ -11,12 +11,16 @@
 mod comparable;
 mod moments;
 mod predicted;
+mod shares;
 
 use crate::outcome::{Defect, Fidelity, Sample, Verdict};
 use crate::protocol::{OnFault, RenderingRules};
-use comparable::{SLOW_S, comparable, direction_known, too_coarse, too_little, with_doubt};
+use comparable::{
+    SLOW_S, TOO_COARSE, comparable, direction_known, too_coarse, too_little, with_doubt,
+};
 use moments::{Moments, best_lag};
 use predicted::{Predicted, predicted};
+use shares::{Share, largest_share};
 use study_base::text::ModelId;
 use study_wire::servo::{self, ServoSettings};
 
@@ -100,6 +104,8 @@ pub fn judge(played: &Played<'_>, rules: &RenderingRules) -> Fidelity {
     fidelity.rendered_gain = commanded.slope();
     fidelity.rendered_bias_n = commanded.bias();
     fidelity.rendered_error_n = lasting_error(played, &samples, &forces, &known);
+    let share = largest_share(&samples, &forces, &keep, interval_s);
+    fidelity.rendered_error_share = share.map(|share| share.beyond_doubt);
     limits(played, &samples, interval_s, &mut fidelity);
     measured(&samples, &mut fidelity);
 
@@ -110,11 +116,15 @@ pub fn judge(played: &Played<'_>, rules: &RenderingRules) -> Fidelity {
     fidelity.nearest_model = nearest.as_ref().map(|near| near.model.clone());
 
     let too_little = too_little(&samples, &keep, interval_s, &commanded);
-    let open = too_little.or_else(|| too_coarse(&forces, &keep, &commanded));
+    let unsure = |share: &Share| share.apart > rules.max_error_share;
+    let open = too_little
+        .or_else(|| too_coarse(&forces, &keep, &commanded))
+        .or_else(|| share.filter(unsure).map(|_| TOO_COARSE));
     let found = Found {
         aligned: lag,
         correlation: commanded.correlation(),
         residual_n: beyond_doubt.residual().map(f64::sqrt),
+        bias_share: commanded.bias_share(),
         other: nearest.is_some_and(|near| near.explains),
         disordered: samples.len() < played.samples.len()
             || repeated(&samples).is_some_and(|share| share > MOST_REPEATED)
@@ -132,6 +142,7 @@ struct Found {
     aligned: Option<moments::Lag>,
     correlation: Option<f64>,
     residual_n: Option<f64>,
+    bias_share: Option<f64>,
     other: bool,
     disordered: bool,
     enough: bool,
@@ -164,7 +175,9 @@ fn defects(fidelity: &Fidelity, found: &Found, rules: &RenderingRules) -> Vec<De
         if found.enough && outside(fidelity.rendered_gain) && aligned {
             all.push(Defect::Gain);
         }
-        if found.enough && over(fidelity.rendered_bias_n, rules.max_bias_n) {
+        let biased = over(fidelity.rendered_bias_n, rules.max_bias_n)
+            || over(found.bias_share, rules.max_error_share);
+        if found.enough && biased {
             all.push(Defect::Bias);
         }
         if found.enough && over(fidelity.rendered_delay_ms, rules.max_delay_ms) {
@@ -177,7 +190,8 @@ fn defects(fidelity: &Fidelity, found: &Found, rules: &RenderingRules) -> Vec<De
         if poor && !(explained && all.len() > before) {
             all.push(Defect::Shape);
         }
-        if all.len() == before && over(fidelity.rendered_error_n, rules.max_error_n) {
+        let in_part = found.enough && over(fidelity.rendered_error_share, rules.max_error_share);
+        if all.len() == before && (in_part || over(fidelity.rendered_error_n, rules.max_error_n)) {
             all.push(Defect::Error);
         }
         all.sort_by_key(|defect| *defect as u8);
@@ -443,7 +457,7 @@ fn nearest<'a>(
         ..played.servo
     };
     let score = |what: &servo::Rendering<'_>| {
-        let forces = predicted(what, settings, samples, 0.0);
+        let forces = predicted(what, settings, samples, |_| 0.0);
         let pairs = (samples.iter().zip(&forces).zip(keep)).filter(|(_, keep)| **keep);
         let moments = Moments::of(pairs.map(|((s, p), _)| (p.force_n, s.force_command_n)));
         let far = moments.residual()? + moments.bias()?.powi(2);

@@ -349,6 +349,12 @@ fn program_rendering(args: &CheckArgs, console: &mut Console) -> Result<(), Fail
         return Err(Failure::device("the program does not answer in time")
             .hint("it has to answer load, start and stop as docs/devices.md says"));
     }
+    if failed == 0 {
+        return Err(
+            Failure::device(format!("{open} of {} tables were not judged", all.len()))
+                .hint("the lines above say why; nothing was found wrong"),
+        );
+    }
     Err(
         Failure::device("the program does not render its tables as the servo of docs/wire.md")
             .hint("a program with other constants is only marked in sessions; docs/devices.md"),

@@ -335,7 +335,10 @@ fn weight(rig: &mut Rig<'_>) -> Result<Step, Failure> {
     let measured_n = 1e-3 * mass_g * GRAVITY;
     let gain = measured_n / FORCE_N;
     let ok = side == "-" && (gain - 1.0).abs() <= FORCE_ERROR;
-    let seen = format!("{mass_g} g, {measured_n:.2} N, gain {gain:.2}, towards {side}x");
+    let seen = format!(
+        "{mass_g} g, {measured_n:.2} N, gain {gain:.2}, towards {}x",
+        side.replace('-', "−")
+    );
     Ok(step(what, required, ok, seen))
 }
 

@@ -6,7 +6,7 @@
 
 use super::single_playback::{self, Pace, PlaybackError};
 use crate::cli::Failure;
-use crate::device::{Device, Report, Stimulus, rendering_of};
+use crate::device::{Device, DeviceError, Report, Stimulus, rendering_of};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -24,6 +24,8 @@ use study_wire::servo::ServoSettings;
 const PLAYBACK: Duration = Duration::from_secs(6);
 /// How often a playback that cannot be judged is repeated.
 const TRIES: usize = 3;
+/// Time for a lost device to return.
+const RETURN: Duration = Duration::from_secs(5);
 /// Positions of the tables, relative to the middle of the stroke, mm.
 const REACH_MM: f64 = 14.0;
 /// Distance of the nodes, mm.
@@ -251,9 +253,12 @@ fn one(device: &mut dyn Device, what: &str, table: &Realization, pace: &mut Pace
                     ..Rendered::new(what, "fail", seen)
                 };
             }
-            // A trip is usually caused by the hand.
+            // A trip is usually caused by the hand; a program that has ended starts again.
             Err(why) => {
                 last = Rendered::new(what, "not judged", why.to_string());
+                if matches!(why, PlaybackError::Device(DeviceError::Lost(_))) {
+                    wait_for_return(device, pace);
+                }
                 continue;
             }
         };
@@ -268,6 +273,14 @@ fn one(device: &mut dyn Device, what: &str, table: &Realization, pace: &mut Pace
         }
     }
     last
+}
+
+/// Waits some seconds until a lost device is there again.
+fn wait_for_return(device: &mut dyn Device, pace: &mut Pace) {
+    let until = pace.at() + RETURN;
+    while pace.at() < until && !device.poll(pace.at()).contains(&Report::Ready) {
+        pace.wait();
+    }
 }
 
 fn judged(what: &str, found: &Fidelity) -> Rendered {
@@ -329,7 +342,7 @@ fn trip(device: &mut dyn Device, middle_mm: f64, pace: &mut Pace) -> Rendered {
         let fastest = (heard.samples.iter()).fold(0.0, |most: f64, s| most.max(s.v_mm_s.abs()));
         let seen = format!("at {fastest:.0} mm/s of {SLOW_MM_S} mm/s");
         last = match heard.ended {
-            Err(PlaybackError::Reported(why)) if why == Fault::Watchdog.as_str() => {
+            Err(PlaybackError::Reported(why)) if why.starts_with(Fault::Watchdog.as_str()) => {
                 Rendered::new(what, "not judged", why)
             }
             Err(PlaybackError::Reported(why)) => return Rendered::new(what, "pass", why),
@@ -346,9 +359,9 @@ fn trip(device: &mut dyn Device, middle_mm: f64, pace: &mut Pace) -> Rendered {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::device::Identity;
     use crate::device::firmware::{Wrong, WrongLoads};
     use crate::device::virtual_device::{Options, VirtualDevice};
-    use crate::device::{DeviceError, Identity};
 
     fn checked(wrong: Option<Wrong>) -> Vec<Rendered> {
         let mut options = Options::seeded(5);

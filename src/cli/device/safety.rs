@@ -1,7 +1,8 @@
 //! `study device safety`, hidden: measures the time to zero force in real time.
 //!
-//! A simulated device runs in this process on a pseudo-terminal, and a child process is
-//! the host that plays. The child is killed, stopped or stalled, or the cable is
+//! A simulated device runs in this process on a pseudo-terminal, or this process stands
+//! between a port and a device that is an example of `firmware/`. A child process is the
+//! host that plays. The child is killed, stopped or stalled, or the cable is
 //! unplugged, repeatedly, and the time until the device's force is zero is measured. The
 //! result holds for the simulated device on this machine under its present load.
 
@@ -10,7 +11,10 @@ use crate::cli::{Console, Failure};
 use crate::device::check::quantile;
 use crate::device::firmware::{Firmware, Options};
 use crate::device::link::memory::Noise;
+use crate::device::link::priority;
 use crate::device::link::pty::{Control, Simulator};
+use crate::device::link::relay::Relay;
+use crate::device::serial::SerialLink;
 use std::io::Write as _;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -25,6 +29,9 @@ pub(in crate::cli) struct Args {
     /// Servo periods per second
     #[arg(long, value_name = "HZ", default_value_t = 4000)]
     rate: u32,
+    /// A device on this port instead of the simulated one
+    #[arg(long, value_name = "PATH")]
+    port: Option<String>,
 }
 
 /// What happens to the host.
@@ -70,6 +77,14 @@ fn failed(why: impl std::fmt::Display) -> Failure {
 
 /// Measures every accident and prints the times.
 pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
+    // The device must not wait for a busy machine.
+    priority::raise();
+    let mut rig: Box<dyn Rig> = match &args.port {
+        None => Box::new(Simulated::new(0, args.rate)?),
+        Some(port) => Box::new(Relay::new(Box::new(
+            SerialLink::open(port, 460_800).map_err(failed)?,
+        ))),
+    };
     let (mut late, mut repeated) = (0, 0);
     console.out("accident             n   median   99 %    most   allowed\n")?;
     for accident in Accident::ALL {
@@ -79,7 +94,7 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
             // On a busy machine the device may go limp before the accident.
             let mut took = None;
             for _ in 0..MAX_TRIES {
-                took = once(accident, n, args.rate)?;
+                took = once(&mut *rig, accident, n)?;
                 if took.is_some() {
                     break;
                 }
@@ -114,20 +129,101 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
         .hint("repeat the measurement on an idle machine; the simulated device needs a free processor"))
 }
 
+/// A device whose force can be seen.
+trait Rig {
+    /// The next device, or the same one with a new port; its port.
+    fn ready(&mut self, seed: u32) -> Result<String, Failure>;
+    /// Lets a fraction of a millisecond pass.
+    fn step(&mut self) -> Result<(), Failure>;
+    /// Whether a playback has begun and the ramp is over.
+    fn plays(&self) -> bool;
+    fn force_n(&self) -> f64;
+    fn latched(&self) -> bool;
+    fn unplug(&mut self) -> Result<(), Failure>;
+}
+
+/// The simulated device, anew for each accident.
+struct Simulated {
+    rate: u32,
+    device: Simulator,
+}
+
+impl Simulated {
+    fn new(seed: u32, rate: u32) -> Result<Self, Failure> {
+        let firmware = Firmware::new(Options {
+            seed: u64::from(seed),
+            servo_hz: f64::from(rate),
+            ..Options::default()
+        });
+        let device = Simulator::open(firmware, Noise::default(), u64::from(seed), None);
+        let device = device.map_err(failed)?;
+        Ok(Self { rate, device })
+    }
+}
+
+impl Rig for Simulated {
+    fn ready(&mut self, seed: u32) -> Result<String, Failure> {
+        *self = Self::new(seed, self.rate)?;
+        Ok(self.device.path().unwrap_or_default().to_owned())
+    }
+
+    fn step(&mut self) -> Result<(), Failure> {
+        self.device.step();
+        Ok(())
+    }
+
+    fn plays(&self) -> bool {
+        self.device.firmware().state() == DeviceState::Run
+    }
+
+    fn force_n(&self) -> f64 {
+        self.device.firmware().held_n()
+    }
+
+    fn latched(&self) -> bool {
+        self.device.firmware().state().latched()
+    }
+
+    fn unplug(&mut self) -> Result<(), Failure> {
+        self.device.control(Control::Unplug).map_err(failed)
+    }
+}
+
+/// A device on a port; it is believed what it says of itself.
+impl Rig for Relay {
+    fn ready(&mut self, _: u32) -> Result<String, Failure> {
+        self.plug().map_err(failed)
+    }
+
+    fn step(&mut self) -> Result<(), Failure> {
+        Self::step(self).map_err(failed)
+    }
+
+    fn plays(&self) -> bool {
+        self.state() == Some(DeviceState::Run)
+    }
+
+    fn force_n(&self) -> f64 {
+        Self::force_n(self)
+    }
+
+    fn latched(&self) -> bool {
+        self.state().is_some_and(DeviceState::latched)
+    }
+
+    fn unplug(&mut self) -> Result<(), Failure> {
+        Self::unplug(self);
+        Ok(())
+    }
+}
+
 /// Starts a host that plays, causes an accident and returns the time to zero force, ms;
 /// `None` if the host ends earlier.
-fn once(accident: Accident, seed: u32, rate: u32) -> Result<Option<f64>, Failure> {
-    let firmware = Firmware::new(Options {
-        seed: u64::from(seed),
-        servo_hz: f64::from(rate),
-        ..Options::default()
-    });
-    let mut device =
-        Simulator::open(firmware, Noise::default(), u64::from(seed), None).map_err(failed)?;
-    let mut host = Host::start(device.path().unwrap_or_default())?;
+fn once(rig: &mut dyn Rig, accident: Accident, seed: u32) -> Result<Option<f64>, Failure> {
+    let mut host = Host::start(&rig.ready(seed)?)?;
     let start = Instant::now();
-    while device.firmware().state() != DeviceState::Run {
-        device.step();
+    while !rig.plays() {
+        rig.step()?;
         if host.ended() || start.elapsed() > PLAY_TIMEOUT {
             return Ok(None);
         }
@@ -135,16 +231,16 @@ fn once(accident: Accident, seed: u32, rate: u32) -> Result<Option<f64>, Failure
     // The accident happens at any phase between two heartbeats, while there is force.
     let from = Instant::now();
     let wait = Duration::from_micros(20_000 + 397 * u64::from(seed % 100));
-    while from.elapsed() < wait || device.firmware().held_n().abs() < 0.5 {
-        device.step();
+    while from.elapsed() < wait || rig.force_n().abs() < 0.5 {
+        rig.step()?;
         if host.ended() || start.elapsed() > PLAY_TIMEOUT {
             return Ok(None);
         }
     }
-    host.cause(accident, &mut device)?;
+    host.cause(accident, rig)?;
     let from = Instant::now();
-    while device.firmware().held_n() != 0.0 {
-        device.step();
+    while rig.force_n() != 0.0 {
+        rig.step()?;
         if from.elapsed() > PLAY_TIMEOUT {
             return Err(failed("the force does not become zero"));
         }
@@ -152,8 +248,8 @@ fn once(accident: Accident, seed: u32, rate: u32) -> Result<Option<f64>, Failure
     let took_ms = from.elapsed().as_secs_f64() * 1e3;
     let from = Instant::now();
     while from.elapsed() < ZERO_FOR {
-        device.step();
-        if device.firmware().held_n() != 0.0 || !device.firmware().state().latched() {
+        rig.step()?;
+        if rig.force_n() != 0.0 || !rig.latched() {
             return Err(failed("zero force is not latched"));
         }
     }
@@ -182,7 +278,7 @@ impl Host {
         self.child.try_wait().is_ok_and(|ended| ended.is_some())
     }
 
-    fn cause(&mut self, accident: Accident, device: &mut Simulator) -> Result<(), Failure> {
+    fn cause(&mut self, accident: Accident, rig: &mut dyn Rig) -> Result<(), Failure> {
         let signal = |signal| {
             let id = i32::try_from(self.child.id()).ok();
             let id = id.and_then(rustix::process::Pid::from_raw);
@@ -192,7 +288,7 @@ impl Host {
         match accident {
             Accident::Killed => signal(rustix::process::Signal::KILL),
             Accident::Stopped => signal(rustix::process::Signal::STOP),
-            Accident::Unplugged => device.control(Control::Unplug).map_err(failed),
+            Accident::Unplugged => rig.unplug(),
             Accident::Stalled => {
                 let stdin = self.child.stdin.as_mut();
                 let stdin = stdin.ok_or_else(|| failed("the host has no input"))?;

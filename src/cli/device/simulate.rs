@@ -3,6 +3,7 @@
 use crate::cli::{Console, Failure};
 use crate::device::firmware::{Firmware, Flaw, Options, Wrong, WrongLoads};
 use crate::device::link::memory::Noise;
+use crate::device::link::priority;
 use crate::device::link::pty::{Control, Simulator};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -171,6 +172,8 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
         port(&simulator).trim_end()
     ));
     let lines = super::hold::input_lines();
+    // A device has a processor of its own.
+    priority::raise();
     let ended = ended();
     while !ended.load(Ordering::Relaxed) {
         for _ in 0..64 {

@@ -26,7 +26,7 @@ impl Pace {
         Self::Real(Instant::now())
     }
 
-    fn at(self) -> Duration {
+    pub(super) fn at(self) -> Duration {
         match self {
             Self::Real(start) => start.elapsed(),
             #[cfg(test)]
@@ -34,7 +34,7 @@ impl Pace {
         }
     }
 
-    fn wait(&mut self) {
+    pub(super) fn wait(&mut self) {
         match self {
             Self::Real(_) => std::thread::sleep(POLL_INTERVAL),
             #[cfg(test)]
@@ -55,7 +55,8 @@ pub(super) enum PlaybackError {
     Timeout,
 }
 
-/// Plays a stimulus for `duration`. `turn` receives the reports of each poll.
+/// Plays a stimulus for `duration`. `turn` receives the reports of each poll, before the next
+/// one: if it stands still, the screen does.
 pub(super) fn play(
     device: &mut dyn Device,
     stimulus: &Stimulus<'_>,
@@ -69,17 +70,20 @@ pub(super) fn play(
     let mut due = pace.at() + ANSWER_TIMEOUT;
     loop {
         let reports = device.poll(pace.at());
-        turn(&reports);
-        for report in reports {
+        for report in &reports {
             match report {
                 Report::Loaded => device.start(pace.at())?,
                 Report::Started => {
                     stop_at = Some(pace.at() + duration);
                     due = pace.at() + duration + ANSWER_TIMEOUT;
                 }
-                Report::Stopped(playback) => return Ok(playback),
+                Report::Stopped(playback) => {
+                    turn(&reports);
+                    return Ok(*playback);
+                }
                 Report::Fault(reason) | Report::Lost(reason) => {
-                    return Err(PlaybackError::Reported(reason));
+                    turn(&reports);
+                    return Err(PlaybackError::Reported(reason.clone()));
                 }
                 _ => {}
             }
@@ -91,5 +95,6 @@ pub(super) fn play(
             return Err(PlaybackError::Timeout);
         }
         pace.wait();
+        turn(&reports);
     }
 }

@@ -29,6 +29,8 @@ wrongs! {
     DoubleForce "double-force" "double force, clamped to the limit";
     Weak "weak" "0.85 of the force";
     Strong "strong" "1.15 of the force";
+    WeakForwards "weak-forwards" "0.85 of the force for v > 0";
+    SlightlyWeak "slightly-weak" "0.89 of the force";
     Reversed "reversed" "the force has the wrong sign";
     Limp "limp" "no force at all";
     OneDirection "one-direction" "the branch for v > 0 in both directions";
@@ -70,15 +72,19 @@ wrongs! {
     AccelerationReversed "acceleration-reversed" "the acceleration has the wrong sign";
     Late "late" "the force comes 20 ms late";
     SlightlyLate "slightly-late" "the force comes 11 ms late";
+    LateForwards "late-forwards" "the force comes 12 ms late for v > 0";
+    LaterLate "later-late" "the force comes 12 ms late after 3 s";
     NoClamp "no-clamp" "double force, not clamped";
     CoarseForce "coarse-force" "the force has steps of 2 N";
     Noisy "noisy" "the force alternates by 2 N every 30 ms";
     Fading "fading" "the force fades away within 6 s";
     Hot "hot" "0.7 of the force after 3 s";
+    Warm "warm" "0.85 of the force after 3 s";
     Overflow "overflow" "a force beyond 4 N wraps to the other sign";
     Unsigned "unsigned" "negative forces are positive";
     OneSidedLimit "one-sided-limit" "the force is at most 2 N in one direction";
     DeadBand "dead-band" "forces below 0.7 N are 0";
+    Friction "friction" "0.3 N against the motion are added";
     Cogging "cogging" "0.8 N are added, with a period of 3 mm";
     Dropouts "dropouts" "no force for 100 ms of each second";
     Sticking "sticking" "the force is frozen for 150 ms of each half second";

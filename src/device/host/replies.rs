@@ -1,6 +1,8 @@
 //! Processing of the replies.
 
-use super::{Host, RECONNECT_INTERVAL, RETRY_INTERVAL, RearmRetry, Stage, upload};
+use super::{
+    HEARTBEAT_INTERVAL, Host, RECONNECT_INTERVAL, RETRY_INTERVAL, RearmRetry, Stage, upload,
+};
 use crate::device::Report;
 use crate::device::host::DeviceClock;
 use std::time::Duration;
@@ -155,8 +157,9 @@ impl Host {
         let what = upload::describe(&request);
         let reason = match reason {
             // It went limp before the request arrived.
-            Refusal::WrongState if ack.state.latched() => ack.fault.as_str(),
-            reason => reason.as_str(),
+            Refusal::WrongState if ack.state.latched() => self.in_words(ack.fault),
+            Refusal::NoHeartbeat => format!("{}: {}", reason.as_str(), self.without_heartbeat()),
+            reason => reason.as_str().to_owned(),
         };
         self.reports.push(Report::Fault(format!(
             "it refuses {what}: {reason}{detail}"
@@ -191,8 +194,37 @@ impl Host {
                 | Stage::AwaitingOutcome
         );
         if playing {
-            self.reports.push(Report::Fault(fault.as_str().to_owned()));
+            self.reports.push(Report::Fault(self.in_words(fault)));
             self.make_idle(at);
+        }
+    }
+
+    /// A fault, and whose it is if heartbeats were missing.
+    fn in_words(&self, fault: Fault) -> String {
+        match fault {
+            Fault::Watchdog => format!("{}: {}", fault.as_str(), self.without_heartbeat()),
+            fault => fault.as_str().to_owned(),
+        }
+    }
+
+    /// Why the device had no fresh heartbeat, as far as this computer knows.
+    fn without_heartbeat(&self) -> String {
+        let watchdog_ms = self.identity.map_or(0, |device| device.watchdog_ms);
+        let [_, late_ms] = self.late.ms().unwrap_or_default();
+        // The device can wait as long as its watchdog, less the time between heartbeats.
+        let most_ms = f64::from(watchdog_ms) - HEARTBEAT_INTERVAL.as_secs_f64() * 2e3;
+        match self.unpolled {
+            Some(time) => format!(
+                "this program's screen stood still for {} ms",
+                time.as_millis()
+            ),
+            None if late_ms >= most_ms => format!("this computer was late by {late_ms:.0} ms"),
+            None if self.identity.is_some_and(|device| device.flags.simulated) => format!(
+                "this computer was late by at most {late_ms:.0} ms, but the device is simulated on it"
+            ),
+            None => format!(
+                "this computer was late by at most {late_ms:.0} ms, so look at the line and the device"
+            ),
         }
     }
 

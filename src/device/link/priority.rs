@@ -24,10 +24,19 @@ pub fn raise() -> Priority {
     let parameters = libc::sched_param {
         sched_priority: REAL_TIME,
     };
+    // Programs and threads that this one starts are ordinary ones.
+    let policy = libc::SCHED_FIFO | libc::SCHED_RESET_ON_FORK;
     // SAFETY: the pointer is valid during the call, which only reads; 0 is this thread.
-    if unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const parameters) } == 0 {
+    if unsafe { libc::sched_setscheduler(0, policy, &raw const parameters) } == 0 {
         return Priority::RealTime;
     }
+    raise_nice()
+}
+
+/// Asks for more time for the current thread than others get, but not before them: for a
+/// user interface, without which there are no heartbeats.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+pub fn raise_nice() -> Priority {
     // On Linux a thread has a nice value of its own.
     match rustix::process::setpriority_process(Some(rustix::thread::gettid()), -10) {
         Ok(()) => Priority::Raised,
@@ -39,5 +48,11 @@ pub fn raise() -> Priority {
 /// known here.
 #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
 pub fn raise() -> Priority {
+    Priority::Usual
+}
+
+/// The same for a user interface.
+#[cfg(not(all(target_os = "linux", target_env = "gnu")))]
+pub fn raise_nice() -> Priority {
     Priority::Usual
 }

@@ -65,14 +65,14 @@ impl Pty {
     }
 
     /// The bytes received so far; none without a host.
-    fn read(&mut self) -> Vec<u8> {
+    pub(super) fn read(&mut self) -> Vec<u8> {
         let mut bytes = vec![0; 4096];
         let n = rustix::io::read(&self.master, &mut bytes).unwrap_or(0);
         bytes.truncate(n);
         bytes
     }
 
-    fn write(&mut self, bytes: &[u8]) {
+    pub(super) fn write(&mut self, bytes: &[u8]) {
         if self.waiting.len() + bytes.len() <= MAX_WAITING {
             self.waiting.extend_from_slice(bytes);
         }

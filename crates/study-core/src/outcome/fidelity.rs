@@ -92,6 +92,10 @@ pub struct Fidelity {
     /// Largest difference of the two forces that lasted 20 ms, N.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rendered_error_n: Option<f64>,
+    /// Largest rms difference of the two forces over rms force of the table: in the whole
+    /// playback, one direction, or a stretch of 2 s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rendered_error_share: Option<f64>,
     /// Largest commanded or measured force, N.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_force_n: Option<f64>,

@@ -1,7 +1,7 @@
 //! Which samples of a playback are compared with the table, and whether they are enough.
 
 use super::moments::Moments;
-use super::predicted::{Predicted, predicted};
+use super::predicted::{APART, Predicted, acceleration, predicted};
 use super::{Played, REST_MM_S, ROUNDING_N};
 use crate::outcome::Sample;
 use study_wire::predict::Direction;
@@ -19,21 +19,51 @@ const LEAST_SD_N: f64 = 0.1;
 pub(super) const SLOW_S: f64 = 0.0025;
 /// Time after the ramp before forces are compared, s.
 const AFTER_RAMP_S: f64 = 0.05;
+/// Why there is no verdict about a force that the steps of the position leave open.
+pub(super) const TOO_COARSE: &str = "the steps of the position are too coarse for this force";
 /// Largest doubt about the force, rms, as a share of its standard deviation, and N.
 const MOST_DOUBT: (f64, f64) = (0.1, 0.5);
 
-/// The force of the table at each sample. The position has steps, which leaves the
-/// acceleration open within the band of its filter, and the force with it.
+/// The force at each sample, with what is not known about it: within the band of its
+/// filter the acceleration is open by half a step of the position, and by its change in a
+/// servo period; the deflection of a mechanism is open by half a step.
 pub(super) fn with_doubt(played: &Played<'_>, samples: &[Sample]) -> Vec<Predicted> {
-    let mut forces = predicted(&played.what, played.servo, samples, 0.0);
+    let (what, servo) = (&played.what, played.servo);
+    let mut forces = predicted(what, servo, samples, |_| 0.0);
     // The largest acceleration in that band within half a step.
-    let band = std::f64::consts::TAU * played.servo.acceleration_hz;
-    let doubt_m_s2 = 1e-3 * 0.5 * step_mm(samples) * band * band;
-    let others = predicted(&played.what, played.servo, samples, doubt_m_s2);
+    let band = std::f64::consts::TAU * servo.acceleration_hz;
+    let half_mm = 0.5 * step_mm(samples);
+    let others = predicted(what, servo, samples, |i| {
+        1e-3 * half_mm * band * band + jerk(samples, i) / servo.servo_hz
+    });
+    let deflection_n = half_mm * stiffness_n_per_mm(&what.law);
     for (force, other) in forces.iter_mut().zip(&others) {
-        force.doubt_n = (other.force_n - force.force_n).abs();
+        force.doubt_n = (other.force_n - force.force_n).abs() + deflection_n;
     }
     forces
+}
+
+/// Size of the change of the acceleration, m/s³.
+fn jerk(samples: &[Sample], i: usize) -> f64 {
+    let (before, after) = (i.saturating_sub(APART), (i + APART).min(samples.len() - 1));
+    let time_s = samples[after].t_s - samples[before].t_s;
+    let change = acceleration(samples, after) - acceleration(samples, before);
+    if time_s > 0.0 {
+        (change / time_s).abs()
+    } else {
+        0.0
+    }
+}
+
+/// Stiffness of the parts of a mechanism that the handle deflects.
+fn stiffness_n_per_mm(law: &Law<'_>) -> f64 {
+    match law {
+        Law::Table { .. } => 0.0,
+        Law::Mechanism(what) => {
+            let own = what.scalars;
+            own.contact_n_per_mm + own.handle_n / own.handle_slip_mm
+        }
+    }
 }
 
 /// The smallest change of the position, mm.
@@ -45,7 +75,7 @@ fn step_mm(samples: &[Sample]) -> f64 {
         .unwrap_or(0.0)
 }
 
-/// Whether what the steps of the position leave open is as much as a verdict excludes.
+/// Whether what is not known about the force is as much as a verdict excludes.
 pub(super) fn too_coarse(
     forces: &[Predicted],
     keep: &[bool],
@@ -55,7 +85,7 @@ pub(super) fn too_coarse(
     let square: f64 = kept().map(|(p, _)| p.doubt_n.powi(2)).sum();
     let doubt_n = (square / kept().count().max(1) as f64).sqrt();
     let known = doubt_n < MOST_DOUBT.0 * commanded.var_x()?.sqrt() && doubt_n < MOST_DOUBT.1;
-    (!known).then_some("the steps of the position are too coarse for this mass")
+    (!known).then_some(TOO_COARSE)
 }
 
 /// At which samples the direction of the motion is known. With the rule sign it can change

@@ -70,6 +70,12 @@ impl Moments {
         (self.n > 0.0).then(|| (self.y - self.x) / self.n)
     }
 
+    /// The same as a share of the rms of x; `None` if x is zero.
+    pub(super) fn bias_share(&self) -> Option<f64> {
+        let square = (self.n > 0.0).then(|| self.xx / self.n)?;
+        (square > 0.0).then(|| self.bias().map(|bias| bias / square.sqrt()))?
+    }
+
     /// Mean of |y − x|.
     pub(super) fn mean_error(&self) -> Option<f64> {
         (self.n > 0.0).then(|| self.apart / self.n)

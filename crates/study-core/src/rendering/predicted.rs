@@ -1,8 +1,8 @@
 //! The force that the table gives for the reported motion, by the device's own servo.
 
 use crate::outcome::Sample;
-use study_wire::predict::Motion;
-use study_wire::servo::{Rendering, Servo, ServoSettings};
+use study_wire::predict::{Direction, Motion};
+use study_wire::servo::{Law, Rendering, Servo, ServoSettings};
 
 /// After a longer pause between two samples the filters have to settle again, s.
 const GAP_S: f64 = 0.004;
@@ -12,7 +12,7 @@ const SETTLING_S: f64 = 0.06;
 const LONGEST_GAP_S: f64 = 0.25;
 
 /// Samples on each side of the second difference of the position.
-const APART: usize = 4;
+pub(super) const APART: usize = 4;
 
 /// The force at one sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,7 +21,8 @@ pub(super) struct Predicted {
     pub force_n: f64,
     /// Whether it is known well: the samples before it are complete.
     pub settled: bool,
-    /// By how much it may be another one because the position has steps, N.
+    /// By how much it may be another one because the position has steps and the servo
+    /// periods, N.
     pub doubt_n: f64,
 }
 
@@ -36,12 +37,12 @@ impl Predicted {
 /// The force at each sample. The samples are finite and in the order of time.
 ///
 /// Between two samples the motion is interpolated, so that the servo runs at its own
-/// rate. `more_m_s2` is added to the acceleration.
+/// rate. `more_m_s2` of a sample is added to its acceleration.
 pub(super) fn predicted(
     what: &Rendering<'_>,
     settings: ServoSettings,
     samples: &[Sample],
-    more_m_s2: f64,
+    more_m_s2: impl Fn(usize) -> f64,
 ) -> Vec<Predicted> {
     // The device trips by its own measurements; here every sample has a force.
     let mut servo = Servo::new(ServoSettings {
@@ -56,18 +57,25 @@ pub(super) fn predicted(
     let mut all = Vec::with_capacity(samples.len());
     let mut before: Option<(f64, Motion)> = None;
     let mut settled_from_s = 0.0;
+    // Positions since the last gap, until they cover what the direction depends on.
+    let mut since_gap: Option<[f64; 2]> = None;
+    let memory_mm = memory_mm(&what.law);
     for (i, sample) in samples.iter().enumerate() {
         let here = Motion {
             x_mm: sample.x_mm,
             v_mm_s: sample.v_mm_s,
-            a_m_s2: acceleration(samples, i) + more_m_s2,
+            a_m_s2: acceleration(samples, i) + more_m_s2(i),
         };
         // A playback begins at its servo period 0 with the first motion that is known.
         let (from_s, from) = before.unwrap_or((-1.0 / hz, here));
         let apart_s = sample.t_s - from_s;
         if before.is_some() && apart_s > GAP_S {
             settled_from_s = sample.t_s + SETTLING_S;
+            since_gap = Some([sample.x_mm; 2]);
         }
+        since_gap = since_gap
+            .map(|[low, high]| [low.min(sample.x_mm), high.max(sample.x_mm)])
+            .filter(|[low, high]| high - low < memory_mm);
         let steps = (apart_s * hz).round().clamp(1.0, most) as u32;
         let mut force_n = 0.0;
         for step in 1..=steps {
@@ -84,7 +92,7 @@ pub(super) fn predicted(
         }
         all.push(Predicted {
             force_n,
-            settled: sample.t_s >= settled_from_s,
+            settled: sample.t_s >= settled_from_s && since_gap.is_none(),
             doubt_n: 0.0,
         });
         before = Some((sample.t_s, here));
@@ -92,10 +100,27 @@ pub(super) fn predicted(
     all
 }
 
+/// The motion that an unknown motion before it has no influence on, mm: the hand may have
+/// turned where samples were lost.
+fn memory_mm(law: &Law<'_>) -> f64 {
+    match law {
+        Law::Table { rule, .. } => match rule {
+            Direction::Sign => 0.0,
+            Direction::Play { delta_mm } => *delta_mm,
+            // e⁻³ of the difference is left.
+            Direction::Dahl { delta_mm } => 3.0 * delta_mm,
+        },
+        Law::Mechanism(what) => {
+            let own = what.scalars;
+            own.gap_mm + 3.0 * own.slip_mm.max(own.handle_slip_mm)
+        }
+    }
+}
+
 /// Acceleration at a sample, m/s²: the second difference of the position, in which the
 /// filter of the speed has no part; at the ends and beside gaps the difference of the
 /// speed.
-fn acceleration(samples: &[Sample], i: usize) -> f64 {
+pub(super) fn acceleration(samples: &[Sample], i: usize) -> f64 {
     let here = &samples[i];
     let around = i
         .checked_sub(APART)

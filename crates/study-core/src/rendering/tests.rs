@@ -5,6 +5,8 @@ use super::*;
 use study_wire::predict::{BranchView, Direction, Lookup, Motion, TableView};
 use study_wire::servo::{Law, Rendering, Servo};
 
+mod parts;
+
 const HZ: f64 = 4000.0;
 /// Position about which the hand moves, amplitude, mm, and frequency, Hz.
 const CENTRE_MM: f64 = 15.0;
@@ -116,7 +118,17 @@ fn verdict(
     change: impl FnOnce(&mut Played<'_>),
     rule: impl FnOnce(&mut RenderingRules),
 ) -> Fidelity {
-    let (table, model) = (table(), ModelId::new("right").unwrap());
+    verdict_about(&table(), samples, change, rule)
+}
+
+/// The same about another table.
+fn verdict_about(
+    table: &Table,
+    samples: &[Sample],
+    change: impl FnOnce(&mut Played<'_>),
+    rule: impl FnOnce(&mut RenderingRules),
+) -> Fidelity {
+    let model = ModelId::new("right").unwrap();
     let other = Table {
         k_n_per_mm: [0.0; 2],
         f0_n: [[3.0; 2], [-1.0; 2]],
@@ -489,6 +501,7 @@ fn the_protocol_says_what_fails() {
         |_| (),
         |rules| {
             (rules.gain, rules.min_vaf, rules.max_error_n) = ([0.4, 1.2], 0.7, 5.0);
+            rules.max_error_share = 0.6;
         },
     );
     assert_eq!(wide.verdict, Verdict::Ok, "{wide:?}");

@@ -7,7 +7,7 @@ use super::error::{At as _, StoreError};
 use super::sessions::SessionData;
 use super::{StudyFolder, atomic, journal, layout, tables};
 use crate::outcome::fold::{attempt_rows, interval_rows};
-use crate::outcome::{AttemptRow, IntervalRow, ParticipantRow, RatingRow, State};
+use crate::outcome::{AttemptRow, IntervalRow, ParticipantRow, RatingRow, State, Verdict};
 use crate::protocol::Protocol;
 use crate::protocol::columns::{AttemptColumn, IntervalColumn, ParticipantColumn, RatingColumn};
 use std::collections::BTreeSet;
@@ -82,6 +82,19 @@ impl StudyFolder {
 }
 
 impl Derived {
+    /// In how many trials of the last session of a participant the force was wrong, and in
+    /// how many it was judged.
+    pub fn wrong_forces(&self, participant: &str) -> [usize; 2] {
+        let own = || (self.rows.iter()).filter(|row| row.participant.as_str() == participant);
+        let last = own().map(|row| row.session).max();
+        let verdicts: Vec<Verdict> = own()
+            .filter(|row| Some(row.session) == last)
+            .filter_map(|row| Some(row.fidelity.as_ref()?.verdict))
+            .collect();
+        let wrong = |verdict: &&Verdict| matches!(verdict, Verdict::Flag | Verdict::Fault);
+        [verdicts.iter().filter(wrong).count(), verdicts.len()]
+    }
+
     /// The rows of all sessions of a study. `protocol` has the VAF of its realizations.
     /// Damaged lines of a journal are skipped; [`StudyFolder::verify`] reports them.
     pub fn of(sessions: &[SessionData], protocol: &Protocol) -> Self {

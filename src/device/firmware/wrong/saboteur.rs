@@ -206,6 +206,7 @@ impl Saboteur {
             Wrong::DoubleForce => scaled([2.0; 4]),
             Wrong::Weak => scaled([0.85; 4]),
             Wrong::Strong => scaled([1.15; 4]),
+            Wrong::SlightlyWeak => scaled([0.89; 4]),
             Wrong::Reversed => scaled([-1.0; 4]),
             Wrong::Limp => scaled([0.0; 4]),
             Wrong::NoMass => scaled([0.0, 1.0, 1.0, 1.0]),
@@ -222,6 +223,10 @@ impl Saboteur {
                 moved.negative[3] -= node.negative[2] * start_mm;
                 moved
             }
+            Wrong::WeakForwards => Node {
+                positive: node.positive.map(|p| 0.85 * p),
+                ..node
+            },
             Wrong::OneDirection => Node {
                 negative: node.positive,
                 ..node
@@ -384,6 +389,10 @@ impl Saboteur {
         match wrong {
             Wrong::Late => changed.command_un = ago(&self.forces, 20.0),
             Wrong::SlightlyLate => changed.command_un = ago(&self.forces, 11.0),
+            Wrong::LateForwards if sample.v_um_s > 0 => {
+                changed.command_un = ago(&self.forces, 12.0);
+            }
+            Wrong::LaterLate if t_s > 3.0 => changed.command_un = ago(&self.forces, 12.0),
             Wrong::NoClamp => changed.command_un = command(2.0 * newtons),
             Wrong::CoarseForce => changed.command_un = command((newtons / 2.0).round() * 2.0),
             Wrong::Noisy => {
@@ -392,6 +401,11 @@ impl Saboteur {
             }
             Wrong::Fading => changed.command_un = command(newtons * (1.0 - t_s / 6.0).max(0.0)),
             Wrong::Hot if t_s > 3.0 => changed.command_un = command(0.7 * newtons),
+            Wrong::Warm if t_s > 3.0 => changed.command_un = command(0.85 * newtons),
+            Wrong::Friction => {
+                let side = f64::from(sample.v_um_s.signum());
+                changed.command_un = command(newtons + 0.3 * side);
+            }
             Wrong::Overflow if newtons.abs() > 4.0 => {
                 changed.command_un = command(newtons - 8.0 * newtons.signum());
             }

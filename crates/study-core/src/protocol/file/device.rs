@@ -39,6 +39,9 @@ const RENDERING: &[Key] = keys! {
     "max_delay_ms": Kind::positive("ms"), "10.0", default("5.0");
     /// Largest difference of commanded and table's force that lasts 20 ms.
     "max_error_n": Kind::positive("N"), "1.0", default("0.5");
+    /// Largest difference of commanded and table's force as a share of the table's force, both
+    /// root mean squares: of the whole playback, of each direction and of each stretch of 2 s.
+    "max_error_share": Kind::positive(""), "0.15", default("0.075");
     /// Largest mean size of measured minus commanded force.
     "max_measured_error_n": Kind::positive("N"), "1.0", default("0.5");
     /// What a wrong playback is. Without this key it fails if the force passed its limit, was
@@ -122,6 +125,7 @@ fn rendering(mut section: Section<'_, '_>) -> Option<RenderingRules> {
         max_bias_n: section.number("max_bias_n")?,
         max_delay_ms: section.number("max_delay_ms")?,
         max_error_n: section.number("max_error_n")?,
+        max_error_share: section.number("max_error_share")?,
         max_measured_error_n: section.number("max_measured_error_n")?,
         on_fault: section.word("on_fault"),
     })
