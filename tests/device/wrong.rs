@@ -162,7 +162,7 @@ fn all_tables() -> Vec<Shipped> {
     let own = rules.into_iter().flat_map(|(id, rule)| {
         [("mixed", mixed(rule)), ("weak", weak(rule))].map(|(force, table)| {
             (
-                ModelId::new(&format!("{force}-{id}")).unwrap(),
+                ModelId::new(format!("{force}-{id}")).unwrap(),
                 table,
                 limits,
             )
