@@ -15,7 +15,7 @@ use std::fs::File;
 use std::io::BufReader;
 use study_base::rng::Stream;
 use study_haptics::identify::method::{
-    Delta, Ewls, Hat, Passive, Segments, Sort, Start, State, TwoSided, Width, Window,
+    Delta, Ewls, Hat, Passive, Segments, Sort, Start, State, Terms, TwoSided, Width, Window,
 };
 use study_haptics::identify::resample::Resample;
 use study_haptics::identify::{Method, Training, vaf};
@@ -39,6 +39,7 @@ fn methods() -> Vec<(&'static str, Method)> {
             window,
             width: Width::Mm(mm),
             bounded,
+            terms: Terms::default(),
         })
     };
     let hat = |state, bounded| {

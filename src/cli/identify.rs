@@ -56,7 +56,7 @@ impl Results<'_> {
 
 /// Identifies a grid of realizations, prints it and writes the files.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
-    let plan = args.plan()?;
+    let mut plan = args.plan()?;
     let names = args.names()?;
     let mut training = Vec::new();
     for named in &args.training {
@@ -70,16 +70,26 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     for named in &args.repeat {
         repeats.push((named, read(named, &names, args, console)?));
     }
-    let offset_mm = offset_mm(&training[0].1);
+    let first = &training[0].1;
+    if plan.dx_mm.is_empty() {
+        plan.dx_mm = args.default_dx_mm(first.scale_mm());
+    }
+    let (offset_mm, offset_n) = (offset(first.range_mm()), offset(first.range_n()));
+    let all = (training.iter_mut())
+        .chain(&mut recordings)
+        .chain(&mut repeats);
+    for (_, recording) in all {
+        recording.x_mm.iter_mut().for_each(|x| *x -= offset_mm);
+        recording.f_n.iter_mut().for_each(|f| *f -= offset_n);
+    }
     if offset_mm != 0.0 {
-        let all = (training.iter_mut())
-            .chain(&mut recordings)
-            .chain(&mut repeats);
-        for x in all.flat_map(|(_, recording)| &mut recording.x_mm) {
-            *x -= offset_mm;
-        }
         console.say(format!(
             "x is far from its origin, which costs digits: identified at x - {offset_mm} mm; model files have the positions of the recording"
+        ));
+    }
+    if offset_n != 0.0 {
+        console.say(format!(
+            "warning: F is far from 0, which costs digits: identified at F - {offset_n} N; model files have the forces of the recording, so subtract the offset of the sensor before you play them"
         ));
     }
     check_distinct(training.iter().chain(&recordings).chain(&repeats))?;
@@ -129,12 +139,15 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         files: Vec::new(),
     };
     if let Some(dir) = &args.out {
-        let shift = |cells: &mut [Cell], by_mm| {
-            (cells.iter_mut()).for_each(|cell| cell.realization.shift(by_mm));
+        let shift = |cells: &mut [Cell], by_mm, by_n| {
+            for cell in cells {
+                cell.realization.shift(by_mm);
+                cell.realization.raise(by_n);
+            }
         };
-        shift(&mut results.cells, offset_mm);
+        shift(&mut results.cells, offset_mm, offset_n);
         results.files = files::models(&mut results.cells, args, dir)?;
-        shift(&mut results.cells, -offset_mm);
+        shift(&mut results.cells, -offset_mm, -offset_n);
         files::write(dir, &results.files, args.force)?;
     }
     if let Some(dir) = &args.figures {
@@ -181,11 +194,10 @@ pub(super) fn required_damping(certificate: &Certificate) -> String {
     )
 }
 
-/// What is subtracted from all positions before identification, mm: 0 unless the middle of
-/// the range is more than [`FAR`] ranges from the origin, because the origin matters to a cold
-/// start. A whole number of mm, so that nodes keep their places.
-fn offset_mm(training: &Recording) -> f64 {
-    let [low, high] = training.range_mm();
+/// What is subtracted from all positions, mm, or forces, N, before identification: 0 unless the
+/// middle of the range is more than [`FAR`] ranges from the origin, because the origin matters to a
+/// cold start. A whole number, so that nodes keep their places.
+fn offset([low, high]: [f64; 2]) -> f64 {
     let middle = 0.5 * (low + high);
     if middle.abs() > FAR * (high - low) {
         middle.round()
@@ -270,9 +282,10 @@ fn unreadable(path: &Path, error: &RecordingError) -> Failure {
         RecordingFault::MissingColumn { .. } => failure.hint(
             "name the columns of your file: --columns t=NAME,x=NAME:UNIT,f=NAME:UNIT, with units such as mm, deg, rad, N and N·m",
         ),
-        RecordingFault::Ragged { found, expected } if *found == 2 * expected => {
+        RecordingFault::Ragged { found, expected } if found > expected => {
             failure.hint("decimal commas need semicolons or tabs between the columns")
         }
+        RecordingFault::LongLine => failure.hint("a row is a line that ends with a line feed"),
         _ => failure,
     }
 }

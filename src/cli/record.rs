@@ -259,16 +259,16 @@ fn excitation_picture(excitation: &Excitation) -> String {
     let (Some(first), Some(last)) = (excitation.windows.first(), excitation.windows.last()) else {
         return String::new();
     };
-    let half = 0.5 * excitation::WINDOW_MM;
+    let half = 0.5 * excitation.window_mm;
     let range = [first.x_mm - half, last.x_mm + half];
-    let count = ((range[1] - range[0]) / excitation::WINDOW_MM).round() as usize;
+    let count = ((range[1] - range[0]) / excitation.window_mm).round() as usize;
     if !(2..=200).contains(&count) {
         return String::new();
     }
     // two characters per window; positions without a window have no bar
     let mut values = vec![0.0f64; 2 * count];
     for window in &excitation.windows {
-        let index = ((window.x_mm - first.x_mm) / excitation::WINDOW_MM).round() as usize;
+        let index = ((window.x_mm - first.x_mm) / excitation.window_mm).round() as usize;
         for value in values.iter_mut().skip(2 * index).take(2) {
             *value = value.max(window.condition);
         }

@@ -149,9 +149,17 @@ fn jitter_is_resampled_for_a_filter_and_said() {
     for (i, row) in rows.iter_mut().enumerate() {
         row[0] += if i % 3 == 1 { 0.0006 } else { 0.0 };
     }
-    let (code, _, err) = identify(&text(NAMES, &rows), &["--filter", "30"]);
-    assert_eq!(code, 0, "{err}");
-    assert!(err.contains("resampled at even intervals"), "{err}");
+    // and stamps that are each off by up to 0.35 of an interval
+    let mut rough = training();
+    for (i, row) in rough.iter_mut().enumerate() {
+        row[0] += 0.0007 * (((i * 7919) % 100) as f64 / 49.5 - 1.0);
+    }
+    for rows in [rows, rough] {
+        let (code, _, err) = identify(&text(NAMES, &rows), &["--filter", "30"]);
+        assert_eq!(code, 0, "{err}");
+        assert!(err.contains("resampled at even intervals"), "{err}");
+        assert!(!err.contains("gap"), "{err}");
+    }
 }
 
 /// The same table at an offset of 10⁸ mm, with the positions of the recording.
@@ -190,6 +198,94 @@ fn a_far_origin_is_moved_and_said() {
         rest.lines().next().unwrap().parse().unwrap()
     };
     assert!(vaf(&model) > 0.95, "{model}");
+}
+
+/// The paper's table of a force with an offset of 10⁸ N has the VAF of the force without it.
+#[test]
+fn a_far_force_is_moved_and_said() {
+    let dir = tempfile::tempdir().unwrap();
+    let identified = |offset_n: f64| {
+        let path = |name: &str, rows: Vec<[f64; 5]>| {
+            let moved: Vec<[f64; 5]> = (rows.into_iter())
+                .map(|[t, x, v, a, f]| [t, x, v, a, f + offset_n])
+                .collect();
+            let path = dir.path().join(name);
+            fs::write(&path, text(NAMES, &moved)).unwrap();
+            path
+        };
+        let output = Command::cargo_bin("study")
+            .unwrap()
+            .arg("identify")
+            .arg(path("t.csv", training()))
+            .arg("--validate")
+            .arg(path("v.csv", rows(&[(1.5, 15.0)])))
+            .args([
+                "--lambda", "0.98", "--dx", "1", "--json", "--force", "--out",
+            ])
+            .arg(dir.path().join("models"))
+            .output()
+            .unwrap();
+        let err = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success(), "{err}");
+        let document: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        (document["cells"][0]["vaf"]["v"].as_f64().unwrap(), err)
+    };
+    let (here, _) = identified(0.0);
+    let (far, err) = identified(1e8);
+    assert!((here - far).abs() < 1e-6, "{here} {far}");
+    assert!(err.contains("identified at F - 100000000 N"), "{err}");
+    let model = fs::read_to_string(dir.path().join("models/lambda-0.98-dx-1.toml")).unwrap();
+    let (_, forces) = model.split_once("f0_n = [").unwrap();
+    let first: f64 = forces.split(',').next().unwrap().trim().parse().unwrap();
+    assert!((first - 1e8).abs() < 1e4, "{first}");
+}
+
+/// Lengths that are looked for are in proportion to the travel: a button and a joint have the
+/// table of the switch.
+#[test]
+fn a_travel_of_a_tenth_of_a_millimetre_or_of_metres_gives_the_same_table() {
+    let vaf = |times: f64| {
+        let dir = tempfile::tempdir().unwrap();
+        let path = |name: &str, rows: Vec<[f64; 5]>| {
+            let larger: Vec<[f64; 5]> = (rows.into_iter())
+                .map(|[t, x, v, a, f]| [t, times * x, times * v, times * a, f])
+                .collect();
+            let path = dir.path().join(name);
+            fs::write(&path, text(NAMES, &larger)).unwrap();
+            path
+        };
+        let output = Command::cargo_bin("study")
+            .unwrap()
+            .arg("identify")
+            .arg(path("t.csv", training()))
+            .arg("--validate")
+            .arg(path("v.csv", rows(&[(1.5, 15.0)])))
+            .arg("--json")
+            .output()
+            .unwrap();
+        assert!(output.status.success());
+        let document: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let cells = document["cells"].as_array().unwrap();
+        let dx: Vec<f64> = (cells.iter())
+            .map(|cell| cell["dx_mm"].as_f64().unwrap() / times)
+            .collect();
+        (dx, cells[0]["vaf"]["v"].as_f64().unwrap())
+    };
+    let (dx, here) = vaf(1.0);
+    assert_eq!(dx, [0.5, 1.0]);
+    for times in [0.01, 100.0] {
+        let (dx, there) = vaf(times);
+        assert_eq!(dx, [0.5, 1.0]);
+        assert!((here - there).abs() < 1e-3, "{times}: {here} {there}");
+    }
+}
+
+/// Decimal commas in a file with commas, whole numbers among them.
+#[test]
+fn decimal_commas_between_commas_are_refused_with_what_to_do() {
+    let commas = "t_s,x_mm,f_n\n0,0,5,1\n0,1,1,5,1,2\n";
+    refused(commas, "line 2: 4 fields, but there are 3 columns");
+    refused(commas, "decimal commas need semicolons or tabs");
 }
 
 /// A knob in degrees and N·m, in a file with semicolons and decimal commas, has the VAF of

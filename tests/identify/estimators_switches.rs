@@ -7,7 +7,7 @@ use std::fs::File;
 use std::io::BufReader;
 use study_base::rng::Stream;
 use study_haptics::identify::method::{
-    Delta, Ewls, Hat, Passive, Segments, State, TwoSided, Width, Window,
+    Delta, Ewls, Hat, Passive, Segments, State, Terms, TwoSided, Width, Window,
 };
 use study_haptics::identify::resample::Resample;
 use study_haptics::identify::{Method, Training, Warning, vaf};
@@ -47,6 +47,7 @@ fn on_switch_a_each_method_reaches_its_known_vaf() {
             window: Window::Exponential,
             width: Width::Mm(0.2),
             bounded,
+            terms: Terms::default(),
         })
     };
     // (method, VAF by the prototype, tolerance)

@@ -12,4 +12,5 @@ mod record;
 mod shipped;
 #[path = "../support/switches.rs"]
 mod switches;
+mod terms;
 mod trajectory;

@@ -306,7 +306,8 @@ impl<'r> Training<'r> {
         });
         let (l_plus, l_minus) = (l_plus?, l_minus?);
         let estimate = |samples: &Samples, width_mm| {
-            two_sided::at_nodes(samples, &nodes, options.window, width_mm, options.bounded)
+            let of = (options.bounded, options.terms);
+            two_sided::at_nodes(samples, &nodes, options.window, width_mm, of)
                 .ok_or(IdentifyError::Narrow { width_mm })
         };
         let positive = estimate(&self.positive, l_plus)?;

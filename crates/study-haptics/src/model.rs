@@ -201,6 +201,17 @@ impl Realization {
         }
     }
 
+    /// The same with a constant force added, N.
+    pub fn raise(&mut self, by_n: f64) {
+        let branches = [&mut self.positive, &mut self.negative];
+        for f0 in branches.into_iter().flat_map(|branch| &mut branch.f0_n) {
+            *f0 += by_n;
+        }
+        if let Some(mechanism) = &mut self.mechanism {
+            mechanism.scalars.offset_n += by_n;
+        }
+    }
+
     /// The table as borrowed slices, for [`study_wire::predict`].
     pub fn table(&self) -> TableView<'_> {
         TableView {

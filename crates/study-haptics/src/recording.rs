@@ -25,6 +25,10 @@ pub use write::{Columns, write};
 
 use std::io::BufRead;
 
+/// The largest deviation of an interval from the mean one, as a share of it, that is jitter and
+/// no gap.
+pub const JITTER: f64 = 0.75;
+
 /// A recording as columns, with the SHA-256 hash of the bytes it was read from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
@@ -83,6 +87,29 @@ impl Recording {
         range(&self.x_mm)
     }
 
+    /// Least and greatest force, N.
+    pub fn range_n(&self) -> [f64; 2] {
+        range(&self.f_n)
+    }
+
+    /// What 1 mm is in a switch with a travel of 10 to 100 mm, the length in which detents and
+    /// changes of the force are looked for: 1 mm there, otherwise about 1/32 of the travel.
+    pub fn scale_mm(&self) -> f64 {
+        let [low, high] = self.range_mm();
+        let travel_mm = high - low;
+        if (10.0..=100.0).contains(&travel_mm) {
+            return 1.0;
+        }
+        let least = travel_mm / 32.0;
+        let decade = 10.0_f64.powf(least.log10().floor());
+        let away = |digit: &f64| (least / (digit * decade)).ln().abs();
+        let nearest = |a: &f64, b: &f64| away(a).total_cmp(&away(b));
+        let digit = [1.0, 2.0, 5.0, 10.0].into_iter().min_by(nearest);
+        let scale_mm = digit.unwrap_or(1.0) * decade;
+        // as a person would write it
+        format!("{scale_mm:.0e}").parse().unwrap_or(scale_mm)
+    }
+
     /// The count of the encoder, mm, if at least half of the differences of x are whole
     /// multiples of one of them: a filtered position has none.
     pub fn resolution_mm(&self) -> Option<f64> {
@@ -127,7 +154,7 @@ pub enum Warning {
     },
     #[error("columns are separated by {0}")]
     Separated(&'static str),
-    /// Intervals longer than 1.5 median ones.
+    /// Intervals longer than 1.75 median ones, which jitter does not explain.
     #[error("{count} gap{} in time, the longest {longest_s:.4} s at {at_s:.4} s", if *.count == 1 { "" } else { "s" })]
     Gaps {
         count: usize,

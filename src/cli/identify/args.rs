@@ -152,7 +152,7 @@ pub(in crate::cli) struct Args {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = lambdas)]
     pub(super) lambda: Vec<Numbers>,
 
-    /// Resampling increments in mm: a list, or FROM:TO:STEP [default: 0.5,1; with --figures 11 values from 0.05 to 4]
+    /// Resampling increments in mm: a list, or FROM:TO:STEP [default: 0.5,1; with --figures 11 values from 0.05 to 4; in proportion if the travel is not 10 to 100 mm]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = increments)]
     pub(super) dx: Vec<Numbers>,
 
@@ -192,7 +192,7 @@ pub(in crate::cli) struct Args {
     #[arg(long, value_name = "F,DYNAMICS", value_delimiter = ',', value_parser = ridge, num_args = 2)]
     pub(super) ridge: Vec<f64>,
 
-    /// Terms of a passive table: f0 with any of m and b [default: m,b,f0]
+    /// Terms that are identified: f0 with any of m, b and, for ewls, constrained and two-sided, k [default: all]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
     pub(super) terms: Vec<Term>,
 
@@ -255,7 +255,9 @@ pub(super) enum Term {
     M,
     /// The damping
     B,
-    /// The force by position
+    /// The stiffness
+    K,
+    /// The force by position; in friction the Coulomb friction with an offset
     F0,
 }
 

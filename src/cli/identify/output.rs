@@ -272,7 +272,7 @@ pub(super) fn table(results: &Results<'_>) -> String {
     if p.units != Units::Linear {
         let _ = writeln!(
             out,
-            "angles in {} and torques in N·m; certificates and mechanisms in mm and N at {} mm",
+            "angles in {} and torques in N·m; certificates, mechanisms and warnings in mm and N at {} mm",
             p.x(),
             p.lever_mm
         );

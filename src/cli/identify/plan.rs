@@ -14,21 +14,16 @@ use study_haptics::identify::resample::Resample;
 const DEFAULT_LAMBDAS: [f64; 10] = [
     0.999, 0.9991, 0.9992, 0.9993, 0.9994, 0.9995, 0.9996, 0.9997, 0.9998, 0.9999,
 ];
-/// The best cell of the paper's grid and the increment of its study, mm.
-const DEFAULT_DX_MM: [f64; 2] = [0.5, 1.0];
-/// The range of the paper's Fig. 4, mm.
-const FIGURE_DX_MM: [f64; 11] = [0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0];
+/// The best cell of the paper's grid and the increment of its study, mm in a switch: multiples
+/// of the scale of the recording.
+const DEFAULT_DX: [f64; 2] = [0.5, 1.0];
+/// The range of the paper's Fig. 4, likewise.
+const FIGURE_DX: [f64; 11] = [0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0];
 
 impl Args {
-    /// The grid: every method with its options, and every dx.
+    /// The grid: every method with its options, and every dx that is given.
     pub(super) fn plan(&self) -> Result<Plan, Failure> {
         self.check_options_apply()?;
-        let dx_mm = match distinct(&self.dx) {
-            given if !given.is_empty() => given,
-            _ if self.method() == MethodName::Mechanism => vec![DEFAULT_DX_MM[0]],
-            _ if self.figures.is_some() => FIGURE_DX_MM.to_vec(),
-            _ => DEFAULT_DX_MM.to_vec(),
-        };
         let lambdas = match distinct(&self.lambda) {
             given if given.is_empty() => DEFAULT_LAMBDAS.to_vec(),
             given => given,
@@ -48,6 +43,7 @@ impl Args {
                         window: self.window.unwrap_or(Window::Tricube),
                         width,
                         bounded: self.bounds.unwrap_or(false),
+                        terms: self.kept(),
                     })
                 };
                 match self.width {
@@ -65,6 +61,7 @@ impl Args {
                 each_delta(&|delta| {
                     Method::Friction(Friction {
                         state: state(rule, delta),
+                        terms: self.kept(),
                     })
                 })
             }
@@ -75,7 +72,20 @@ impl Args {
             )],
             MethodName::Spring => vec![Method::Spring],
         };
+        let dx_mm = distinct(&self.dx);
         Ok(Plan { methods, dx_mm })
+    }
+
+    /// The increments without `--dx`, in a recording of this scale.
+    pub(super) fn default_dx_mm(&self, scale_mm: f64) -> Vec<f64> {
+        let of_switch: &[f64] = match self.method() {
+            MethodName::Mechanism => &DEFAULT_DX[..1],
+            _ if self.figures.is_some() => &FIGURE_DX,
+            _ => &DEFAULT_DX,
+        };
+        // 3 · 0.2 has to equal 0.6
+        let plain = |dx: f64| format!("{:.6e}", dx * scale_mm).parse().unwrap_or(dx);
+        of_switch.iter().map(|dx| plain(*dx)).collect()
     }
 
     fn ewls(&self, lambda: f64, bounded: bool) -> Method {
@@ -85,7 +95,18 @@ impl Args {
             start: self.start.unwrap_or(Start::Cold),
             sort: self.sort.unwrap_or(Sort::Ascending),
             bounded,
+            terms: self.kept(),
         })
+    }
+
+    /// The terms that are identified.
+    fn kept(&self) -> Terms {
+        let kept = |term| self.terms.is_empty() || self.terms.contains(&term);
+        Terms {
+            m: kept(Term::M),
+            b: kept(Term::B),
+            k: kept(Term::K),
+        }
     }
 
     /// The direction state of a table.
@@ -99,13 +120,7 @@ impl Args {
             state: self.table_state(delta),
             ridge_force: self.ridge.first().copied().unwrap_or(default.ridge_force),
             ridge_damping: self.ridge.get(1).copied().unwrap_or(default.ridge_damping),
-            terms: match self.terms.is_empty() {
-                true => default.terms,
-                false => Terms {
-                    m: self.terms.contains(&Term::M),
-                    b: self.terms.contains(&Term::B),
-                },
-            },
+            terms: self.kept(),
             huber: self.huber,
         })
     }
@@ -117,6 +132,7 @@ impl Args {
             ridge_force: self.ridge.first().copied().unwrap_or(default.ridge_force),
             ridge_dynamics: self.ridge.get(1).copied().unwrap_or(default.ridge_dynamics),
             bounded: self.bounds.unwrap_or(default.bounded),
+            terms: self.kept(),
         })
     }
 
@@ -130,6 +146,19 @@ impl Args {
         if !self.terms.is_empty() && !self.terms.contains(&Term::F0) {
             return Err(Failure::usage("--terms needs f0, the force by position")
                 .hint("without it: --method friction"));
+        }
+        if self.terms.contains(&Term::K)
+            && !matches!(self.method(), Ewls | Constrained | TwoSided | Mechanism)
+        {
+            return Err(Failure::usage(
+                "--terms: only ewls, constrained and two-sided have a stiffness k",
+            )
+            .hint("the others have a force by position, f0, whose slope it is"));
+        }
+        if !self.terms.is_empty() && self.method() == Mechanism {
+            return Err(Failure::usage("--terms does not apply to a mechanism").hint(
+                "none of its parts can be left out; a standard error shows which ones the recordings do not determine",
+            ));
         }
         let given: [(&str, bool, &[MethodName]); 12] = [
             ("--lambda", lambda, &[Ewls, Constrained, TwoSided]),
@@ -151,7 +180,11 @@ impl Args {
                 &[Hat, Passive, Friction],
             ),
             ("--delta", !self.delta.is_empty(), &[Hat, Passive, Friction]),
-            ("--terms", !self.terms.is_empty(), &[Passive]),
+            (
+                "--terms",
+                !self.terms.is_empty(),
+                &[Ewls, Constrained, TwoSided, Hat, Passive, Friction],
+            ),
             ("--huber", self.huber, &[Passive]),
             ("--ridge", !self.ridge.is_empty(), &[Hat, Passive]),
             ("--bounds", self.bounds.is_some(), &[TwoSided, Hat]),

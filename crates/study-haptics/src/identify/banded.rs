@@ -32,6 +32,13 @@ pub(super) enum Bound {
     Zero,
 }
 
+impl Bound {
+    /// Of a term that is not negative, or left out.
+    pub(super) fn of_term(kept: bool) -> Self {
+        if kept { Self::NotNegative } else { Self::Zero }
+    }
+}
+
 /// Block exchanges in a row that may fail to reduce the number of violations.
 const MAX_FAILED_EXCHANGES: usize = 3;
 /// Pivots below this share of their diagonal element are rounding errors.

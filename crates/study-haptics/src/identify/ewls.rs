@@ -8,7 +8,8 @@
 //! ```
 //!
 //! with φ = [a v x 1] and θ = [m b k F0], from θ = 0 and P = 10⁶ I (a "cold" start).
-//! Each sample gives one estimate θ. Only the upper triangle of P is computed, so P
+//! Each sample gives one estimate θ. A term that is left out starts with P = 0 and so
+//! stays 0. Only the upper triangle of P is computed, so P
 //! stays symmetric. P(0) = I would bias the first estimates; 10¹² costs six digits.
 //!
 //! Departures from the paper, all optional: a "warm" start takes θ and P from a
@@ -22,8 +23,8 @@
 
 use super::constrained;
 use super::lanes::recursion::{Run, Sums};
-use super::method::{Ewls, Sort, Start};
-use super::samples::{INITIAL_COVARIANCE, Samples, Theta};
+use super::method::{Ewls, Sort, Start, Terms};
+use super::samples::{Samples, Theta, initial_covariance};
 
 /// One estimate of θ per sample, in the order of `samples` whatever the order of the
 /// recursion. λ has to be in (0, 1]; `backward` says that these samples travelled
@@ -33,7 +34,7 @@ pub fn estimate(samples: &Samples, options: &Ewls, backward: bool) -> Vec<Theta>
         Sort::Travel if backward => samples.descending(),
         Sort::Travel | Sort::Ascending => (0..samples.len()).collect(),
     };
-    let mut recursion = Recursion::cold(options.lambda);
+    let mut recursion = Recursion::cold(options.lambda, options.terms);
     if options.start == Start::Warm {
         let first = warm_samples(options.lambda).min(order.len());
         for i in order[..first].iter().rev() {
@@ -58,12 +59,12 @@ pub fn estimate(samples: &Samples, options: &Ewls, backward: bool) -> Vec<Theta>
 /// No estimate is stored. `None` if a sum is not finite.
 pub(super) fn bounded_sums(
     samples: &Samples,
-    lambda: f64,
+    (lambda, terms): (f64, Terms),
     warm: usize,
     runs: &[Run],
     moments: bool,
 ) -> Option<Vec<Sums>> {
-    let mut recursion = Recursion::cold(lambda);
+    let mut recursion = Recursion::cold(lambda, terms);
     for i in (0..warm.min(samples.len())).rev() {
         recursion.pass(samples, i);
     }
@@ -106,10 +107,10 @@ struct Recursion {
 }
 
 impl Recursion {
-    fn cold(lambda: f64) -> Self {
+    fn cold(lambda: f64, terms: Terms) -> Self {
         let mut p = [[0.0; 4]; 4];
-        for (i, row) in p.iter_mut().enumerate() {
-            row[i] = INITIAL_COVARIANCE;
+        for (i, prior) in initial_covariance(terms).into_iter().enumerate() {
+            p[i][i] = prior;
         }
         Self {
             lambda,

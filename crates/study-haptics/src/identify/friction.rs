@@ -5,6 +5,7 @@
 //! equal parameters and passes its certificate by construction: S⁺ − S⁻ = 2 F_c.
 
 use super::banded::{Banded, Bound};
+use super::method::Terms;
 use super::samples::Theta;
 use super::vaf::motion;
 use crate::recording::Recording;
@@ -15,7 +16,11 @@ const UNKNOWNS: usize = 4;
 
 /// The parameters of either direction of least squared error; `None` if the recordings leave
 /// them undetermined.
-pub(super) fn parameters(recordings: &[&Recording], rule: Direction) -> Option<[Theta; 2]> {
+pub(super) fn parameters(
+    recordings: &[&Recording],
+    rule: Direction,
+    terms: Terms,
+) -> Option<[Theta; 2]> {
     let mut normal = Banded::zero(UNKNOWNS, UNKNOWNS - 1);
     let mut right = [0.0; UNKNOWNS];
     for recording in recordings {
@@ -33,8 +38,8 @@ pub(super) fn parameters(recordings: &[&Recording], rule: Direction) -> Option<[
         }
     }
     let bounds = [
-        Bound::NotNegative,
-        Bound::NotNegative,
+        Bound::of_term(terms.m),
+        Bound::of_term(terms.b),
         Bound::NotNegative,
         Bound::Free,
     ];

@@ -341,10 +341,12 @@ fn pass(
     let moments = runs.moments;
     let sums_over = |samples: &Samples, runs: &[Run]| -> Vec<Option<Vec<Sums>>> {
         if options.bounded {
-            let alone = |l: &f64| ewls::bounded_sums(samples, *l, warm(*l), runs, moments);
+            let alone =
+                |l: &f64| ewls::bounded_sums(samples, (*l, options.terms), warm(*l), runs, moments);
             lambdas.iter().map(alone).collect()
         } else {
-            recursion::sums(processor, samples, lambdas, warm, runs, moments)
+            let of = (lambdas, options.terms);
+            recursion::sums(processor, samples, of, warm, runs, moments)
         }
     };
     if !(backward && options.sort == Sort::Travel) {

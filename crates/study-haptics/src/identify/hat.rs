@@ -27,12 +27,13 @@ const B_SCALE: f64 = 60.0;
 /// Share of a node's information that keeps m and b at 0 where they are not excited.
 const FLOOR: f64 = 1e-12;
 
-/// Weights of the penalties and the bound on m and b.
+/// Weights of the penalties and the bounds on m and b.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Penalty {
     pub(super) ridge_force: f64,
     pub(super) ridge_dynamics: f64,
-    pub(super) dynamics: Bound,
+    /// Of m and of b.
+    pub(super) dynamics: [Bound; 2],
 }
 
 /// θ at the nodes and the weight of the samples behind each.
@@ -97,7 +98,8 @@ pub(super) fn table(
     let samples: usize = recordings.iter().map(|r| r.len()).sum();
     let information = samples as f64 / nodes.len() as f64;
     add_ridges(&mut normal, nodes.len(), information, penalty);
-    let of_node = [penalty.dynamics, penalty.dynamics, Bound::Free];
+    let [m, b] = penalty.dynamics;
+    let of_node = [m, b, Bound::Free];
     let bounds = of_node.repeat(n / 3);
     let x = normal.solve_bounded(&right, &bounds)?;
     if !x.iter().all(|value| value.is_finite()) {

@@ -13,6 +13,12 @@ use study_wire::predict::{Direction, Lookup};
 
 /// Least and greatest δ of the scan, as shares of the travel.
 const SCAN: [f64; 2] = [0.01, 0.25];
+/// The scan goes on below its least δ while each step reduces the error by more than this share …
+const FALLS: f64 = 0.01;
+/// … down to this share of the travel: for a table, whose friction over δ is a stiffness to the
+/// device, and for the friction model.
+const BELOW_TABLE: f64 = 0.002;
+const BELOW_FRICTION: f64 = 0.0005;
 /// Ratio of one δ of the scan to the one before.
 const STEP: f64 = std::f64::consts::SQRT_2;
 /// Golden sections of the neighbourhood of the best, to 1 % of it.
@@ -43,13 +49,15 @@ impl Training<'_> {
         let penalty = Penalty {
             ridge_force: options.ridge_force,
             ridge_dynamics: options.ridge_dynamics,
-            dynamics: if options.bounded {
-                Bound::NotNegative
-            } else {
-                Bound::Free
-            },
+            dynamics: [options.terms.m, options.terms.b].map(|kept| {
+                if kept && !options.bounded {
+                    Bound::Free
+                } else {
+                    Bound::of_term(kept)
+                }
+            }),
         };
-        let mut identified = self.with_state(options.state, |rule| {
+        let mut identified = self.with_state((options.state, BELOW_TABLE), |rule| {
             self.hat_with(nodes.clone(), lookup, rule, penalty)
         })?;
         identified.realization.provenance = Provenance {
@@ -81,7 +89,7 @@ impl Training<'_> {
                 .ok_or(IdentifyError::Undetermined)?;
             Ok(self.hats(nodes.clone(), [positive, negative], &weight, rule, lookup))
         };
-        let mut identified = self.with_state(options.state, |rule| {
+        let mut identified = self.with_state((options.state, BELOW_TABLE), |rule| {
             let mut identified = weighted(rule, None)?;
             for _ in 0..if options.huber { HUBER_STEPS } else { 0 } {
                 identified = weighted(rule, Some(&self.huber(&identified)))?;
@@ -103,8 +111,8 @@ impl Training<'_> {
     ) -> Result<Identified, IdentifyError> {
         let samples: usize = self.recordings.iter().map(|r| r.len()).sum();
         let weight = [[0.5 * samples as f64; 2]; 2];
-        let mut identified = self.with_state(options.state, |rule| {
-            let sides = friction::parameters(&self.recordings, rule)
+        let mut identified = self.with_state((options.state, BELOW_FRICTION), |rule| {
+            let sides = friction::parameters(&self.recordings, rule, options.terms)
                 .ok_or(IdentifyError::Undetermined)?
                 .map(|theta| vec![theta; 2]);
             Ok(self.hats(self.range_mm.to_vec(), sides, &weight, rule, lookup))
@@ -133,35 +141,39 @@ impl Training<'_> {
     /// The table with the given direction state, or with the δ that the scan finds.
     fn with_state(
         &self,
-        state: State,
+        (state, floor): (State, f64),
         table: impl Fn(Direction) -> Result<Identified, IdentifyError>,
     ) -> Result<Identified, IdentifyError> {
         match state {
             State::Sign => table(Direction::Sign),
             State::Play(Delta::Mm(mm)) | State::Dahl(Delta::Mm(mm)) => table(state.with(mm)),
             State::Play(Delta::Scan) | State::Dahl(Delta::Scan) => {
-                self.scan(|delta_mm| table(state.with(delta_mm)))
+                self.scan(floor, |delta_mm| table(state.with(delta_mm)))
             }
         }
     }
 
     /// The table with the shortest δ whose rms error on the recordings is within
     /// [`TOLERANCE`] of the least. Tried are lengths in a geometric series from 1/100 to
-    /// 1/4 of the travel, then golden sections around the best.
+    /// 1/4 of the travel, or below it, down to a share `floor` of it, while the error falls, then golden sections around the best.
     ///
     /// The error is flat in δ, and a longer δ also fits the slow reversals of this
     /// motion, which are not hysteresis; on other motions the shorter δ predicts better.
     fn scan(
         &self,
+        floor: f64,
         table: impl Fn(f64) -> Result<Identified, IdentifyError>,
     ) -> Result<Identified, IdentifyError> {
         let travel_mm = self.range_mm[1] - self.range_mm[0];
         let counts = (self.recordings.iter())
             .filter_map(|r| r.resolution_mm())
             .fold(0.0, f64::max);
-        let least_mm = (SCAN[0] * travel_mm)
-            .max(LEAST_COUNTS * counts)
-            .min(0.5 * SCAN[1] * travel_mm);
+        let at_least = |share: f64| {
+            (share * travel_mm)
+                .max(LEAST_COUNTS * counts)
+                .min(0.5 * SCAN[1] * travel_mm)
+        };
+        let least_mm = at_least(SCAN[0]);
         let most_mm = SCAN[1] * travel_mm;
         let attempt = |delta_mm: f64| -> Result<(f64, f64, Identified), IdentifyError> {
             let identified = table(delta_mm)?;
@@ -179,6 +191,11 @@ impl Training<'_> {
         let mut tried = (0..=steps)
             .map(|i| attempt(series(i)))
             .collect::<Result<Vec<_>, _>>()?;
+        let mut below = -1;
+        while tried[0].1 < (1.0 - FALLS) * tried[1].1 && series(below) >= at_least(floor) {
+            tried.insert(0, attempt(series(below))?);
+            below -= 1;
+        }
         let rms_n = |tried: &[(f64, f64, Identified)], i: usize| tried.get(i).map(|t| t.1);
         let least = |tried: &[(f64, f64, Identified)]| {
             (0..tried.len()).min_by(|a, b| tried[*a].1.total_cmp(&tried[*b].1))
@@ -243,7 +260,7 @@ impl Training<'_> {
             // only interpolates over segments without samples
             ridge_force: 1e-6,
             ridge_dynamics: 0.0,
-            dynamics: Bound::Zero,
+            dynamics: [Bound::Zero; 2],
         };
         let mut identified = self.hat_with(nodes, lookup, Direction::Sign, penalty)?;
         identified.realization.provenance = self.provenance(Method::Segments(options));

@@ -12,6 +12,8 @@ mod levenberg;
 mod objective;
 mod sensitivity;
 mod start;
+#[cfg(test)]
+mod tests;
 
 use super::signal::{LowPass, SignalError, sampling_interval_s};
 use super::{IdentifyError, Training, Warning};

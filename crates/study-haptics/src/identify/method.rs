@@ -141,10 +141,12 @@ pub struct Ewls {
     pub sort: Sort,
     /// Whether m, b ≥ 0 in every estimate.
     pub bounded: bool,
+    /// The terms that are estimated.
+    pub terms: Terms,
 }
 
 impl Ewls {
-    /// The method as published: cold start, ascending order, no bounds.
+    /// The method as published: cold start, ascending order, no bounds, all terms.
     pub fn paper(lambda: f64, resample: Resample) -> Self {
         Self {
             lambda,
@@ -152,6 +154,7 @@ impl Ewls {
             start: Start::Cold,
             sort: Sort::Ascending,
             bounded: false,
+            terms: Terms::default(),
         }
     }
 }
@@ -185,6 +188,8 @@ pub struct TwoSided {
     pub width: Width,
     /// Whether m, b ≥ 0 at every node.
     pub bounded: bool,
+    /// The terms that are estimated.
+    pub terms: Terms,
 }
 
 named! {
@@ -218,6 +223,8 @@ pub struct Hat {
     pub ridge_dynamics: f64,
     /// Whether m, b ≥ 0 at every node.
     pub bounded: bool,
+    /// Which of m and b the table has.
+    pub terms: Terms,
 }
 
 impl Default for Hat {
@@ -228,6 +235,7 @@ impl Default for Hat {
             ridge_force: 3e-3,
             ridge_dynamics: 5e-2,
             bounded: true,
+            terms: Terms::default(),
         }
     }
 }
@@ -244,6 +252,8 @@ pub struct Mechanism {
 pub struct Friction {
     /// The direction state, in identification and in prediction.
     pub state: State,
+    /// Which of m and b it has.
+    pub terms: Terms,
 }
 
 impl Default for Friction {
@@ -251,6 +261,7 @@ impl Default for Friction {
     fn default() -> Self {
         Self {
             state: State::Dahl(Delta::Scan),
+            terms: Terms::default(),
         }
     }
 }
@@ -283,19 +294,32 @@ impl Default for Passive {
     }
 }
 
-/// Which of the dynamic terms are identified; the others are 0.
+/// Which terms are identified beside the force by position; the others are 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Terms {
     /// The mass.
     pub m: bool,
     /// The damping.
     pub b: bool,
+    /// The stiffness, in the methods that estimate one.
+    pub k: bool,
 }
 
 impl Default for Terms {
-    /// Both.
+    /// All.
     fn default() -> Self {
-        Self { m: true, b: true }
+        Self {
+            m: true,
+            b: true,
+            k: true,
+        }
+    }
+}
+
+impl Terms {
+    /// Whether each entry of [`Theta`](super::Theta) is identified.
+    pub(super) fn kept(self) -> [bool; 4] {
+        [self.m, self.b, self.k, true]
     }
 }
 
@@ -363,14 +387,15 @@ impl fmt::Display for Method {
                 if options.sort != Sort::Ascending {
                     write!(f, " sort={}", options.sort.as_str())?;
                 }
-                Ok(())
+                terms(f, options.terms)
             }
             Self::TwoSided(options) => {
                 write!(f, " window={}", options.window.as_str())?;
                 if let Width::Mm(mm) = options.width {
                     write!(f, " width={mm}")?;
                 }
-                bounds(f, options.bounded)
+                bounds(f, options.bounded)?;
+                terms(f, options.terms)
             }
             Self::Hat(options) => {
                 write!(
@@ -379,7 +404,8 @@ impl fmt::Display for Method {
                     options.ridge_force, options.ridge_dynamics
                 )?;
                 scanned(f, options.state)?;
-                bounds(f, options.bounded)
+                bounds(f, options.bounded)?;
+                without_k(f, options.terms)
             }
             Self::Passive(options) => {
                 write!(
@@ -391,15 +417,13 @@ impl fmt::Display for Method {
                 if options.huber {
                     f.write_str(" huber")?;
                 }
-                match options.terms {
-                    Terms { m: true, b: true } => Ok(()),
-                    Terms { m: true, b: false } => f.write_str(" terms=m"),
-                    Terms { m: false, b: true } => f.write_str(" terms=b"),
-                    Terms { m: false, b: false } => f.write_str(" terms=f0"),
-                }
+                without_k(f, options.terms)
             }
             Self::Segments(options) => write!(f, " count={}", options.count),
-            Self::Friction(options) => scanned(f, options.state),
+            Self::Friction(options) => {
+                scanned(f, options.state)?;
+                without_k(f, options.terms)
+            }
             Self::Mechanism(options) => match options.recorded_hz {
                 Some(hz) => write!(f, " recorded={hz}"),
                 None => Ok(()),
@@ -414,6 +438,28 @@ fn scanned(f: &mut fmt::Formatter<'_>, state: State) -> fmt::Result {
         State::Play(Delta::Scan) | State::Dahl(Delta::Scan) => " delta=scan",
         _ => "",
     })
+}
+
+/// The terms of a method with a stiffness, if they are not all.
+fn terms(f: &mut fmt::Formatter<'_>, terms: Terms) -> fmt::Result {
+    listed(f, &[("m", terms.m), ("b", terms.b), ("k", terms.k)])
+}
+
+/// The terms of a method without a stiffness, if they are not all.
+fn without_k(f: &mut fmt::Formatter<'_>, terms: Terms) -> fmt::Result {
+    listed(f, &[("m", terms.m), ("b", terms.b)])
+}
+
+fn listed(f: &mut fmt::Formatter<'_>, terms: &[(&str, bool)]) -> fmt::Result {
+    if terms.iter().all(|(_, kept)| *kept) {
+        return Ok(());
+    }
+    let kept = terms.iter().filter(|(_, kept)| *kept);
+    let names: Vec<&str> = kept.map(|(name, _)| *name).collect();
+    match names.is_empty() {
+        true => f.write_str(" terms=f0"),
+        false => write!(f, " terms={}", names.join(",")),
+    }
 }
 
 fn bounds(f: &mut fmt::Formatter<'_>, bounded: bool) -> fmt::Result {
@@ -451,6 +497,7 @@ mod tests {
                 window: Window::Tricube,
                 width,
                 bounded: false,
+                terms: Terms::default(),
             })
         };
         let hat = |delta, ridge| {

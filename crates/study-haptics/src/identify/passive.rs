@@ -86,21 +86,14 @@ pub(super) fn table(
     let mean_square = (speed / samples).max(f64::MIN_POSITIVE);
     add_ridges(&mut normal, nodes.len(), information, mean_square, penalty);
     let terms = penalty.terms;
-    let bound = |kept: bool| {
-        if kept {
-            Bound::NotNegative
-        } else {
-            Bound::Zero
-        }
-    };
-    let mut bounds = [
+    let of_node = [
         Bound::Free,
         Bound::NotNegative,
-        bound(terms.b),
-        bound(terms.b),
-    ]
-    .repeat(nodes.len());
-    bounds.push(bound(terms.m));
+        Bound::of_term(terms.b),
+        Bound::of_term(terms.b),
+    ];
+    let mut bounds = of_node.repeat(nodes.len());
+    bounds.push(Bound::of_term(terms.m));
     normal.add(mass, mass, FLOOR * samples);
     let x = normal.solve_bounded(&right, &bounds)?;
     if !x.iter().all(|value| value.is_finite()) {

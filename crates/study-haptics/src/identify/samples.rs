@@ -1,5 +1,6 @@
 //! The samples of one direction of travel, and the parameter vector.
 
+use super::method::Terms;
 use crate::recording::{Recording, range};
 
 /// A parameter vector θ in the order m (kg), b (N·s/mm), k (N/mm), F0 (N).
@@ -8,6 +9,14 @@ pub type Theta = [f64; 4];
 /// P(0) of every recursion is this multiple of the identity matrix; its inverse is
 /// the prior of the direct solutions.
 pub(super) const INITIAL_COVARIANCE: f64 = 1e6;
+
+/// The diagonal of P(0): 0 for terms that are left out, which then stay 0.
+pub(super) fn initial_covariance(terms: Terms) -> [f64; 4] {
+    terms.kept().map(|kept| match kept {
+        true => INITIAL_COVARIANCE,
+        false => 0.0,
+    })
+}
 
 /// The samples of one direction of travel in ascending order of x; samples at the
 /// same x keep their order in time. All columns are equally long.

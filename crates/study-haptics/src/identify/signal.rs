@@ -19,7 +19,7 @@ pub use excitation::Excitation;
 pub use filter::LowPass;
 pub use thin::thin;
 
-use crate::recording::Recording;
+use crate::recording::{JITTER, Recording};
 
 /// A sampling interval may differ from the mean one by this share.
 const INTERVAL_TOLERANCE: f64 = 0.1;
@@ -83,13 +83,9 @@ pub fn sampling_interval_s(recording: &Recording) -> Result<f64, SignalError> {
     Ok(mean_s)
 }
 
-/// The largest deviation of an interval from the mean one that resampling bridges, as a
-/// share of the mean: sampling with jitter, but without gaps.
-const JITTER: f64 = 0.5;
-
 /// A recording with jitter, interpolated at even intervals by cubics through the samples,
 /// and the largest deviation of an interval from the mean one, s. `None` if it is even, or
-/// so uneven that samples are missing.
+/// so uneven ([`JITTER`]) that samples are missing.
 pub fn without_jitter(recording: &Recording) -> Option<(Recording, f64)> {
     let (t, n) = (&recording.t_s, recording.len());
     let mean_s = recording.duration_s() / (n - 1) as f64;

@@ -11,7 +11,7 @@
 //! the order of the samples does not change the table.
 
 use super::constrained;
-use super::method::Window;
+use super::method::{Terms, Window};
 use super::resample::{self, Resampled};
 use super::samples::{INITIAL_COVARIANCE, Samples, Theta};
 
@@ -30,7 +30,7 @@ pub fn at_nodes(
     nodes: &[f64],
     window: Window,
     l_mm: f64,
-    bounded: bool,
+    (bounded, terms): (bool, Terms),
 ) -> Option<Resampled> {
     let around = match window {
         Window::Exponential => exponential(samples, nodes, l_mm),
@@ -40,7 +40,7 @@ pub fn at_nodes(
         .iter()
         .zip(&around)
         .map(|(node, sums)| {
-            let [m, b, k, force] = sums.solve(bounded)?;
+            let [m, b, k, force] = sums.with(terms).solve(bounded)?;
             Some([m, b, k, force - k * node])
         })
         .collect();
@@ -85,6 +85,17 @@ impl Sums {
         }
         self.y[2] -= by_mm * self.y[3];
         self.scaled(factor)
+    }
+
+    /// Only the terms that are estimated: the prior keeps the others at 0.
+    fn with(mut self, terms: Terms) -> Self {
+        let left_out = (terms.kept().into_iter().enumerate()).filter(|(_, kept)| !kept);
+        for (i, _) in left_out {
+            self.r[i] = [0.0; 4];
+            self.r.iter_mut().for_each(|row| row[i] = 0.0);
+            self.y[i] = 0.0;
+        }
+        self
     }
 
     fn scaled(mut self, factor: f64) -> Self {
@@ -251,8 +262,16 @@ mod tests {
         let nodes: Vec<f64> = (0..=20).map(f64::from).collect();
         for window in [Window::Exponential, Window::Tricube] {
             for bounded in [false, true] {
-                let here = at_nodes(&samples(), &nodes, window, 0.8, bounded).unwrap();
-                let there = at_nodes(&mirrored(&samples()), &nodes, window, 0.8, bounded).unwrap();
+                let here =
+                    at_nodes(&samples(), &nodes, window, 0.8, (bounded, Terms::default())).unwrap();
+                let there = at_nodes(
+                    &mirrored(&samples()),
+                    &nodes,
+                    window,
+                    0.8,
+                    (bounded, Terms::default()),
+                )
+                .unwrap();
                 for (j, node) in nodes.iter().enumerate() {
                     let (t, u) = (here.theta[j], there.theta[20 - j]);
                     for i in 0..3 {
@@ -275,7 +294,14 @@ mod tests {
         let options = Ewls::paper(lambda, resample::Resample::Point);
         let recursion = *ewls::estimate(&s, &options, false).last().unwrap();
         let l_mm = -0.01 / lambda.ln();
-        let both = at_nodes(&s, &[node], Window::Exponential, l_mm, false).unwrap();
+        let both = at_nodes(
+            &s,
+            &[node],
+            Window::Exponential,
+            l_mm,
+            (false, Terms::default()),
+        )
+        .unwrap();
         for (one, other) in both.theta[0].iter().zip(recursion) {
             assert!((one - other).abs() < 1e-5, "{both:?} {recursion:?}");
         }
@@ -291,11 +317,18 @@ mod tests {
             column.retain(|_| *kept.next().unwrap());
         }
         for window in [Window::Exponential, Window::Tricube] {
-            let at = at_nodes(&s, &[3.0, 10.0, 17.0], window, 0.3, false).unwrap();
+            let at = at_nodes(
+                &s,
+                &[3.0, 10.0, 17.0],
+                window,
+                0.3,
+                (false, Terms::default()),
+            )
+            .unwrap();
             assert_eq!(at.filled, 1, "{window:?}");
             let middle = 0.5 * (at.theta[0][3] + at.theta[2][3]);
             assert!((at.theta[1][3] - middle).abs() < 1e-12);
-            assert!(at_nodes(&s, &[10.0], window, 0.3, false).is_none());
+            assert!(at_nodes(&s, &[10.0], window, 0.3, (false, Terms::default())).is_none());
         }
     }
 }

@@ -10,26 +10,25 @@
 //! 1 − ½ var(F₁ − F₂) / var(F₁).
 //!
 //! A detent is the range between two crests, where the static force falls through
-//! zero. Crests are found in the mean of the static profiles of both directions, so a
+//! zero. Crests are found in the mean of the static profiles of both directions, in bins of
+//! [`Recording::scale_mm`], so a
 //! recording of one direction has none.
 
 use super::vaf;
 use crate::model::Realization;
-use crate::recording::{Recording, mean_and_variance};
+use crate::recording::{Recording, mean_and_variance, range};
 
 /// The just noticeable difference in force, N.
 pub const JUST_NOTICEABLE_N: f64 = 0.1;
 
-/// Bin width of the profile in which crests are found, mm.
-const PROFILE_MM: f64 = 1.0;
-
-/// The force of a crest or valley has to exceed this, N: above the noise of friction,
-/// far below a detent.
+/// The force of a crest or valley has to exceed this, N, and this share of its range: above the
+/// noise of friction, far below a detent.
 const CROSSING_N: f64 = 0.3;
+const CROSSING: f64 = 0.01;
 
-/// Recordings whose positions differ by more than this, mm rms, are not of the same
-/// trajectory.
-const SAME_TRAJECTORY_MM: f64 = 0.5;
+/// Recordings whose positions differ by more than this rms, in units of
+/// [`Recording::scale_mm`], are not of the same trajectory.
+const SAME_TRAJECTORY: f64 = 0.5;
 
 /// The accuracy of a prediction over some samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -114,28 +113,31 @@ pub fn validate(
 /// Empty if there is no crest.
 pub fn detents(recording: &Recording) -> Vec<[f64; 2]> {
     let [low, high] = recording.range_mm();
-    let bins = ((high - low) / PROFILE_MM).ceil().min(1e6) as usize;
+    let profile_mm = recording.scale_mm();
+    let [least_n, most_n] = range(&recording.f_n);
+    let crossing_n = CROSSING_N.max(CROSSING * (most_n - least_n));
+    let bins = ((high - low) / profile_mm).ceil().min(1e6) as usize;
     // Σ F and number of samples, for each direction
     let mut sums = vec![[(0.0, 0.0); 2]; bins.max(1)];
     for i in 0..recording.len() {
         let v = recording.v_mm_s[i];
         if v != 0.0 {
             // the highest x belongs to the last bin
-            let bin = (((recording.x_mm[i] - low) / PROFILE_MM) as usize).min(sums.len() - 1);
+            let bin = (((recording.x_mm[i] - low) / profile_mm) as usize).min(sums.len() - 1);
             let of = &mut sums[bin][usize::from(v < 0.0)];
             *of = (of.0 + recording.f_n[i], of.1 + 1.0);
         }
     }
     let mut crests = Vec::new();
-    // whether the force of the last bin above CROSSING_N was positive, and its position
+    // whether the force of the last bin above crossing_n was positive, and its position
     let mut last: Option<(bool, f64)> = None;
     for (bin, [plus, minus]) in sums.iter().enumerate() {
         if plus.1 == 0.0 || minus.1 == 0.0 {
             continue;
         }
-        let at = low + (bin as f64 + 0.5) * PROFILE_MM;
+        let at = low + (bin as f64 + 0.5) * profile_mm;
         let force = 0.5 * (plus.0 / plus.1 + minus.0 / minus.1);
-        if force.abs() < CROSSING_N {
+        if force.abs() < crossing_n {
             continue;
         }
         if let Some((true, before)) = last
@@ -214,7 +216,8 @@ pub fn ceiling(recording: &Recording, repeat: &Recording) -> Option<Ceiling> {
     let apart_mm = (apart / overlap).sqrt();
     let noise = 0.5 * mean_and_variance(&differences).1;
     let (_, variance) = mean_and_variance(&forces);
-    (apart_mm <= SAME_TRAJECTORY_MM && variance > 0.0).then(|| Ceiling {
+    let most_mm = SAME_TRAJECTORY * recording.scale_mm();
+    (apart_mm <= most_mm && variance > 0.0).then(|| Ceiling {
         vaf: 1.0 - noise / variance,
         noise_n: noise.sqrt(),
         apart_mm,

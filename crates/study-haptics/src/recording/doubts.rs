@@ -14,6 +14,9 @@ const REACH: usize = 3;
 /// So many samples in a row at the highest or lowest value are saturation; a smooth peak has
 /// fewer that are equal.
 const FLAT_RUN: usize = 5;
+/// A position that moves by more than this share of its range from sample to sample says
+/// nothing of cycles.
+const COARSE: f64 = 0.2;
 /// Less energy per path than this share of the range of the force may be noise.
 const ENERGY_SHARE: f64 = 0.005;
 
@@ -106,7 +109,8 @@ pub struct Energy {
 
 impl Recording {
     /// The energy from the first sample to the last one at the same position and direction;
-    /// `None` if there is no closed cycle.
+    /// `None` if there is no closed cycle, or too few samples in it. Around a cycle a constant
+    /// force does no work; its middle is left out, because no cycle of samples closes exactly.
     pub fn energy(&self) -> Option<Energy> {
         let x = &self.x_mm;
         let start = x[0];
@@ -117,13 +121,18 @@ impl Recording {
             .rev()
             .filter(crossing)
             .find(|i| (x[*i] > x[i - 1]) == upwards)?;
+        let [low, high] = range(&self.f_n);
+        let middle = 0.5 * low + 0.5 * high;
         let (mut energy, mut path_mm) = (0.0, 0.0);
         for i in 1..=last {
             let dx = x[i] - x[i - 1];
-            energy += 0.5 * (self.f_n[i] + self.f_n[i - 1]) * dx;
+            energy += (0.5 * (self.f_n[i] - middle) + 0.5 * (self.f_n[i - 1] - middle)) * dx;
             path_mm += dx.abs();
         }
-        let [low, high] = range(&self.f_n);
+        let [left, right] = range(x);
+        if path_mm > COARSE * (right - left) * last as f64 {
+            return None;
+        }
         Some(Energy {
             supplied_j: 1e-3 * energy,
             path_mm,
@@ -204,6 +213,18 @@ mod tests {
         let flipped = recording(-1.0).energy().unwrap();
         assert!(flipped.negative);
         assert!((flipped.supplied_j + right.supplied_j).abs() < 1e-12);
+    }
+
+    /// Cycles of samples do not close exactly, and ten samples are no cycle.
+    #[test]
+    fn an_offset_of_the_force_does_no_work_and_few_samples_are_no_evidence() {
+        let right = recording(1.0);
+        let mut far = right.clone();
+        far.f_n.iter_mut().for_each(|f| *f -= 1e8);
+        let difference = far.energy().unwrap().supplied_j - right.energy().unwrap().supplied_j;
+        assert!(difference.abs() < 1e-6, "{difference}");
+        let few: Vec<usize> = (0..10).map(|i| 290 * i).collect();
+        assert_eq!(recording(-1.0).select(&few).energy(), None);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::differences::{acceleration, velocity};
 use super::rows::Rows;
 use super::swapped::swapped;
-use super::{Recording, RecordingError, RecordingFault, Warning, range};
+use super::{JITTER, Recording, RecordingError, RecordingFault, Warning, range};
 
 /// A smaller stroke, in mm, must have been written in metres.
 const MIN_STROKE_MM: f64 = 0.1;
@@ -79,7 +79,7 @@ fn is_constant(values: &[f64]) -> bool {
     values.windows(2).all(|pair| pair[0] == pair[1])
 }
 
-/// A warning about intervals longer than 1.5 median ones.
+/// A warning about intervals longer than jitter makes them.
 fn gaps(t: &[f64]) -> Option<Warning> {
     // from evenly chosen intervals, so that memory does not grow with the recording
     let every = (t.len() / INTERVALS).max(1);
@@ -92,7 +92,7 @@ fn gaps(t: &[f64]) -> Option<Warning> {
     let (mut count, mut longest_s, mut at_s) = (0, 0.0, 0.0);
     for pair in t.windows(2) {
         let interval = pair[1] - pair[0];
-        if interval > 1.5 * median {
+        if interval > (1.0 + JITTER) * median {
             count += 1;
             if interval > longest_s {
                 (longest_s, at_s) = (interval, pair[0]);

@@ -13,7 +13,8 @@
 //! are ill-conditioned). Only the sums are stored.
 
 use super::{Lane, Processor, WIDTH};
-use crate::identify::samples::{INITIAL_COVARIANCE, Samples, Theta};
+use crate::identify::method::Terms;
+use crate::identify::samples::{Samples, Theta, initial_covariance};
 
 /// Number of samples between rescalings of Q.
 const RESCALE: usize = 64;
@@ -51,18 +52,19 @@ pub struct Sums {
 pub fn sums(
     processor: Processor,
     samples: &Samples,
-    lambdas: &[f64],
+    (lambdas, terms): (&[f64], Terms),
     warm: impl Fn(f64) -> usize,
     runs: &[Run],
     moments: bool,
 ) -> Vec<Option<Vec<Sums>>> {
-    let mut states: Vec<State> = lambdas.chunks(WIDTH).map(State::cold).collect();
+    let cold = |lambdas| State::cold(lambdas, terms);
+    let mut states: Vec<State> = lambdas.chunks(WIDTH).map(cold).collect();
     let mut sums = vec![LaneSums::ZERO; states.len() * runs.len()];
     // each λ has its own number of samples to go back over: one at a time
     for (i, lambda) in lambdas.iter().enumerate() {
         let first = warm(*lambda).min(samples.len());
         if first > 0 {
-            let mut alone = State::cold(&[*lambda]);
+            let mut alone = State::cold(&[*lambda], terms);
             back(processor, samples, first, &mut alone);
             states[i / WIDTH].copy_lane(i % WIDTH, &alone);
         }
@@ -131,11 +133,11 @@ impl LaneSums {
 
 impl State {
     /// From at most four λ; the last one fills unused lanes.
-    fn cold(lambdas: &[f64]) -> Self {
+    fn cold(lambdas: &[f64], terms: Terms) -> Self {
         let lambda = Lane(std::array::from_fn(|i| lambdas[i.min(lambdas.len() - 1)]));
         let mut q = [Lane::ZERO; 10];
-        for i in 0..4 {
-            q[UPPER[i][i]] = Lane::all(INITIAL_COVARIANCE);
+        for (i, prior) in initial_covariance(terms).into_iter().enumerate() {
+            q[UPPER[i][i]] = Lane::all(prior);
         }
         Self {
             q,

@@ -20,6 +20,8 @@ const RIDGE: [f64; 2] = [1e-5, 1e-4];
 /// in a row.
 const SMALL: f64 = 2e-4;
 const SMALL_STEPS: usize = 3;
+/// Standard errors of fewer stretches than this are not worth printing.
+const LEAST_STRETCHES: f64 = 10.0;
 /// λ at the start and beyond which no step helps.
 const LAMBDA: [f64; 2] = [1e-2, 1e8];
 
@@ -96,6 +98,7 @@ fn cost(mechanism: &Mechanism, on: &[Compared<'_>], hz: f64, layout: Layout) -> 
         errors,
         normal: vec![0.0; parameters.len() * parameters.len()],
         gradient: vec![0.0; parameters.len()],
+        scores: Vec::new(),
     };
     add_ridges(&mut sum, &parameters, layout);
     sum.square
@@ -181,7 +184,7 @@ pub(super) fn fit(
         step_done();
     }
     Some(Fit {
-        standard_errors: standard_errors(&sum, data, &pack(&best), bound),
+        standard_errors: standard_errors(&sum, &pack(&best), bound),
         mechanism: best,
         rms_n: (data.0 / data.1 as f64).sqrt(),
         iterations: done,
@@ -260,32 +263,35 @@ fn solve(
     step.iter().all(|v| v.is_finite()).then_some(step)
 }
 
-/// Standard errors of the scalars that are not at a bound, from the normal matrix and the
-/// error of `n` samples that are nearly independent, being four per period of the low-pass
-/// of whose gain half remains: half of them are counted.
+/// Standard errors of the scalars that are not at a bound: A⁻¹ (Σ g gᵀ) A⁻¹ with the normal
+/// matrix A and the gradients g of stretches of the recordings, within which errors may be
+/// correlated and differ in size (White 1980; Liang & Zeger 1986). Errors of a fit are smaller
+/// than those around the truth, so that the sum is multiplied by n/(n − 1) for the stretches
+/// and by N/(N − p) for the samples.
 fn standard_errors(
     sum: &Sum,
-    (square, n): (f64, usize),
     parameters: &[f64],
     bound: impl Fn(usize) -> f64,
 ) -> [Option<f64>; SCALARS] {
     let all = parameters.len();
-    let at_bound: Vec<bool> = (0..all).map(|i| parameters[i] <= bound(i)).collect();
     // a trace of damping, so that one flat direction leaves the others an inverse
     let (a, ..) = model(sum, parameters, &bound, 1e-10);
-    let free: Vec<bool> = at_bound.iter().map(|held| !held).collect();
-    let used = free.iter().filter(|free| **free).count();
-    let independent = 0.5 * n as f64;
+    let free: Vec<bool> = (0..all).map(|i| parameters[i] > bound(i)).collect();
+    let used = free.iter().filter(|free| **free).count() as f64;
+    // of the samples that count, four per period of the corner, about half are independent
+    let (stretches, samples) = (sum.scores.len() as f64, 0.5 * sum.errors as f64);
+    let known = stretches >= LEAST_STRETCHES && samples > used;
+    let spread = stretches / (stretches - 1.0) * samples / (samples - used);
     std::array::from_fn(|i| {
-        if at_bound[i] || sum.normal[i * all + i] <= 0.0 || independent <= used as f64 {
+        if !(known && free[i]) || sum.normal[i * all + i] <= 0.0 {
             return None;
         }
         let mut unit = vec![0.0; all];
         unit[i] = 1.0;
-        let variance = a.solve(&unit, &free)?[i];
-        // each counted sample stands for two of the sum
-        let of_error = square / n as f64 * independent / (independent - used as f64);
-        let error = (2.0 * of_error * variance).sqrt();
+        let row = a.solve(&unit, &free)?;
+        let moved = |score: &Vec<f64>| -> f64 { row.iter().zip(score).map(|(r, g)| r * g).sum() };
+        let square: f64 = sum.scores.iter().map(|g| moved(g).powi(2)).sum();
+        let error = (spread * square).sqrt();
         error.is_finite().then_some(error)
     })
 }

@@ -10,6 +10,9 @@ use study_wire::mechanism::{MechanismView, State};
 const COMPARED_HZ: f64 = 1000.0;
 /// Of the low-passed error at least this many samples per period of the corner count.
 const PER_PERIOD: f64 = 4.0;
+/// Errors within this time of each other may be correlated, s: by the low-pass, by noise that
+/// is not white, and by what the mechanism does not explain at one place.
+const CORRELATED_S: f64 = 0.5;
 /// Time from the start of a recording that does not count, because the state of the
 /// mechanism is unknown there, s.
 const SETTLING_S: f64 = 0.2;
@@ -59,6 +62,8 @@ pub(super) struct Sum {
     /// JᵀJ, row by row, and Jᵀe with the error F̂ − F.
     pub(super) normal: Vec<f64>,
     pub(super) gradient: Vec<f64>,
+    /// Jᵀe of each stretch of [`CORRELATED_S`].
+    pub(super) scores: Vec<Vec<f64>>,
 }
 
 impl<'r> Compared<'r> {
@@ -174,11 +179,22 @@ impl<'r> Compared<'r> {
                 normal[j * parameters + i] = product;
             }
         }
+        let counted_hz = 1.0 / (self.interval_s * (self.block * self.stride) as f64);
+        let stretch = ((CORRELATED_S * counted_hz) as usize).max(1);
+        let scores = (0..errors.len())
+            .step_by(stretch)
+            .map(|from| {
+                let to = (from + stretch).min(errors.len());
+                let of = |column: &Vec<f64>| dot(&column[from..to], &errors[from..to]);
+                columns.iter().map(of).collect()
+            })
+            .collect();
         Sum {
             square: dot(&errors, &errors),
             errors: errors.len(),
             normal,
             gradient,
+            scores,
         }
     }
 }
@@ -187,6 +203,7 @@ impl Sum {
     pub(super) fn add(&mut self, other: &Self) {
         self.square += other.square;
         self.errors += other.errors;
+        self.scores.extend_from_slice(&other.scores);
         for (a, b) in self.normal.iter_mut().zip(&other.normal) {
             *a += b;
         }

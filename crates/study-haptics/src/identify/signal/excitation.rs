@@ -9,8 +9,6 @@
 
 use crate::recording::{Recording, range};
 
-/// Width of a window, mm.
-pub const WINDOW_MM: f64 = 1.0;
 /// Condition number above which parameters are not identifiable.
 pub const ILL_CONDITIONED: f64 = 100.0;
 /// Windows with fewer samples are left out.
@@ -39,14 +37,17 @@ pub struct Window {
 pub struct Excitation {
     /// The windows with at least 20 samples.
     pub windows: Vec<Window>,
+    /// Their width, mm: [`Recording::scale_mm`].
+    pub window_mm: f64,
 }
 
 impl Excitation {
-    /// Analyzes a recording in windows of [`WINDOW_MM`].
+    /// Analyzes a recording in windows of [`Recording::scale_mm`].
     pub fn of(recording: &Recording) -> Self {
         let [low, high] = recording.range_mm();
-        let first = (low / WINDOW_MM).floor();
-        let count = ((high / WINDOW_MM).floor() - first + 1.0).min(MAX_WINDOWS);
+        let window_mm = recording.scale_mm();
+        let first = (low / window_mm).floor();
+        let count = ((high / window_mm).floor() - first + 1.0).min(MAX_WINDOWS);
         // at most MAX_WINDOWS, so the cast is exact
         let mut sums = vec![[Gram::default(); 2]; count as usize];
         for i in 0..recording.len() {
@@ -54,18 +55,18 @@ impl Excitation {
             if v == 0.0 {
                 continue;
             }
-            let index = (x / WINDOW_MM).floor() - first;
+            let index = (x / window_mm).floor() - first;
             let Some(window) = sums.get_mut(index as usize) else {
                 continue;
             };
-            let centre = (first + index + 0.5) * WINDOW_MM;
+            let centre = (first + index + 0.5) * window_mm;
             window[usize::from(v < 0.0)].add([recording.a_m_s2[i], v, x - centre, 1.0]);
         }
         let windows = sums
             .iter()
             .enumerate()
             .flat_map(|(index, both)| {
-                let x_mm = (first + index as f64 + 0.5) * WINDOW_MM;
+                let x_mm = (first + index as f64 + 0.5) * window_mm;
                 [(true, both[0]), (false, both[1])].map(|(positive, gram)| Window {
                     x_mm,
                     positive,
@@ -75,7 +76,7 @@ impl Excitation {
             })
             .filter(|window| window.samples >= MIN_SAMPLES)
             .collect();
-        Self { windows }
+        Self { windows, window_mm }
     }
 
     /// The median of the condition numbers; `None` without windows.

@@ -1,0 +1,110 @@
+//! Whether the standard errors are those of repeated recordings.
+
+#![allow(clippy::unwrap_used, reason = "a test that fails says where")]
+
+use super::objective::Compared;
+use super::{Filter, PARAMETERS, levenberg, predict};
+use crate::identify::signal::LowPass;
+use crate::model::{Mechanism, Profile};
+use crate::recording::Recording;
+use rayon::prelude::*;
+use std::f64::consts::TAU;
+use study_base::rng::Stream;
+use study_wire::mechanism::{SCALARS, Scalars};
+
+const STEPS_HZ: f64 = 2000.0;
+const RATE_HZ: f64 = 1000.0;
+const CORNER_HZ: f64 = 30.0;
+
+fn truth() -> Mechanism {
+    Mechanism {
+        scalars: Scalars::from_array([
+            0.1, 0.14, 15.0, 0.012, 0.8, 0.006, 0.06, 0.35, 8.0, 0.25, 0.07, 0.001, 0.1,
+        ]),
+        detent: Profile {
+            first_mm: -7.0,
+            step_mm: 1.0,
+            n: (-7..=7).map(|i| 4.0 * (f64::from(i) * 0.8).sin()).collect(),
+        },
+        friction: Profile {
+            first_mm: -7.0,
+            step_mm: 7.0,
+            n: vec![1.2, 0.9, 1.4],
+        },
+        recorded_hz: None,
+    }
+}
+
+/// Twelve seconds of two sines, and the low-passed force of the mechanism.
+fn recording() -> Recording {
+    let sines = [(4.0, 0.7, 0.0), (2.0, 3.1, 1.0)];
+    let sum = |of: &dyn Fn(f64, f64, f64) -> f64| -> f64 {
+        sines
+            .iter()
+            .map(|(mm, hz, lag)| of(*mm, TAU * hz, *lag))
+            .sum()
+    };
+    let all = 0..12_000;
+    let t_s: Vec<f64> = all.map(|i| f64::from(i) / RATE_HZ).collect();
+    let each = |of: &dyn Fn(f64) -> f64| t_s.iter().map(|t| of(*t)).collect::<Vec<f64>>();
+    let mut recording = Recording {
+        name: "r".into(),
+        x_mm: each(&|t| sum(&|mm, w, lag| mm * (w * t + lag).sin())),
+        v_mm_s: each(&|t| sum(&|mm, w, lag| mm * w * (w * t + lag).cos())),
+        a_m_s2: each(&|t| sum(&|mm, w, lag| -1e-3 * mm * w * w * (w * t + lag).sin())),
+        f_n: Vec::new(),
+        t_s,
+        header: Vec::new(),
+        sha256: String::new(),
+        warnings: Vec::new(),
+    };
+    let force_n = predict(&truth().view(), &recording, recording.len(), STEPS_HZ);
+    recording.f_n = LowPass::new(CORNER_HZ, RATE_HZ)
+        .unwrap()
+        .zero_phase(&force_n);
+    recording
+}
+
+/// 0.05 N of noise with a correlation time of 50 ms, twelve times that of the samples that
+/// count: standard errors that took them as independent would be 2.5 times too small.
+fn noisy(clean: &Recording, seed: u64) -> Recording {
+    let mut noise = Stream::new(seed, &["standard errors"]);
+    let (keep, mut state) = ((-1.0 / (0.05 * RATE_HZ)).exp(), 0.0);
+    let mut next = || {
+        state = keep * state + (1.0 - keep * keep).sqrt() * 0.05 * noise.normal();
+        state
+    };
+    Recording {
+        f_n: clean.f_n.iter().map(|f| f + next()).collect(),
+        ..clean.clone()
+    }
+}
+
+#[test]
+fn standard_errors_are_the_spread_of_repeated_recordings_under_correlated_noise() {
+    let clean = recording();
+    let fits: Vec<([f64; SCALARS], [f64; SCALARS])> = (0..24_u64)
+        .into_par_iter()
+        .map(|seed| {
+            let recording = noisy(&clean, seed);
+            let compared = Compared::new(&recording, Filter::Recorded(CORNER_HZ), 99.0).unwrap();
+            let on = [compared];
+            let fit = levenberg::fit(&truth(), &on, STEPS_HZ, 6, 100.0, &|| ()).unwrap();
+            let errors = fit.standard_errors.map(|error| error.unwrap());
+            (fit.mechanism.scalars.to_array(), errors)
+        })
+        .collect();
+    let n = fits.len() as f64;
+    let mut product = 1.0;
+    for (i, (name, ..)) in PARAMETERS.iter().enumerate() {
+        let mean = fits.iter().map(|(p, _)| p[i]).sum::<f64>() / n;
+        let square = fits.iter().map(|(p, _)| (p[i] - mean).powi(2)).sum::<f64>();
+        let error = fits.iter().map(|(_, e)| e[i]).sum::<f64>() / n;
+        let ratio = (square / (n - 1.0)).sqrt() / error;
+        // of 24 recordings: a standard deviation has an error of 15 %
+        assert!((0.5..2.0).contains(&ratio), "{name}: {ratio}");
+        product *= ratio;
+    }
+    let geometric = product.powf(1.0 / PARAMETERS.len() as f64);
+    assert!((0.8..1.25).contains(&geometric), "{geometric}");
+}

@@ -1,0 +1,145 @@
+//! Terms that are left out, and the scan of δ below its usual range.
+
+#![allow(clippy::unwrap_used, reason = "a test that fails says where")]
+
+use crate::estimators_tables::{identified, motion, target};
+use study_haptics::identify::grid::{self, Plan};
+use study_haptics::identify::method::{
+    Ewls, Friction, Hat, Passive, Start, Terms, TwoSided, Width, Window,
+};
+use study_haptics::identify::resample::Resample;
+use study_haptics::identify::{Method, Training};
+use study_wire::predict::{Direction, DirectionState, Lookup, Motion};
+
+/// Terms that are left out are 0, and the file says so.
+#[test]
+fn a_passive_table_has_only_the_terms_that_are_asked_for() {
+    let r = target("r", 10, 0.1);
+    let with = |m, b| {
+        let method = Method::Passive(Passive {
+            terms: Terms { m, b, k: true },
+            ..Passive::default()
+        });
+        identified(&r, method, 1.0).realization
+    };
+    let all_zero = |of: &[f64]| of.iter().all(|v| *v == 0.0);
+    let bare = with(false, false);
+    assert!(all_zero(&bare.positive.m_kg) && all_zero(&bare.negative.b_n_s_per_mm));
+    assert!(bare.provenance.method.ends_with("terms=f0"));
+    let damped = with(false, true);
+    assert!(all_zero(&damped.negative.m_kg) && damped.provenance.method.ends_with("terms=b"));
+}
+
+/// The paper's recursion without forgetting, with damping and a constant force only, is the
+/// straight line of the force over the speed.
+#[test]
+fn a_recursion_without_mass_and_stiffness_is_the_regression_on_the_speed() {
+    let r = target("r", 10, 0.1);
+    let options = Ewls {
+        terms: Terms {
+            m: false,
+            b: true,
+            k: false,
+        },
+        ..Ewls::paper(1.0, Resample::Point)
+    };
+    let estimates = Training::new(&r).unwrap().estimates(options).unwrap();
+    let rows: Vec<[f64; 2]> = (0..r.len())
+        .filter(|i| r.v_mm_s[*i] > 0.0)
+        .map(|i| [r.v_mm_s[i], r.f_n[i]])
+        .collect();
+    let mean = |of: &dyn Fn(&[f64; 2]) -> f64| rows.iter().map(of).sum::<f64>() / rows.len() as f64;
+    let (v, f) = (mean(&|row| row[0]), mean(&|row| row[1]));
+    let product = mean(&|row| (row[0] - v) * (row[1] - f));
+    let b = product / mean(&|row| (row[0] - v).powi(2));
+    let [m, found, k, f0] = *estimates.positive.last().unwrap();
+    assert_eq!([m, k], [0.0, 0.0]);
+    assert!((found - b).abs() < 1e-6 * b.abs(), "{found} {b}");
+    assert!((f0 - (f - b * v)).abs() < 1e-5, "{f0}");
+}
+
+/// Every method leaves out what it is told to, and a grid gives the tables of one cell.
+#[test]
+fn a_term_that_is_left_out_is_0_at_every_node_of_every_method() {
+    let r = target("r", 10, 0.1);
+    let training = Training::new(&r).unwrap();
+    let terms = Terms {
+        m: false,
+        b: true,
+        k: false,
+    };
+    let of = |change: &dyn Fn(&mut Ewls)| {
+        let mut options = Ewls {
+            terms,
+            ..Ewls::paper(0.99, Resample::Hat)
+        };
+        change(&mut options);
+        Method::Ewls(options)
+    };
+    let methods = [
+        of(&|_| ()),
+        of(&|options| options.bounded = true),
+        of(&|options| options.start = Start::Warm),
+        Method::TwoSided(TwoSided {
+            window: Window::Tricube,
+            width: Width::Mm(0.5),
+            bounded: true,
+            terms,
+        }),
+        Method::Hat(Hat {
+            terms,
+            ..Hat::default()
+        }),
+        Method::Friction(Friction {
+            terms,
+            ..Friction::default()
+        }),
+    ];
+    for method in methods {
+        let alone = identified(&r, method, 1.0).realization;
+        let plan = Plan {
+            methods: vec![method],
+            dx_mm: vec![1.0],
+        };
+        let cells = grid::run(&training, &plan, Lookup::Linear, &[], || ()).unwrap();
+        for (one, other) in [
+            (&alone.positive, &cells[0].realization.positive),
+            (&alone.negative, &cells[0].realization.negative),
+        ] {
+            let out = one.m_kg.iter().chain(&one.k_n_per_mm);
+            assert!(out.copied().all(|p| p == 0.0), "{method}: {one:?}");
+            assert!(one.b_n_s_per_mm.iter().any(|b| *b != 0.0), "{method}");
+            let forces = one.f0_n.iter().zip(&other.f0_n);
+            assert!(
+                forces.clone().all(|(a, b)| (a - b).abs() < 1e-6),
+                "{method}"
+            );
+            let out = other.m_kg.iter().chain(&other.k_n_per_mm);
+            assert!(out.copied().all(|p| p == 0.0), "{method}: {other:?}");
+        }
+        let name = alone.provenance.method;
+        assert!(name.ends_with(" terms=b"), "{name}");
+    }
+}
+
+/// A presliding far below 1/100 of the travel is found where the error says so.
+#[test]
+fn the_scan_goes_below_a_hundredth_of_the_travel_while_the_error_falls() {
+    let mut r = motion("r", 10);
+    let rule = Direction::Dahl { delta_mm: 0.05 };
+    let mut state = DirectionState::default();
+    for i in 0..r.len() {
+        let at = Motion {
+            x_mm: r.x_mm[i],
+            v_mm_s: r.v_mm_s[i],
+            a_m_s2: r.a_m_s2[i],
+        };
+        r.f_n[i] = 0.01 * at.v_mm_s + 1.5 * state.step(rule, at);
+    }
+    let [low, high] = r.range_mm();
+    assert!(0.05 < 0.005 * (high - low));
+    let found = identified(&r, Method::Friction(Friction::default()), 1.0);
+    let delta = found.realization.direction.delta_mm().unwrap();
+    assert!((0.035..=0.055).contains(&delta), "{delta}");
+    assert_eq!(found.warnings, []);
+}
