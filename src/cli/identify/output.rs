@@ -200,11 +200,11 @@ fn mechanism_in_detail(fitted: &Fitted) -> String {
     let _ = match fitted.filter {
         Filter::Recorded(hz) => writeln!(
             out,
-            "the recorded force has passed a low-pass of about {hz} Hz; the predicted one passes it as well"
+            "the recorded force passed a low-pass of about {hz} Hz; so does the predicted one"
         ),
         Filter::Both(hz) => writeln!(
             out,
-            "the recorded force was not filtered; fitted below {hz} Hz, predicted without a filter"
+            "recorded force not filtered; fitted below {hz} Hz, predicted without a filter"
         ),
     };
     out += "starts, with their rms error on a part and on all of the training recordings:\n";
@@ -411,7 +411,7 @@ fn best_in_detail(results: &Results<'_>) -> String {
     let filter = provenance.filter.as_deref().unwrap_or("unknown");
     let mechanism = (cell.fitted.as_deref()).map_or(String::new(), mechanism_in_detail);
     format!(
-        "\nthe {} cell in detail; signals: {filter}; JND: just noticeable difference, {JUST_NOTICEABLE_N} N\n{}{ceilings}{mechanism}certificate {}\n    {}\n    m < 0 at {:.0} % of the nodes, b < 0 at {:.0} %\n",
+        "\nthe {} cell in detail; JND: just noticeable difference, {JUST_NOTICEABLE_N} N\nsignals: {filter}\n{}{ceilings}{mechanism}certificate {}\n    {}\n    m < 0 at {:.0} % of the nodes, b < 0 at {:.0} %\n",
         if results.cells.len() == 1 {
             "only"
         } else {
@@ -447,12 +447,11 @@ fn settings(cell: &Cell) -> String {
 fn heads(results: &Results<'_>) -> Vec<String> {
     let p = Printed::of(results);
     let (x, f) = (p.x(), p.f());
-    let mut heads = vec![
-        String::new(),
-        "lambda".into(),
-        format!("L {x}"),
-        format!("dx {x}"),
-    ];
+    let mut heads = vec![String::new()];
+    if has_memory(results) {
+        heads.extend(["lambda".into(), format!("L {x}")]);
+    }
+    heads.push(format!("dx {x}"));
     if has_delta(results) {
         heads.push(format!("delta {x}"));
     }
@@ -462,6 +461,15 @@ fn heads(results: &Results<'_>) -> Vec<String> {
     }
     heads.extend(["m<0", "b<0", "passive"].map(String::from));
     heads
+}
+
+/// Whether a cell has a forgetting factor or a width of its weights.
+fn has_memory(results: &Results<'_>) -> bool {
+    let memory = |cell: &Cell| {
+        let provenance = &cell.realization.provenance;
+        provenance.lambda.is_some() || provenance.memory_mm.is_some()
+    };
+    results.cells.iter().any(memory)
 }
 
 /// Whether a cell has a direction state.
@@ -480,12 +488,11 @@ fn row(results: &Results<'_>, cell: &Cell, best: bool) -> Vec<String> {
         (_, Some(memory)) => format!("{:.3}", p.length(memory)),
         (None, None) => "-".to_owned(),
     };
-    let mut row = vec![
-        if best { "*" } else { "" }.to_owned(),
-        number(provenance.lambda),
-        memory,
-        (provenance.dx_mm).map_or("-".to_owned(), |dx| plain(p.length(dx))),
-    ];
+    let mut row = vec![if best { "*" } else { "" }.to_owned()];
+    if has_memory(results) {
+        row.extend([number(provenance.lambda), memory]);
+    }
+    row.push((provenance.dx_mm).map_or("-".to_owned(), |dx| plain(p.length(dx))));
     if has_delta(results) {
         let delta_mm = cell.realization.direction.delta_mm();
         row.push(number(

@@ -22,7 +22,7 @@ fn label((key, name, _): Parameter, shown: Shown) -> String {
     let [x, f] = shown.units.names();
     let unit = match key {
         "m_kg" if f == "N" => "kg".to_owned(),
-        "m_kg" => "kg·m²".to_owned(),
+        "m_kg" => return "inertia m (kg·m²)".to_owned(),
         "b_n_s_per_mm" => format!("{f}·s/{x}"),
         "k_n_per_mm" => format!("{f}/{x}"),
         _ => f.to_owned(),
@@ -65,7 +65,8 @@ pub fn parameters(realization: &Realization, shown: Shown) -> Drawing {
             true => ("k_n_per_mm", "slope of the offset dF0/dx", of),
             false => parameter,
         };
-        let values = lines.iter().flat_map(|[_, y]| y.iter().copied());
+        // with 0, which is drawn: one mass for all x is otherwise a line on an axis without a scale
+        let values = (lines.iter().flat_map(|[_, y]| y.iter().copied())).chain([0.0]);
         let mut panel = Panel::new(
             Axis::around(&shown.position(), r.x_mm.iter().copied()),
             Axis::around(&label(name, shown), values),
