@@ -14,7 +14,7 @@ use study_wire::predict::{Direction, Lookup};
 /// Least and greatest δ of the scan, as shares of the travel.
 const SCAN: [f64; 2] = [0.01, 0.25];
 /// The scan goes on below its least δ while each step reduces the error by more than this share …
-const FALLS: f64 = 0.01;
+const FALLS: f64 = 0.1;
 /// … down to this share of the travel: for a table, whose friction over δ is a stiffness to the
 /// device, and for the friction model.
 const BELOW_TABLE: f64 = 0.002;

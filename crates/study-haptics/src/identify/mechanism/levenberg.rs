@@ -267,7 +267,8 @@ fn solve(
 /// matrix A and the gradients g of stretches of the recordings, within which errors may be
 /// correlated and differ in size (White 1980; Liang & Zeger 1986). Errors of a fit are smaller
 /// than those around the truth, so that the sum is multiplied by n/(n − 1) for the stretches
-/// and by N/(N − p) for the samples.
+/// and by N/(N − p) for the samples. Added is the square of the step that is left, because a fit ends
+/// before it has reached its minimum.
 fn standard_errors(
     sum: &Sum,
     parameters: &[f64],
@@ -281,6 +282,7 @@ fn standard_errors(
     // of the samples that count, four per period of the corner, about half are independent
     let (stretches, samples) = (sum.scores.len() as f64, 0.5 * sum.errors as f64);
     let known = stretches >= LEAST_STRETCHES && samples > used;
+    let left = solve(sum, parameters, &bound, 1e-10);
     let spread = stretches / (stretches - 1.0) * samples / (samples - used);
     std::array::from_fn(|i| {
         if !(known && free[i]) || sum.normal[i * all + i] <= 0.0 {
@@ -291,7 +293,8 @@ fn standard_errors(
         let row = a.solve(&unit, &free)?;
         let moved = |score: &Vec<f64>| -> f64 { row.iter().zip(score).map(|(r, g)| r * g).sum() };
         let square: f64 = sum.scores.iter().map(|g| moved(g).powi(2)).sum();
-        let error = (spread * square).sqrt();
+        let left = left.as_ref()?[i];
+        let error = (spread * square + left * left).sqrt();
         error.is_finite().then_some(error)
     })
 }
