@@ -98,7 +98,7 @@ pub enum Warning {
         "the best delta, {delta_mm} mm, is at an end of the scan: a better one may lie beyond it (--delta), and friction that changes at once has none (--direction sign)"
     )]
     DeltaAtEnd { delta_mm: f64 },
-    #[error("{parameter} = {value:.3} is not determined by the recordings{}: {excitation}", .error.map_or(String::new(), |e| format!(" (standard error {e:.2})")))]
+    #[error("{parameter} = {value:.2e} is not determined by the recordings{}: {excitation}", .error.map_or(String::new(), |e| format!(" (standard error {e:.1e})")))]
     NotDetermined {
         parameter: &'static str,
         value: f64,

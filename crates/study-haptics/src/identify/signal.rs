@@ -52,7 +52,7 @@ pub enum SignalError {
     )]
     Corner { corner_hz: f64, rate_hz: f64 },
     #[error(
-        "{recording}: the sampling interval at {at_s} s is {interval_s} s instead of {mean_s} s: a filter needs a recording without gaps"
+        "{recording}: the sampling interval at {at_s} s is {interval_s} s instead of {mean_s} s: a filter or a simulation needs a recording without gaps: divide it there, several are accepted"
     )]
     Uneven {
         recording: String,
