@@ -109,7 +109,7 @@ struct Recursion {
 impl Recursion {
     fn cold(lambda: f64, terms: Terms) -> Self {
         let mut p = [[0.0; 4]; 4];
-        for (i, prior) in initial_covariance(terms).into_iter().enumerate() {
+        for (i, prior) in initial_covariance(terms.kept()).into_iter().enumerate() {
             p[i][i] = prior;
         }
         Self {

@@ -1,6 +1,5 @@
 //! The samples of one direction of travel, and the parameter vector.
 
-use super::method::Terms;
 use crate::recording::{Recording, range};
 
 /// A parameter vector θ in the order m (kg), b (N·s/mm), k (N/mm), F0 (N).
@@ -11,8 +10,8 @@ pub type Theta = [f64; 4];
 pub(super) const INITIAL_COVARIANCE: f64 = 1e6;
 
 /// The diagonal of P(0): 0 for terms that are left out, which then stay 0.
-pub(super) fn initial_covariance(terms: Terms) -> [f64; 4] {
-    terms.kept().map(|kept| match kept {
+pub(super) fn initial_covariance(kept: [bool; 4]) -> [f64; 4] {
+    kept.map(|kept| match kept {
         true => INITIAL_COVARIANCE,
         false => 0.0,
     })

@@ -136,7 +136,7 @@ impl State {
     fn cold(lambdas: &[f64], terms: Terms) -> Self {
         let lambda = Lane(std::array::from_fn(|i| lambdas[i.min(lambdas.len() - 1)]));
         let mut q = [Lane::ZERO; 10];
-        for (i, prior) in initial_covariance(terms).into_iter().enumerate() {
+        for (i, prior) in initial_covariance(terms.kept()).into_iter().enumerate() {
             q[UPPER[i][i]] = Lane::all(prior);
         }
         Self {
