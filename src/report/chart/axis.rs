@@ -92,7 +92,8 @@ impl Axis {
         match ticks.len() {
             // Within less than a factor of two: both ends.
             0 | 1 => {
-                let ends = [axis.low, axis.high].map(|at| (at, label(at.exp(), 0.1 * at.exp())));
+                let ends =
+                    [axis.low, axis.high].map(|at| (at, label(at.exp(), 0.1 * at.exp(), at.exp())));
                 axis.at(ends.to_vec())
             }
             _ => axis.at(ticks),
