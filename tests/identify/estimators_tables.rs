@@ -243,12 +243,12 @@ fn a_best_delta_at_the_end_of_the_scan_gives_a_warning() {
     let found = identified(&r, hat(State::Play(Delta::Scan)), 1.0);
     assert_eq!(
         found.realization.direction,
-        Direction::Play { delta_mm: 0.074 }
+        Direction::Play { delta_mm: 0.3 }
     );
     assert!(
         found
             .warnings
-            .contains(&Warning::DeltaAtEnd { delta_mm: 0.074 })
+            .contains(&Warning::DeltaAtEnd { delta_mm: 0.3 })
     );
 }
 

@@ -191,15 +191,23 @@ impl Training<'_> {
         let mut tried = (0..=steps)
             .map(|i| attempt(series(i)))
             .collect::<Result<Vec<_>, _>>()?;
-        let mut below = -1;
-        while tried[0].1 < (1.0 - FALLS) * tried[1].1 && series(below) >= at_least(floor) {
-            tried.insert(0, attempt(series(below))?);
-            below -= 1;
-        }
-        let rms_n = |tried: &[(f64, f64, Identified)], i: usize| tried.get(i).map(|t| t.1);
         let least = |tried: &[(f64, f64, Identified)]| {
             (0..tried.len()).min_by(|a, b| tried[*a].1.total_cmp(&tried[*b].1))
         };
+        let mut below = -1;
+        while least(&tried) == Some(0) && series(below) >= at_least(floor) {
+            let next = attempt(series(below))?;
+            let falls = next.1 < (1.0 - FALLS) * tried[0].1;
+            // one that is much worse ends the neighbourhood of the best
+            if falls || tried[0].1 < (1.0 - FALLS) * next.1 {
+                tried.insert(0, next);
+            }
+            if !falls {
+                break;
+            }
+            below -= 1;
+        }
+        let rms_n = |tried: &[(f64, f64, Identified)], i: usize| tried.get(i).map(|t| t.1);
         let best = least(&tried).ok_or(IdentifyError::Undetermined)?;
         let ends_mm = [tried[0].0, tried[tried.len() - 1].0];
         // the golden section of the neighbourhood of the best, in log δ
