@@ -5,6 +5,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::support::player::{correct_newest, enter, mark_bad, play, quit};
+use crate::support::simulator::Simulator;
 use crate::support::{PATIENCE, Terminal, repository, study};
 use serde_json::Value as Json;
 use std::fs;
@@ -79,10 +80,17 @@ fn models() -> String {
 
 /// The events of the session so far.
 fn events(folder: &Path) -> Vec<Json> {
-    let session = folder.join("results/p/sessions/P01/1");
-    // A resumed session goes on in a second segment.
-    let segment = |name: &str| fs::read_to_string(session.join(name)).unwrap_or_default();
-    let text = ["journal.jsonl", "journal-2.jsonl", "journal-3.jsonl"].map(segment);
+    // Of several sessions, the last.
+    let sessions = folder.join("results/p/sessions/P01");
+    let session = ["2", "1"].map(|number| sessions.join(number));
+    let session = session.iter().find(|path| path.exists());
+    let session = session.unwrap_or(&sessions).clone();
+    // A resumed session goes on in another segment.
+    let segment = |number: u32| match number {
+        1 => fs::read_to_string(session.join("journal.jsonl")),
+        n => fs::read_to_string(session.join(format!("journal-{n}.jsonl"))),
+    };
+    let text: Vec<String> = (1..).map_while(|number| segment(number).ok()).collect();
     // A line may be half written.
     let event = |line: &str| serde_json::from_str(line).ok();
     text.concat().lines().filter_map(event).collect()
@@ -159,8 +167,8 @@ fn play_until(
     panic!("the session ended before");
 }
 
-fn start(folder: &Path) -> Terminal {
-    let arguments = ["run", "p", "--operator", "lw"];
+fn start_with(folder: &Path, more: &[&str]) -> Terminal {
+    let arguments = [&["run", "p", "--operator", "lw"], more].concat();
     let mut terminal = Terminal::start(&arguments, folder, 24, 80);
     terminal.wait_for("Who takes part?");
     terminal
@@ -169,7 +177,12 @@ fn start(folder: &Path) -> Terminal {
 /// A session with a failed interval, a correction, a quit during a trial and a resume. The
 /// columns of `ratings.csv` of the counted trials.
 fn eventful(folder: &Path, observer: Observer) -> Vec<csv::StringRecord> {
-    let mut terminal = start(folder);
+    eventful_with(folder, observer, &[])
+}
+
+/// The same of a program that is started with further arguments.
+fn eventful_with(folder: &Path, observer: Observer, more: &[&str]) -> Vec<csv::StringRecord> {
+    let mut terminal = start_with(folder, more);
     // An interval fails: the last of the trial, where it has several.
     play_until(&mut terminal, folder, observer, |s| {
         done(folder) >= 1
@@ -189,7 +202,7 @@ fn eventful(folder: &Path, observer: Observer) -> Vec<csv::StringRecord> {
         done(folder) >= 4 && (s.contains("FIRST") || s.contains("Feel the"))
     });
     quit(&mut terminal);
-    let mut terminal = start(folder);
+    let mut terminal = start_with(folder, more);
     play_until(&mut terminal, folder, observer, |s| {
         s.contains("Enter: close")
     });
@@ -270,12 +283,16 @@ fn track_by_keys(vary: &str, procedure: &str) {
     let folder = tempfile::tempdir().unwrap();
     written(folder.path(), &track(vary, procedure));
     eventful(folder.path(), hears);
-    let level = |a: &Json, key: &str| a["level"][key].as_f64().unwrap();
-    let levels: Vec<(f64, f64)> = (completed(folder.path()).iter())
-        .map(|a| (level(a, "proposed"), level(a, "presented")))
-        .collect();
+    let levels = levels(folder.path());
     assert_eq!(levels, expected(folder.path()));
     assert!(levels.len() > 5, "{levels:?}");
+}
+
+/// The levels of the trials of the track so far.
+fn levels(folder: &Path) -> Vec<(f64, f64)> {
+    let level = |a: &Json, key: &str| a["level"][key].as_f64();
+    let both = |a: &Json| Some((level(a, "proposed")?, level(a, "presented")?));
+    completed(folder).iter().filter_map(both).collect()
 }
 
 #[test]
@@ -287,6 +304,138 @@ fn a_staircase_on_damping_by_keys() {
 #[test]
 fn a_quest_plus_track_on_detent_strength_by_keys() {
     track_by_keys("detent", r#"{ rule = "quest+", trials = 7 }"#);
+}
+
+/// The device fails while an interval is felt: its stop button, its cable, its power. A
+/// session that is left in mid-track with the cable out is continued.
+#[test]
+fn a_track_with_faults_of_the_device_by_keys() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let rule = r#"{ rule = "quest+", trials = 7 }"#;
+    let part = track("b", rule).replace("max_s = 0.4", "max_s = 1.5");
+    written(folder, &part);
+    let mut device = Simulator::start(folder, &[]);
+    let port = device.port.to_str().unwrap().to_owned();
+    let more = ["--device", "serial", "--port", &port];
+    let mut terminal = start_with(folder, &more);
+    for (trials, interval, fault) in [
+        (1, "SECOND", "trip"),
+        (2, "FIRST", "unplug"),
+        (4, "SECOND", "reset"),
+    ] {
+        play_until(&mut terminal, folder, hears, |s| {
+            done(folder) >= trials && s.contains(interval) && s.contains("Feel the")
+        });
+        device.control(fault);
+        terminal.wait_for("DEVICE TROUBLE");
+        if fault == "unplug" {
+            quit(&mut terminal);
+            device.control("plug");
+            terminal = start_with(folder, &more);
+        }
+    }
+    play_until(&mut terminal, folder, hears, |s| s.contains("Enter: close"));
+    terminal.keys("\r");
+    assert_eq!(terminal.exit_code(), 0);
+    let (code, out, err) = study(&["verify", "results"], folder);
+    assert_eq!(code, 0, "{out}{err}");
+    let attempts = fs::read_to_string(folder.join("results/p/attempts.csv")).unwrap();
+    let failed = attempts.lines().filter(|line| line.contains(",failure,"));
+    assert!(failed.count() >= 3, "{attempts}");
+    assert_eq!(levels(folder), expected(folder));
+    assert_eq!(levels(folder).len(), 7);
+}
+
+#[test]
+fn two_sessions_of_a_group_with_a_track_by_keys() {
+    two_sessions("tracks", 1);
+}
+
+#[test]
+fn two_sessions_of_a_group_with_a_track_and_pairs_by_keys() {
+    two_sessions("both", 2);
+}
+
+/// A study of two groups in two sessions: one has a staircase, the other pairs after it. The track
+/// of each session is one of its own.
+fn two_sessions(group: &str, parts: usize) {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let rule = r#"{ rule = "staircase", up = 1, down = 2, start = 2.0, steps = [0.4, 0.2], stop = { reversals = 3, max_trials = 6 }, estimate_last = 2 }"#;
+    let rest = format!(
+        r#"{}{}[[parts]]
+id = "which"
+kind = "pairs"
+prompt = "{PROMPT}"
+models = ["l9991", "l9995", "l9999"]
+repetitions = 1
+gap_s = 0.2
+exposure = {{ max_s = 0.4 }}
+[groups]
+assign = "given"
+[[groups.list]]
+id = "tracks"
+parts = ["answer"]
+[[groups.list]]
+id = "both"
+[[sessions]]
+id = "one"
+[[sessions]]
+id = "two"
+max_gap_h = 72
+"#,
+        models(),
+        track("b", rule)
+    );
+    written(folder, &rest);
+    let more = ["--group", group];
+    eventful_with(folder, hears_or_prefers, &more);
+    let first = levels(folder);
+    assert_eq!(first, expected(folder));
+    let pairs = |of: Vec<Json>| of.iter().filter(|a| a["level"].is_null()).count();
+    assert_eq!(pairs(completed(folder)), if parts == 2 { 3 } else { 0 });
+    let mut terminal = start_with(folder, &more);
+    typed(&mut terminal, "P01", "next: session two, one of 2");
+    terminal.keys("\u{15}");
+    play_until(&mut terminal, folder, hears_or_prefers, |s| {
+        s.contains("SECOND") && done(folder) == 1
+    });
+    quit(&mut terminal);
+    let mut terminal = start_with(folder, &more);
+    play_until(&mut terminal, folder, hears_or_prefers, |s| {
+        s.contains("Enter: close")
+    });
+    terminal.keys("\r");
+    assert_eq!(terminal.exit_code(), 0);
+    assert!(folder.join("results/p/sessions/P01/2").exists());
+    assert_eq!(levels(folder), first);
+    let (code, out, err) = study(&["verify", "results"], folder);
+    assert_eq!(code, 0, "{out}{err}");
+    let analyze = ["analyze", "results", "--include", "pilot", "--json"];
+    let (code, out, err) = study(&analyze, folder);
+    assert_eq!(code, 0, "{err}");
+    let document: Json = serde_json::from_str(&out).unwrap();
+    let values = &document["parts"][0]["values"];
+    for session in ["one", "two"] {
+        let n = values[format!("psy/P01/up@{session}/n_trials")].as_f64();
+        assert_eq!(n, Some(first.len() as f64), "{session}");
+    }
+    let pairs = document["parts"][1]["trials"].as_u64().unwrap_or(0);
+    assert_eq!(pairs, if parts == 2 { 6 } else { 0 });
+}
+
+/// Of a pair, the realization whose name comes first; of a track as [`hears`].
+fn hears_or_prefers(attempt: &Json) -> (String, String) {
+    if !attempt["level"].is_null() {
+        return hears(attempt);
+    }
+    let name = |i: usize| attempt["intervals"][i].as_str().unwrap().to_owned();
+    let answers = ("1".to_owned(), "2".to_owned());
+    match name(0) < name(1) {
+        true => answers,
+        false => (answers.1, answers.0),
+    }
 }
 
 #[test]
