@@ -1,9 +1,9 @@
 //! A session that is begun on one channel and ended on another: by keys, in typed lines, on
-//! the page. A replay, a quit and a resume are in it.
+//! the page. A replay, a break, a correction, a quit and a resume are in it.
 
 use crate::plain::{Lines, events, last_answers};
 use crate::screen::Session;
-use crate::support::player::{F7, play_to_end, play_until};
+use crate::support::player::{F7, correct_newest, play_to_end, play_until};
 use crate::support::{PATIENT, Terminal, changed_protocol, repository, study};
 use serde_json::{Value, json};
 use std::path::Path;
@@ -25,7 +25,8 @@ impl Channel {
         }
     }
 
-    /// Feels the first realization twice, rates two trials and quits.
+    /// Feels the first realization twice, rates two trials, corrects the second after the
+    /// break and quits.
     fn begin(self, folder: &Path, protocol: &Path) {
         let path = protocol.to_str().unwrap();
         match self {
@@ -37,6 +38,7 @@ impl Channel {
                 // What the player does next is done to the new page.
                 terminal.wait_until("the replay", |s| !s.contains("F7: feel it again"));
                 play_until(&mut terminal, "P01", "trial 3 of 5");
+                correct_newest(&mut terminal, "3", "mistyped");
                 terminal.keys("\u{11}");
                 terminal.wait_for("Leave the session?");
                 terminal.keys("y");
@@ -47,7 +49,13 @@ impl Channel {
                 lines.play(Some("Type a number from 1 to 7"));
                 lines.types("/replay\n");
                 lines.play(Some("Trial 3 of 5"));
-                lines.types("/quit\n");
+                lines.types("/correct\n");
+                lines.asked(&["Type the number of the answer to correct"]);
+                lines.types("1\n");
+                lines.asked(&["Type a number from 1 to 7"]);
+                lines.types("3\n");
+                lines.asked(&["Type the reason"]);
+                lines.types("mistyped\n/quit\n");
                 lines.asked(&["Leave the session?"]);
                 lines.types("y\n");
                 lines.line(&["The session is not finished"]);
@@ -64,7 +72,10 @@ impl Channel {
                 let again = browser.reply(&page, "replay", json!({}));
                 assert_eq!(browser.post("/reply", &again).status, 200);
                 browser.play("the third trial", |p| p["progress"]["at"] == 3);
-                session.types("/quit");
+                // The experimenter corrects.
+                for line in ["/correct", "1", "3", "mistyped", "/quit"] {
+                    session.types(line);
+                }
                 session.types("y");
                 assert!(session.child.wait().unwrap().success());
             }
@@ -97,7 +108,10 @@ fn session(begin: Channel, end: Channel) -> (Vec<Value>, Vec<String>) {
     let protocol = folder.path().join("paper");
     let changes = [
         PATIENT,
-        ("repetitions = 3", "repetitions = 1"),
+        (
+            "repetitions = 3",
+            "repetitions = 1\nbreaks = { every = 2, at_least_s = 1 }",
+        ),
         ("[trial]\n", "[trial]\nexposure = { replays = 1 }\n"),
     ];
     changed_protocol("turn-signal", &protocol, &changes);
@@ -129,6 +143,8 @@ fn same_journal(begin: Channel, end: Channel) {
     assert_eq!(channels, words);
     let replays = journal.iter().filter(|e| e["event"] == "replayed").count();
     assert_eq!(replays, 1);
+    let corrections = journal.iter().filter(|e| e["reason"] == "mistyped");
+    assert_eq!(corrections.count(), 1);
     assert_eq!(last_answers(&journal), last_answers(by_keys()));
     // A busy machine can lose a playback: its trial is then repeated at another place.
     let lost = |events: &[Value]| events.iter().any(|e| e["event"] == "attempt_failed");

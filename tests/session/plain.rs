@@ -151,7 +151,7 @@ impl Lines {
 }
 
 /// Times, checksums, and what the device measured.
-const NOT_COMPARED: [&str; 11] = [
+const NOT_COMPARED: [&str; 12] = [
     "crc",
     "prev",
     "seq",
@@ -162,6 +162,7 @@ const NOT_COMPARED: [&str; 11] = [
     "telemetry",
     "reference_s",
     "response_s",
+    "rested_s",
     "channel",
 ];
 
