@@ -198,6 +198,8 @@ fn a_hostile_comment_is_stored_as_typed_and_shown_escaped() {
     // the keys choose, a paste brings the rest as it is
     terminal.keys(&format!("4\t\u{1b}[200~{comment}\u{1b}[201~"));
     terminal.wait_for("second");
+    // an Enter that comes with another key was pasted
+    std::thread::sleep(std::time::Duration::from_millis(300));
     terminal.keys("\r");
     terminal.wait_for("saved ✓ 1 of 1");
     terminal.keys("\u{3}");
