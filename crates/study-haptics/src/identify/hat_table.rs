@@ -13,12 +13,11 @@ use study_wire::predict::{Direction, Lookup};
 
 /// Least and greatest δ of the scan, as shares of the travel.
 const SCAN: [f64; 2] = [0.01, 0.25];
-/// The scan goes on below its least δ while each step reduces the error by more than this share …
-const FALLS: f64 = 0.1;
-/// … down to this share of the travel: for a table, whose friction over δ is a stiffness to the
+/// The scan goes on below its least δ down to this share of the travel, while each step reduces
+/// the error by more than this share: for a table, whose friction over δ is a stiffness to the
 /// device, and for the friction model.
-const BELOW_TABLE: f64 = 0.002;
-const BELOW_FRICTION: f64 = 0.0005;
+const BELOW_TABLE: [f64; 2] = [0.002, 0.1];
+const BELOW_FRICTION: [f64; 2] = [0.0005, 0.01];
 /// Ratio of one δ of the scan to the one before.
 const STEP: f64 = std::f64::consts::SQRT_2;
 /// Golden sections of the neighbourhood of the best, to 1 % of it.
@@ -141,14 +140,14 @@ impl Training<'_> {
     /// The table with the given direction state, or with the δ that the scan finds.
     fn with_state(
         &self,
-        (state, floor): (State, f64),
+        (state, below): (State, [f64; 2]),
         table: impl Fn(Direction) -> Result<Identified, IdentifyError>,
     ) -> Result<Identified, IdentifyError> {
         match state {
             State::Sign => table(Direction::Sign),
             State::Play(Delta::Mm(mm)) | State::Dahl(Delta::Mm(mm)) => table(state.with(mm)),
             State::Play(Delta::Scan) | State::Dahl(Delta::Scan) => {
-                self.scan(floor, |delta_mm| table(state.with(delta_mm)))
+                self.scan(below, |delta_mm| table(state.with(delta_mm)))
             }
         }
     }
@@ -161,7 +160,7 @@ impl Training<'_> {
     /// motion, which are not hysteresis; on other motions the shorter δ predicts better.
     fn scan(
         &self,
-        floor: f64,
+        [floor, share]: [f64; 2],
         table: impl Fn(f64) -> Result<Identified, IdentifyError>,
     ) -> Result<Identified, IdentifyError> {
         let travel_mm = self.range_mm[1] - self.range_mm[0];
@@ -197,9 +196,9 @@ impl Training<'_> {
         let mut below = -1;
         while least(&tried) == Some(0) && series(below) >= at_least(floor) {
             let next = attempt(series(below))?;
-            let falls = next.1 < (1.0 - FALLS) * tried[0].1;
+            let falls = next.1 < (1.0 - share) * tried[0].1;
             // one that is much worse ends the neighbourhood of the best
-            if falls || tried[0].1 < (1.0 - FALLS) * next.1 {
+            if falls || next.1 > TOLERANCE * tried[0].1 {
                 tried.insert(0, next);
             }
             if !falls {
