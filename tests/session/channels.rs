@@ -25,7 +25,8 @@ impl Channel {
         }
     }
 
-    /// Feels the first realization twice, rates two trials, corrects the second after the
+    /// Feels the first realization twice, steps back from its comment to change the rating
+    /// (on the page both are before the eyes), rates two trials, corrects the second after the
     /// break and quits.
     fn begin(self, folder: &Path, protocol: &Path) {
         let path = protocol.to_str().unwrap();
@@ -37,6 +38,11 @@ impl Channel {
                 terminal.keys(F7);
                 // What the player does next is done to the new page.
                 terminal.wait_until("the replay", |s| !s.contains("F7: feel it again"));
+                play_until(&mut terminal, "P01", "Tab: comment");
+                terminal.keys("6\t");
+                terminal.wait_until("the comment", |s| !s.contains("Tab: comment"));
+                terminal.keys("\u{1b}[Z");
+                terminal.wait_for("Tab: comment");
                 play_until(&mut terminal, "P01", "trial 3 of 5");
                 correct_newest(&mut terminal, "3", "mistyped");
                 terminal.keys("\u{11}");
@@ -48,6 +54,10 @@ impl Channel {
                 let mut lines = Lines::start(folder, &["run", path, "--plain"], None);
                 lines.play(Some("Type a number from 1 to 7"));
                 lines.types("/replay\n");
+                lines.play(Some("Type a number from 1 to 7"));
+                lines.types("6\n");
+                lines.asked(&["Type your answer"]);
+                lines.types("/back\n");
                 lines.play(Some("Trial 3 of 5"));
                 lines.types("/correct\n");
                 lines.asked(&["Type the number of the answer to correct"]);
