@@ -230,12 +230,24 @@ tried <- function(test) tryCatch(test, error = function(why) NULL)
 # The test of y ~ condition + (1 | participant), as the numbers of `group`.
 mixed_test <- function(put, group, data) {
   if (any(!is.finite(data$y)) || length(unique(data$condition)) < 2) return(invisible())
-  table <- tried(anova(lmer(y ~ condition + (1 | participant), data = data, control = control),
-                       type = 3, ddf = "Satterthwaite"))
-  if (is.null(table)) return(invisible())
+  formula <- y ~ condition + (1 | participant)
+  model <- tried(lmer(formula, data = data, control = control))
+  if (is.null(model)) return(invisible())
+  # The deviance is flat where the variance of the participants is 0, and the search stops
+  # beside it, with other degrees of freedom. At 0 the model is that of lm.
+  deviance_at <- lme4::lmer(formula, data = data, control = control, devFunOnly = TRUE)
+  if (deviance_at(0) <= deviance_at(getME(model, "theta")) + 1e-9) {
+    table <- anova(lm(y ~ condition, data = data))
+    found <- c(F = table[["F value"]][1], df1 = table$Df[1], df2 = table$Df[2],
+               p = table[["Pr(>F)"]][1])
+  } else {
+    table <- tried(anova(model, type = 3, ddf = "Satterthwaite"))
+    if (is.null(table)) return(invisible())
+    found <- c(F = table[["F value"]], df1 = table$NumDF, df2 = table$DenDF,
+               p = table[["Pr(>F)"]])
+  }
   print(table)
-  columns <- c(F = "F value", df1 = "NumDF", df2 = "DenDF", p = "Pr(>F)")
-  for (what in names(columns)) put(paste0(group, "/", what), table[[columns[[what]]]])
+  for (what in names(found)) put(paste0(group, "/", what), found[[what]])
 }
 of_part <- function(part) function(what, number) value[paste0(part, ":", what)] <<- number
 # Each participant's mean of `value` by condition, and by session if the part has several.
