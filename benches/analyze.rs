@@ -4,9 +4,9 @@
 //! table for timing the whole program.
 
 use std::io::{BufWriter, Write};
+use study_analysis::analyze::{Rules, analyze};
 use study_base::rng::Stream;
-use study_core::analyze::{Rules, analyze};
-use study_core::outcome::ratings::Ratings;
+use study_session::outcome::ratings::Ratings;
 
 fn main() -> std::io::Result<()> {
     let args: Vec<String> = std::env::args().collect();

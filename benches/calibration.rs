@@ -15,9 +15,9 @@
 
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use study_analysis::analyze::{Rules, Values, analyze};
 use study_base::rng::Stream;
-use study_core::analyze::{Rules, Values, analyze};
-use study_core::outcome::ratings::Ratings;
+use study_session::outcome::ratings::Ratings;
 use study_stats::correlation::{kendall, pearson, spearman};
 use study_stats::rank::doubled_ranks;
 

@@ -3,11 +3,11 @@
 use divan::{Bencher, black_box};
 use std::num::NonZeroU16;
 use std::time::Duration;
-use study::device::firmware::{self, Firmware};
-use study::device::virtual_device::{Options, VirtualDevice};
-use study::device::{Device, Report, Stimulus};
 use study::rater::{Impression, Reference};
 use study_base::limits::{Limit, Limits};
+use study_device::firmware::{self, Firmware};
+use study_device::virtual_device::{Options, VirtualDevice};
+use study_device::{Device, Report, Stimulus};
 use study_haptics::model::{Branch, Realization, Trained};
 use study_wire::message::{
     Commit, FixedVec, Heartbeat, Hello, Node, Play, Request, TableBegin, TableChunk, UploadCrc,
@@ -96,7 +96,7 @@ fn a_thousand_servo_steps_of_a_mechanism(bencher: Bencher) {
     let text = std::fs::read_to_string(path).expect("the shipped file");
     let parsed = study_haptics::model::file::parse(path, &text).0;
     let realization = parsed.expect("a valid file");
-    let what = study::device::rendering_of(&realization);
+    let what = study_device::rendering_of(&realization);
     servo_steps(bencher, &what);
 }
 

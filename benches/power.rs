@@ -9,7 +9,7 @@
 use std::hint::black_box;
 use std::sync::OnceLock;
 use std::time::Instant;
-use study_core::power::{
+use study_analysis::power::{
     Assumptions, Cell, Scale, Settings, Test, Vaf, candidates, closed, reach, run_chunk,
 };
 use study_stats::power::covariate::Spread;

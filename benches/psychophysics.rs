@@ -1,7 +1,7 @@
 //! How long the next level of a track and a fit take: `cargo bench --bench psychophysics`.
 
 use study_base::rng::Stream;
-use study_core::procedure::{Answer, Ladder, QuestPlus, Rule, Track};
+use study_plan::procedure::{Answer, Ladder, QuestPlus, Rule, Track};
 use study_stats::psychometric::{Core, Experiment, Level, maximum_likelihood, posterior};
 
 fn main() {

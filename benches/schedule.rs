@@ -4,9 +4,9 @@
 mod designs;
 
 use designs::{constrained, design};
-use study_core::protocol::Order::{Blocked, Shuffled, Williams};
-use study_core::protocol::{Protocol, Seat};
-use study_core::schedule::Planner;
+use study_plan::protocol::Order::{Blocked, Shuffled, Williams};
+use study_plan::protocol::{Protocol, Seat};
+use study_plan::schedule::Planner;
 
 fn main() {
     divan::main();
@@ -47,14 +47,14 @@ fn williams_12_by_3(bencher: divan::Bencher<'_, '_>) {
 #[divan::bench(sample_count = 20, args = [1, 2])]
 fn one_row_shuffled_10_by_5_max_run(bencher: divan::Bencher<'_, '_>, max_run: u32) {
     let protocol = constrained(10, 5, Shuffled, Some(max_run), None);
-    bencher.bench(|| study_core::schedule::plan(&protocol, None, Seat::Row(1)));
+    bencher.bench(|| study_plan::schedule::plan(&protocol, None, Seat::Row(1)));
 }
 
 /// Near the most that is counted by states.
 #[divan::bench(sample_count = 3, sample_size = 1)]
 fn one_row_shuffled_20_by_5_max_run_1(bencher: divan::Bencher<'_, '_>) {
     let protocol = constrained(20, 5, Shuffled, Some(1), None);
-    bencher.bench(|| study_core::schedule::plan(&protocol, None, Seat::Row(1)));
+    bencher.bench(|| study_plan::schedule::plan(&protocol, None, Seat::Row(1)));
 }
 
 /// Too many states: counted by inclusion and exclusion.
@@ -64,5 +64,5 @@ fn one_row_shuffled_max_run_1(
     (models, repetitions): (usize, u32),
 ) {
     let protocol = constrained(models, repetitions, Shuffled, Some(1), None);
-    bencher.bench(|| study_core::schedule::plan(&protocol, None, Seat::Row(1)));
+    bencher.bench(|| study_plan::schedule::plan(&protocol, None, Seat::Row(1)));
 }

@@ -16,8 +16,8 @@ use std::io::Write as _;
 use std::path::Path;
 use std::time::{Duration, Instant};
 use study_base::text::ParticipantId;
-use study_core::outcome::{Event, Moment};
-use study_core::store::{ClaimRequest, Frozen, SeatKind, StudyFolder};
+use study_session::outcome::{Event, Moment};
+use study_session::store::{ClaimRequest, Frozen, SeatKind, StudyFolder};
 use support::player::{Did, play};
 use support::{Terminal, repository, study};
 
@@ -115,7 +115,8 @@ fn disk(folder: &Path) -> Vec<Duration> {
 
 /// The events of an answer in the journal, until they are acknowledged.
 fn journal(folder: &Path, mirror: Option<&Path>) -> Vec<Duration> {
-    let loaded = ::study::cli::load::load(Path::new(&repository("protocols/turn-signal"))).unwrap();
+    let loaded =
+        study_analysis::load::load(Path::new(&repository("protocols/turn-signal"))).unwrap();
     let frozen = Frozen {
         protocol: &loaded.protocol,
         files: &loaded.files,
@@ -135,7 +136,7 @@ fn journal(folder: &Path, mirror: Option<&Path>) -> Vec<Duration> {
         participant: ParticipantId::new("P01").unwrap(),
         kind: SeatKind::Real,
         rows: None,
-        plan: study_core::store::Plan::default(),
+        plan: study_session::store::Plan::default(),
     };
     let mut claimed = opened.unwrap().claim(&request).unwrap();
     let mut journal = claimed.folder.journal().unwrap();

@@ -10,7 +10,7 @@
 
 use rayon::prelude::*;
 use study_base::rng::Stream;
-use study_core::procedure::{
+use study_plan::procedure::{
     Answer, Constant, Function, Ladder, Parameter, QuestPlus, Rule, Scale, Staircase, Stop, Track,
 };
 use study_stats::describe;

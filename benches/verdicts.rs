@@ -10,9 +10,9 @@
 
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use study_analysis::analyze::{Rules, all_findings};
 use study_base::rng::Stream;
-use study_core::analyze::{Rules, all_findings};
-use study_core::outcome::ratings::Ratings;
+use study_session::outcome::ratings::Ratings;
 use study_stats::carry_over::{OrderedRating, carry_over};
 use study_stats::clm::{CategoryCount, CategoryCounts, Predictor};
 use study_stats::clmm::clmm_crossed;
@@ -250,7 +250,8 @@ fn verdicts(world: &World, trials: &[Trial]) -> Results {
         csv += &format!("S{p:02},m{m:02},{},{rating},{},{index}\n", r + 1, x[m]);
     }
     let ratings = Ratings::read_csv("verdicts", csv.as_bytes(), None).expect("the table is valid");
-    let (findings, values) = all_findings(&ratings, &Rules::default());
+    let (findings, evidence) = all_findings(&ratings, &Rules::default());
+    let values = evidence.values();
     let mut results = Results::new();
     for finding in &findings {
         let id = format!("verdict: {}", finding.question.id());
@@ -283,8 +284,8 @@ fn functions(world: &World, trials: &[Trial]) -> Results {
             }
         })
         .collect();
-    let centre = x.iter().sum::<f64>() / x.len() as f64;
-    let slopes = LmmData::new(&cells, FixedEffects::Covariate { centre }).and_then(|table| {
+    let center = x.iter().sum::<f64>() / x.len() as f64;
+    let slopes = LmmData::new(&cells, FixedEffects::Covariate { center }).and_then(|table| {
         let without = fit(&table, RandomEffects::crossed(&table), Criterion::Reml)?;
         slope_variance(&without)
     });

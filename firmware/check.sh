@@ -26,9 +26,9 @@ if chrt -f 5 true 2>/dev/null; then soon="chrt -f 5"; fi
 case "${1-}" in
   c)
     command -v cc >/dev/null || { echo "no C compiler here" >&2; exit 77; }
-    cargo build --locked -q -p study-device
+    cargo build --locked -q -p study-firmware-c
     cc -std=c99 -Wall -Wextra -pedantic -Werror -O2 -I firmware/c/include firmware/c/examples/pty.c \
-      "$target_dir/debug/libstudy_device.a" -lm -lpthread -ldl -o "$work/device"
+      "$target_dir/debug/libstudy_firmware_c.a" -lm -lpthread -ldl -o "$work/device"
     $soon "$work/device" > "$work/said" &
     ;;
   emulator)

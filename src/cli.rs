@@ -3,7 +3,6 @@
 
 pub mod console;
 pub mod failure;
-pub mod load;
 
 mod amend;
 mod analyze;
@@ -18,6 +17,7 @@ mod new;
 mod participant;
 mod power;
 mod preregister;
+mod progress;
 mod record;
 mod rehearse;
 mod run;

@@ -13,15 +13,15 @@
 //! | layer | crates and modules |
 //! |---|---|
 //! | 0 | `study-base` (text, limits, diagnostic, rng), `study-wire` (serial format, servo), `study-stats` |
-//! | 1 | `study-haptics` (trajectory, plant, recording, identify, model); `study-core`: protocol |
-//! | 2 | `study-core`: schedule, outcome |
-//! | 3 | `study-core`: session, store, analyze; [`device`], [`rater`] |
-//! | 4 | [`runner`], [`report`] |
+//! | 1 | `study-haptics` (trajectory, plant, recording, identify, model); `study-plan` (protocol, procedure, schedule) |
+//! | 2 | `study-session` (outcome, session, rendering, store) |
+//! | 3 | `study-analysis` (analyze, power, preregister, export); `study-device`; [`rater`] |
+//! | 4 | `study-report`; [`runner`] |
 //! | 5 | [`tui`]; [`plain`], [`screen`] |
 //! | 6 | [`cli`] |
 //!
 //! Input and output happen only in `store`, `tui`, `plain`, `screen`, `runner` (the
-//! clock), `device::{link, process}` and `cli`. Everywhere else time, randomness and identity
+//! clock), `link` and `process` of `study-device`, and `cli`. Everywhere else time, randomness and identity
 //! are arguments.
 //!
 //! # Glossary
@@ -46,10 +46,9 @@
 //!   mass, damping, stiffness, offset force. The paper's symbols.
 
 pub mod cli;
-pub mod device;
 pub mod plain;
 pub mod rater;
-pub mod report;
+pub mod rehearsal;
 pub mod runner;
 pub mod screen;
 pub mod tui;

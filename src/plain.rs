@@ -16,8 +16,8 @@ use dialogue::Dialogue;
 use input::{Lines, Typed};
 use std::io::{self, Write};
 use std::time::{Duration, Instant};
-use study_core::outcome::Channel;
-use study_core::session::{Input, View};
+use study_session::outcome::Channel;
+use study_session::session::{Input, View};
 
 /// A line that ends within this time after a new page is held, repeated or pasted.
 const UNREAD: Duration = Duration::from_millis(300);
@@ -30,6 +30,8 @@ pub struct Plain {
     input: Lines,
     /// When the last page was printed.
     said: Instant,
+    /// How long after that an Enter is not yet meant for it.
+    unread: Duration,
     suspend_since: Option<Instant>,
 }
 
@@ -38,13 +40,15 @@ impl Plain {
     ///
     /// # Errors
     /// [`TuiError`] if a session cannot run here.
-    pub fn open(live: bool) -> Result<Self, TuiError> {
+    /// `hurry` is how many times as fast lines may follow each other: 1 except in tests.
+    pub fn open(live: bool, hurry: u32) -> Result<Self, TuiError> {
         crate::tui::check_platform()?;
         let input = Lines::open().map_err(TuiError::Terminal)?;
         Ok(Self {
             dialogue: Dialogue::new(input.has_keys(), live),
             input,
             said: Instant::now(),
+            unread: UNREAD / hurry.max(1),
             suspend_since: None,
         })
     }
@@ -64,7 +68,7 @@ impl Plain {
             Typed::Stop => return Ok(vec![Input::Stop]),
             Typed::Line(line) => line,
         };
-        let unread = self.input.has_keys() && self.said.elapsed() < UNREAD;
+        let unread = self.input.has_keys() && self.said.elapsed() < self.unread;
         if unread && !line.starts_with('/') {
             if !line.trim().is_empty() {
                 self.dialogue.repeat();

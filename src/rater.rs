@@ -23,7 +23,8 @@ pub use impression::{Impression, Reference};
 use comparison::Comparing;
 
 use study_base::rng::Stream;
-use study_core::protocol::{Answer, Question, QuestionKind};
+use study_plan::protocol::kinds::Draws;
+use study_plan::protocol::{Answer, Question, Scale};
 
 /// Whether ratings depend on the realization.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -93,28 +94,11 @@ impl Rater {
     /// trial `felt` is the impression of the realization.
     pub fn answer(&mut self, question: &Question, felt: Option<&Impression>) -> Answer {
         let felt = felt.filter(|_| self.effect == Effect::BuiltIn);
-        match &question.kind {
-            QuestionKind::Rating { from, to, .. } => {
-                let span = (*to - *from) as f64;
-                let steps = (self.position(question, felt) * span).round() as i64;
-                Answer::Rating((from + steps).clamp(*from, *to))
-            }
-            QuestionKind::Slider { from, to, step, .. } => {
-                let along = self.position(question, felt) * (to - from);
-                // Rounded to the steps of the slider.
-                let along = if *step > 0.0 {
-                    (along / step).round() * step
-                } else {
-                    along
-                };
-                Answer::Number((from + along).clamp(*from, *to))
-            }
-            QuestionKind::Choice { options, multiple } => self.choose(options, *multiple),
-            QuestionKind::Number {
-                min, max, above, ..
-            } => self.number(min.or(*above), *max, *above),
-            QuestionKind::Text => self.comment(question.required, felt),
-        }
+        question.kind.simulate(&mut Answering {
+            rater: self,
+            question,
+            felt,
+        })
     }
 
     /// Position of the answer on a scale, from 0 to 1.
@@ -140,50 +124,13 @@ impl Rater {
     ) -> Answer {
         let felt = felt.filter(|_| self.effect == Effect::BuiltIn);
         let above = self.position(question, felt) > 0.5;
-        let others: Vec<&String> = match &question.kind {
-            QuestionKind::Choice { options, .. } => {
-                options.iter().filter(|o| *o != counted).collect()
-            }
+        let others: Vec<&String> = match question.kind.scale() {
+            Scale::Names { options, .. } => options.iter().filter(|o| *o != counted).collect(),
             _ => Vec::new(),
         };
         let other = others.get(self.pick(others.len()));
         let chosen = other.filter(|_| !above).map_or(counted, |o| o.as_str());
         Answer::Choice(vec![chosen.to_owned()])
-    }
-
-    fn choose(&mut self, options: &[String], multiple: bool) -> Answer {
-        let first = self.pick(options.len());
-        let chosen = options
-            .iter()
-            .enumerate()
-            .filter(|(i, _)| {
-                let also = multiple && self.stream.unit() < 0.2;
-                *i == first || also
-            })
-            .map(|(_, option)| option.clone())
-            .collect();
-        Answer::Choice(chosen)
-    }
-
-    /// A number within the bounds, whole if possible; without bounds a plausible age.
-    fn number(&mut self, min: Option<f64>, max: Option<f64>, above: Option<f64>) -> Answer {
-        let low = min.unwrap_or_else(|| max.map_or(18.0, |max| max - 40.0));
-        let high = max.unwrap_or(low + 40.0);
-        let drawn = low + self.stream.unit() * (high - low);
-        let whole = drawn.round();
-        let allowed = |n: &f64| (low..=high).contains(n) && above.is_none_or(|above| *n > above);
-        let number = [whole, drawn.clamp(low, high)].into_iter().find(allowed);
-        Answer::Number(number.unwrap_or(high))
-    }
-
-    fn comment(&mut self, required: bool, felt: Option<&Impression>) -> Answer {
-        let silent = self.stream.unit() >= self.comment_rate;
-        let draw = self.stream.unit();
-        if silent && !required {
-            return Answer::Text(String::new());
-        }
-        let text = felt.map_or_else(|| remarks::general(draw), |felt| remarks::about(felt, draw));
-        Answer::Text(text.to_owned())
     }
 
     fn pick(&mut self, count: usize) -> usize {
@@ -193,12 +140,46 @@ impl Rater {
     }
 }
 
+/// A rater at a question.
+struct Answering<'a> {
+    rater: &'a mut Rater,
+    question: &'a Question,
+    felt: Option<&'a Impression>,
+}
+
+impl Draws for Answering<'_> {
+    fn position(&mut self) -> f64 {
+        self.rater.position(self.question, self.felt)
+    }
+
+    fn unit(&mut self) -> f64 {
+        self.rater.stream.unit()
+    }
+
+    fn pick(&mut self, count: usize) -> usize {
+        self.rater.pick(count)
+    }
+
+    fn comment(&mut self) -> String {
+        let silent = self.rater.stream.unit() >= self.rater.comment_rate;
+        let draw = self.rater.stream.unit();
+        if silent && !self.question.required {
+            return String::new();
+        }
+        let text =
+            (self.felt).map_or_else(|| remarks::general(draw), |felt| remarks::about(felt, draw));
+        text.to_owned()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
     use std::collections::BTreeMap;
     use study_base::text::QuestionId;
+    use study_plan::protocol::QuestionKind;
+    use study_plan::protocol::kinds::{self, KINDS};
 
     fn question(id: &str, required: bool, kind: QuestionKind) -> Question {
         Question {
@@ -214,11 +195,11 @@ mod tests {
         question(
             "realism",
             true,
-            QuestionKind::Rating {
+            QuestionKind::Rating(kinds::Rating {
                 from: 1,
                 to: 7,
                 labels,
-            },
+            }),
         )
     }
 
@@ -288,7 +269,7 @@ mod tests {
             let mut rater = Rater::new(3, 1, Effect::BuiltIn);
             rater.answer(&realism(), Some(&felt(first)));
             rater.answer(
-                &question("c", false, QuestionKind::Text),
+                &question("c", false, QuestionKind::Text(kinds::Text)),
                 Some(&felt(first)),
             );
             rater.exploration_s()
@@ -309,10 +290,10 @@ mod tests {
     #[test]
     fn the_counted_answer_is_that_of_what_is_judged_above_the_middle() {
         let options = ["no", "yes", "cannot say"].map(str::to_owned).to_vec();
-        let kind = QuestionKind::Choice {
+        let kind = QuestionKind::Choice(kinds::Choice {
             options,
             multiple: false,
-        };
+        });
         let question = question("real", true, kind);
         let share = |effect, error: f64| {
             let mut said = [0u32; 3];
@@ -339,32 +320,41 @@ mod tests {
 
     fn any_kind() -> impl Strategy<Value = QuestionKind> {
         prop_oneof![
-            (-5i64..5, 1i64..100).prop_map(|(from, span)| QuestionKind::Rating {
+            (-5i64..5, 1i64..100).prop_map(|(from, span)| QuestionKind::Rating(kinds::Rating {
                 from,
                 to: from + span,
                 labels: BTreeMap::new()
-            }),
-            (-10.0..10.0, 1e-6..200.0).prop_map(|(from, span)| QuestionKind::Slider {
-                from,
-                to: from + span,
-                step: 1.0,
-                labels: BTreeMap::new()
-            }),
-            (1usize..6, any::<bool>()).prop_map(|(n, multiple)| QuestionKind::Choice {
-                options: (0..n).map(|i| format!("option {i}")).collect(),
-                multiple
-            }),
+            })),
+            (-10.0..10.0, 1e-6..200.0).prop_map(|(from, span)| QuestionKind::Slider(
+                kinds::Slider {
+                    from,
+                    to: from + span,
+                    step: 1.0,
+                    labels: BTreeMap::new()
+                }
+            )),
+            (1usize..6, any::<bool>()).prop_map(|(n, multiple)| QuestionKind::Choice(
+                kinds::Choice {
+                    options: (0..n).map(|i| format!("option {i}")).collect(),
+                    multiple
+                }
+            )),
             (
                 prop::option::of(-1e6..1e6f64),
                 prop::option::of(1e-6..1e6f64)
             )
-                .prop_map(|(min, above)| QuestionKind::Number {
+                .prop_map(|(min, above)| QuestionKind::Number(kinds::Number {
                     unit: None,
                     min,
                     max: above.map(|above| min.unwrap_or(0.0) + above),
                     above: above.and(min),
-                }),
-            Just(QuestionKind::Text),
+                })),
+            prop::sample::select(
+                KINDS
+                    .iter()
+                    .flat_map(|k| (k.examples)())
+                    .collect::<Vec<_>>()
+            ),
         ]
     }
 

@@ -13,7 +13,6 @@ mod loading;
 pub mod rehearsal;
 pub mod saver;
 
-use crate::device::{Device, Report, Stimulus, manual, rendering_of};
 use clock::Clock;
 use loading::end_of_slot;
 use saver::{Job, SaveEvent, Saver};
@@ -23,14 +22,15 @@ use std::sync::Arc;
 use std::time::Duration;
 use study_base::limits::Limits;
 use study_base::text::{ModelId, PartId, ParticipantId};
-use study_core::outcome::{Channel, Event, Fidelity, Playback, Sample, Verdict};
-use study_core::protocol::fingerprint::Fingerprints;
-use study_core::protocol::{DeviceKind, FileOrders, ModelEntry, Protocol, Trial};
-use study_core::rendering::{Played, judge};
-use study_core::session::{Effect, Ending, Input, Screen, Session, Unsaved, View, input::Claim};
-use study_core::store::{ClaimRequest, Copies, Plan, Receipt, SeatKind, StudyFolder};
+use study_device::{Device, Report, Stimulus, manual, rendering_of};
 use study_haptics::identify::delivery::Delivery;
 use study_haptics::model::Realization;
+use study_plan::protocol::fingerprint::Fingerprints;
+use study_plan::protocol::{DeviceKind, FileOrders, ModelEntry, Protocol, Trial};
+use study_session::outcome::{Channel, Event, Fidelity, Playback, Sample, Verdict};
+use study_session::rendering::{Played, judge};
+use study_session::session::{Effect, Ending, Input, Screen, Session, Unsaved, View, input::Claim};
+use study_session::store::{ClaimRequest, Copies, Plan, Receipt, SeatKind, StudyFolder};
 use study_wire::servo::ServoSettings;
 
 /// Longest wait for an input while nothing else is expected: clocks on the screen move.
@@ -142,7 +142,7 @@ pub struct Runner {
     codes: BTreeMap<ModelId, String>,
     /// Whether the current playback reports telemetry.
     has_telemetry: bool,
-    /// Its samples.
+    /// Samples of the current playback, for its judgement.
     samples: Vec<Sample>,
     /// Whether wrong playbacks are only marked.
     only_flags: bool,
@@ -150,7 +150,7 @@ pub struct Runner {
 
 impl Runner {
     /// Opens a session; no participant is claimed yet.
-    pub fn new(setup: Setup, config: study_core::session::Config) -> Self {
+    pub fn new(setup: Setup, config: study_session::session::Config) -> Self {
         let at = setup.clock.now();
         let (session, effects) =
             Session::new(setup.protocol.clone(), setup.orders.clone(), config, at);
@@ -190,7 +190,7 @@ impl Runner {
                 IDLE
             };
             let inputs = operator
-                .next(&view, timeout)
+                .next(&view, self.setup.clock.wait(timeout))
                 .unwrap_or_else(|gone| vec![Input::Abort(gone.0)]);
             self.session.set_channel(operator.channel());
             if let Some(ended) = self.step(inputs) {
@@ -555,7 +555,7 @@ impl Drop for Runner {
     }
 }
 
-/// The codes on the physical samples of a study: for labelling them, and for the
+/// The codes on the physical samples of a study: for labeling them, and for the
 /// experimenter's prompt, which identifies a sample by its code only.
 pub fn sample_codes(protocol: &Protocol) -> BTreeMap<ModelId, String> {
     let ids: Vec<&ModelId> = protocol.models.iter().map(|m| &m.id).collect();

@@ -2,29 +2,27 @@
 //!
 //! [`Screen`] serves the page, and [`Both`] is an operator like [`crate::tui::Tui`]: it
 //! gives the terminal's inputs and those of the page. Nothing of the page is stored; the
-//! journal is the same. [`pages`] says what the page shows, [`replies`] what an answer
-//! means; the other files are the server. docs/screen.md describes the limits.
+//! journal is the same. [`study_session::page`] says what the page shows, [`replies`] what
+//! an answer means; the other files are the server. docs/screen.md describes the limits.
 
 mod access;
 mod board;
 mod code;
 mod http;
-pub mod pages;
 pub mod replies;
 mod server;
 
 use crate::runner::{Operator, OperatorError};
-use crate::tui::ui_state::same_page;
 use board::{Board, Outcome};
-use pages::Page;
 use serde::Serialize;
 use server::Server;
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use study_core::outcome::Channel;
-use study_core::protocol::phrases::Words;
-use study_core::session::{Input, View};
+use study_plan::protocol::phrases::Words;
+use study_session::outcome::Channel;
+use study_session::page::{self, Page, same_page};
+use study_session::session::{Input, View};
 
 /// How long the terminal is asked before the page is.
 const SLICE: Duration = Duration::from_millis(8);
@@ -111,7 +109,7 @@ pub struct Screen {
 struct Shown {
     id: String,
     page: Page,
-    screen: study_core::session::Screen,
+    screen: study_session::session::Screen,
 }
 
 /// A reply that the session has.
@@ -119,7 +117,7 @@ struct Shown {
 struct Pending {
     key: String,
     /// The screen that must be gone once it is accepted.
-    leaves: Option<study_core::session::Screen>,
+    leaves: Option<study_session::session::Screen>,
 }
 
 /// A page with its id.
@@ -175,7 +173,7 @@ impl Screen {
     /// Shows a view.
     fn show(&mut self, view: &View) {
         self.settle(view);
-        let Some(page) = pages::page(view) else {
+        let Some(page) = page::participant(view) else {
             return;
         };
         let same = self.shown.as_ref().is_some_and(|shown| {

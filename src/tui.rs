@@ -23,14 +23,14 @@ pub mod widgets;
 pub mod wrap;
 
 pub use surface::Surface;
-pub use theme::Colour;
+pub use theme::ColorDepth;
 
 use crate::runner::{Operator, OperatorError};
 use crossterm::event::{Event, MouseEventKind};
 use pace::Pace;
 use std::time::{Duration, Instant};
-use study_core::outcome::Channel;
-use study_core::session::{Input, Screen, View};
+use study_session::outcome::Channel;
+use study_session::session::{Input, Screen, View};
 use terminal::Terminal;
 pub(crate) use terminal::{Signals, survive_file_size_limit};
 
@@ -41,8 +41,10 @@ pub struct Options {
     pub mouse: bool,
     /// Whether the page shows that telemetry arrives.
     pub live: bool,
-    /// The colours to use.
-    pub colour: Colour,
+    /// The colors to use.
+    pub color: ColorDepth,
+    /// How many times as fast keys may follow each other: 1 except in tests.
+    pub hurry: u32,
 }
 
 /// Why a terminal cannot be used for a session.
@@ -113,9 +115,9 @@ impl Tui {
     pub fn open(options: Options) -> Result<Self, TuiError> {
         Ok(Self {
             terminal: Terminal::open(options.mouse)?,
-            surface: Surface::new(options.colour).with_live(options.live),
+            surface: Surface::new(options.color).with_live(options.live),
             drawn: None,
-            pace: Pace::new(Instant::now()),
+            pace: Pace::new(Instant::now()).hurried(options.hurry),
             suspend_since: None,
         })
     }

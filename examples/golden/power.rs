@@ -3,7 +3,7 @@
 use super::GoldenError;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
-use study_core::power::{
+use study_analysis::power::{
     Assumptions, Cell, CellResult, Link, Scale, Settings, Test, Vaf, floor, merge, run_chunk,
 };
 use study_stats::power::covariate::{self, Design, Spread, Values};
@@ -240,7 +240,7 @@ fn simulated(case: &Value) -> Option<Value> {
     found["type_s"] = json!(pearson.type_s);
     found["type_m"] = json!(pearson.type_m);
     if settings.assumptions.scale == Scale::Continuous {
-        let closed = study_core::power::closed(&settings, &cell)?;
+        let closed = study_analysis::power::closed(&settings, &cell)?;
         found["pearson_closed"] = json!(closed.power);
     }
     Some(found)

@@ -1,14 +1,14 @@
 //! Reference files of psychophysics, by their `kind`: from the settings and rows of
-//! `input` to the functions of `study_core::analyze::psychophysics`.
+//! `input` to the functions of `study_analysis::analyze::psychophysics`.
 
 use serde::de::{DeserializeOwned, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 use serde_json::{Map, Value as Json, json};
+use study_analysis::analyze::psychophysics as analysis;
+use study_analysis::analyze::{Value, Values};
 use study_base::rng::Stream;
-use study_core::analyze::psychophysics as analysis;
-use study_core::analyze::{Value, Values};
-use study_core::procedure::{Function, Parameter, Passes, QuestPlus, Scale, Staircase, Stop};
-use study_core::procedure::{quest, staircase};
+use study_plan::procedure::{Function, Parameter, Passes, QuestPlus, Scale, Staircase, Stop};
+use study_plan::procedure::{quest, staircase};
 use study_stats::detection::Answers;
 use study_stats::mushra::Screening;
 use study_stats::psychometric::{Core, Experiment, Level, Spacing};
@@ -25,7 +25,7 @@ pub(crate) enum Error {
     #[error(transparent)]
     Json(#[from] serde_json::Error),
     #[error(transparent)]
-    Procedure(#[from] study_core::procedure::ProcedureError),
+    Procedure(#[from] study_plan::procedure::ProcedureError),
 }
 
 /// The values of a reference file; an undefined one is null.

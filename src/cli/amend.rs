@@ -1,9 +1,10 @@
 //! `study amend`
 
-use super::{Console, Failure, load, study_folder};
+use super::{Console, Failure, study_folder};
 use std::path::PathBuf;
+use study_analysis::load;
 use study_base::text::Untrusted;
-use study_core::store::Frozen;
+use study_session::store::{self, Frozen};
 
 /// Arguments of `study amend`.
 #[derive(Debug, clap::Args)]
@@ -23,7 +24,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let loaded = load::load_for(&args.protocol, &args.results)?;
     console.warnings_in_short(&loaded.findings, &args.protocol);
     let id = &loaded.protocol.study.id;
-    let mut studies = study_folder::studies(&args.results)?;
+    let mut studies = store::studies(&args.results)?;
     studies.retain(|s| s.manifest().study == *id);
     let Some(mut study) = studies.pop() else {
         let none = format!("{}: contains no study `{id}`", args.results.display());
@@ -34,7 +35,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         files: &loaded.files,
         fingerprints: &loaded.fingerprints,
     };
-    let changes = study_folder::changes(&study, &loaded)?;
+    let changes = load::changes(&study, &loaded)?;
     let version = study
         .amend(&frozen, reason, study_folder::now())
         .map_err(|error| study_folder::refused(error, &loaded))?;

@@ -1,32 +1,27 @@
 //! `study analyze`
 
 mod grim;
-mod parts;
-mod pool;
-mod preregistration;
-mod progress;
-mod report;
 mod trials;
 
-pub(in crate::cli) use parts::of_track;
-
-use super::load::Loaded;
-use super::{Console, Failure, study_folder};
-use crate::report::figures::Trace;
-use crate::report::html::Details;
-use crate::report::text::{Page, comments, page};
-use crate::report::{Source, csv, json, wide};
+use super::progress::{self, shown};
+use super::{Console, Failure, Kind, study_folder};
 use rayon::prelude::*;
 use std::fs::{self, File};
 use std::io::{self, BufReader};
 use std::path::{Path, PathBuf};
-use study_base::text::{QuestionId, Untrusted};
-use study_core::analyze::{self, Analysis, Better, Deviation, Include, Rules, Warning};
-use study_core::outcome::RatingRow;
-use study_core::outcome::ratings::Ratings;
-use study_core::protocol::{Protocol, Task};
-use study_core::store::disk::{Disk as _, RealDisk};
-use study_core::store::{Derived, StoreError, StudyFolder};
+use study_analysis::analyze::psychophysics::PartAnalysis;
+use study_analysis::analyze::{Better, Include, Progress, Rules};
+use study_analysis::study::{Analyzed, Options, Pool, Results, Study, analyze_table};
+use study_base::text::Untrusted;
+use study_report::figures::Trace;
+use study_report::html::Details;
+use study_report::study::{self as report, Output};
+use study_report::text::{Page, comments, page, part, preregistered};
+use study_session::store::disk::{Disk as _, RealDisk};
+use study_session::store::{self, StoreError, StudyFolder};
+
+/// What the progress of an analysis counts.
+const GROUPS: &str = "groups of statistics";
 
 /// Arguments of `study analyze`.
 #[derive(Debug, clap::Args)]
@@ -51,7 +46,7 @@ pub(super) struct Args {
     /// Folder for tables, report.html and figures (default for a study: its analysis/)
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Analyse this question instead of the protocol's primary one
+    /// Analyze this question instead of the protocol's primary one
     #[arg(long, value_name = "ID")]
     question: Option<String>,
     /// The scale of the ratings in a CSV, such as 1..7; ratings outside it are reported
@@ -116,8 +111,7 @@ fn parse_scale(given: &str) -> Result<(f64, f64), ScaleError> {
 /// Runs `study analyze`.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     if args.pool {
-        let input = pool::analysed(&args.results, args, console)?;
-        return show(args, &input, args.out.as_deref(), console);
+        return of_sites(args, console);
     }
     let results = match &args.results[..] {
         [] => return grim::run(&args.possible, args.json, console),
@@ -137,8 +131,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         return trials::run(results, task, &args.trials, args.json, console);
     }
     if results.is_file() {
-        let input = of_csv(results, args)?;
-        return show(args, &input, args.out.as_deref(), console);
+        return of_csv(results, args, console);
     }
     if args.scale.is_some() {
         return Err(Failure::input(
@@ -150,7 +143,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             "--direction is for a CSV: in a study higher ratings are better",
         ));
     }
-    let studies = study_folder::studies(results)?;
+    let studies = store::studies(results)?;
     if args.json && studies.len() > 1 {
         return Err(Failure::input(format!(
             "{}: {} studies, but --json prints only one",
@@ -161,68 +154,103 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     }
     let several = studies.len() > 1;
     let mut truncated = Ok(());
-    for (i, study) in studies.iter().enumerate() {
+    for (i, folder) in studies.into_iter().enumerate() {
         if i > 0 {
             console.out(format!("\n{}\n\n", "─".repeat(60)))?;
         }
-        let sessions = study.sessions()?;
-        let loaded = study_folder::frozen(study)?;
-        let derived = Derived::of(&sessions, &loaded.protocol);
-        let is_real = |row: &RatingRow| !row.pilot && !row.simulated;
-        let pilots = derived.rows.iter().any(|row| row.pilot) && !include(args).pilot;
-        if pilots && !derived.rows.iter().any(is_real) {
-            return Err(only_pilots(study));
-        }
-        let place = Place::of(args, study, several);
-        let parts = parts::analyse(&sessions, &derived, &loaded.protocol, args);
-        // Estimates of magnitudes are no ratings, though they are numbers.
-        let primary = Some(&loaded.protocol.analysis.primary);
-        let estimated = (loaded.protocol.parts.iter())
-            .any(|p| matches!(p.task, Task::Magnitude(_)) && p.asks.first() == primary);
-        let unrated = estimated || question(&loaded.protocol, None).is_err();
-        if !parts.is_empty() && args.question.is_none() && unrated {
-            let damage = study_folder::warnings(study, &sessions, Some(&loaded))?;
-            study_folder::warn(study, &damage, console);
-            let who = &derived.participants;
-            let source = Source {
-                preregistration: preregistration::of_parts(study, &sessions, &loaded, who, &parts)?,
-                ..source_of(study, &loaded.protocol)
-            };
-            let details = Details {
-                parts: parts::reports(&loaded.protocol, &parts),
-                damage,
-                ..report::details(&loaded.protocol, study, &derived, "")
-            };
-            parts::show(&source, &details, &parts, args, place, console)?;
-            truncated = truncated.and(study_folder::whole(study, &sessions));
-            continue;
-        }
-        let (input, damage) = rayon::join(
-            || of_study(study, &derived, &loaded, args),
-            || study_folder::warnings(study, &sessions, Some(&loaded)),
-        );
-        let (mut input, damage) = (input?, damage?);
-        input.details.parts = parts::reports(&loaded.protocol, &parts);
-        input.analysis.parts = parts;
-        preregistration::add(study, &sessions, &loaded, &mut input)?;
-        // The page contains these warnings; if it is not shown on a terminal, they are
-        // also printed to standard error.
-        if !console.terminal || args.json || args.comments {
-            study_folder::warn(study, &damage, console);
-        }
-        let damage = damage.into_iter().map(|text| Warning {
-            code: "damaged-results",
-            text: format!("{text} (see `study verify`)"),
-        });
-        // Before all other warnings.
-        input.analysis.warnings.splice(0..0, damage);
-        show(args, &input, place.out.as_deref(), console)?;
-        if let Some(error) = place.blocked {
-            study_folder::tables_unwritten(&error.into(), console);
-        }
-        truncated = truncated.and(study_folder::whole(study, &sessions));
+        let study = Study::read(folder)?;
+        of_study(&study, args, several, console)?;
+        truncated = truncated.and(study_folder::whole(&study.folder, &study.sessions));
     }
     truncated
+}
+
+/// Analyzes one study of RESULTS.
+fn of_study(
+    study: &Study,
+    args: &Args,
+    several: bool,
+    console: &mut Console,
+) -> Result<(), Failure> {
+    let place = Place::of(args, &study.folder, several);
+    let analyzed = shown(GROUPS, |progress| {
+        study.analyze(&args.options(Some(progress)))
+    })?;
+    // The page of ratings contains these warnings; if it is not shown on a terminal, they
+    // are also printed to standard error.
+    let on_page = analyzed.ratings().is_some() && console.terminal;
+    if !on_page || args.json || args.comments {
+        study_folder::warn(&study.folder, &analyzed.damage, console);
+    }
+    let details = report::details(study, &study.derived, &analyzed);
+    // Telemetry is large: read it only if figures are written.
+    let traces = match (analyzed.ratings(), &place.out) {
+        (Some(analysis), Some(_)) => study.traces(analysis),
+        _ => Vec::new(),
+    };
+    show(args, &analyzed, &details, &traces, place, console)
+}
+
+/// Analyzes several sites together.
+fn of_sites(args: &Args, console: &mut Console) -> Result<(), Failure> {
+    let pool = Pool::open(&args.results)?;
+    for study in pool.studies() {
+        study_folder::warn(&study.folder, &study.damage()?, console);
+        study_folder::whole(&study.folder, &study.sessions)?;
+    }
+    let analyzed = shown(GROUPS, |progress| {
+        pool.analyze(&args.options(Some(progress)))
+    })?;
+    let first = pool.studies().next();
+    let details = first.map_or_else(Details::default, |first| {
+        report::details(first, &pool.derived(), &analyzed)
+    });
+    // Whose playbacks would be shown? The reports of the sites have theirs.
+    show(args, &analyzed, &details, &[], Place::given(args), console)
+}
+
+/// Analyzes a table of ratings without a study.
+fn of_csv(path: &Path, args: &Args, console: &mut Console) -> Result<(), Failure> {
+    let file = File::open(path).map_err(|e| Failure::file(path, &e))?;
+    let length = file.metadata().map_or(0, |m| m.len());
+    let input = BufReader::with_capacity(1 << 16, progress::Reader::new(file, length));
+    let rules = Rules {
+        include: args.include(),
+        scale: args.scale,
+        better: args.direction.into(),
+        ..Rules::default()
+    };
+    let analyzed = shown(GROUPS, |progress| {
+        analyze_table(
+            path,
+            input,
+            args.question.as_deref(),
+            &rules,
+            Some(progress),
+        )
+    })?;
+    let details = Details {
+        seed: Some(rules.seed),
+        ..Details::default()
+    };
+    show(args, &analyzed, &details, &[], Place::given(args), console)
+}
+
+impl Args {
+    fn include(&self) -> Include {
+        Include {
+            pilot: self.include.contains(&Who::Pilot),
+            simulated: self.include.contains(&Who::Simulated),
+        }
+    }
+
+    fn options<'a>(&'a self, progress: Option<&'a Progress>) -> Options<'a> {
+        Options {
+            question: self.question.as_deref(),
+            include: self.include(),
+            progress,
+        }
+    }
 }
 
 /// Where the analysis of a study is written.
@@ -249,247 +277,83 @@ impl Place {
             blocked,
         }
     }
+
+    /// Only where the user says.
+    fn given(args: &Args) -> Self {
+        Self {
+            out: args.out.clone(),
+            blocked: None,
+        }
+    }
 }
 
-/// Pilots alone are analyzed only on request.
-fn only_pilots(study: &StudyFolder) -> Failure {
-    let path = study.path().display();
-    Failure::input(format!("{path}: holds only pilots so far")).hint(format!(
-        "`study analyze {path} --include pilot` analyzes them"
-    ))
-}
-
-/// An analysis with everything its report needs.
-struct Analysed {
-    source: Source,
-    details: Details,
-    traces: Vec<Trace>,
-    analysis: Analysis,
-}
-
+/// Writes and prints an analysis.
 fn show(
     args: &Args,
-    analysed: &Analysed,
-    out: Option<&Path>,
+    analyzed: &Analyzed,
+    details: &Details,
+    traces: &[Trace],
+    place: Place,
     console: &mut Console,
 ) -> Result<(), Failure> {
-    let Analysed {
-        source, analysis, ..
-    } = analysed;
-    let written = out.map(|dir| (dir, write_all(dir, analysed)));
+    let source = &analyzed.source;
+    let answers = |parts: &[PartAnalysis]| parts.iter().any(|part| part.trials > 0);
+    if analyzed.ratings().is_none() && !answers(analyzed.parts()) {
+        return Err(Failure::input(format!(
+            "{}: no answers that count",
+            source.path
+        )));
+    }
+    let written = place.out.as_deref().map(|dir| {
+        let files = report::files(analyzed, details, traces);
+        let files = files.map_err(|e| Failure::new(Kind::Bug, e));
+        (dir, files.and_then(|files| write_files(dir, &files)))
+    });
     let written = match written {
         // Writing to a folder that the user named must succeed.
         Some((_, Err(failure))) if args.out.is_some() => return Err(failure),
         other => other,
     };
     if args.json {
-        return console.document(json::document(source, analysis));
+        console.document(report::document(analyzed))?;
+    } else {
+        print(args, analyzed, console)?;
+        match written {
+            Some((dir, Ok(()))) => {
+                console.say(format!("report: {}", dir.join("report.html").display()));
+            }
+            Some((_, Err(failure))) => study_folder::tables_unwritten(&failure, console),
+            None => {}
+        }
     }
+    if let Some(error) = place.blocked {
+        study_folder::tables_unwritten(&error.into(), console);
+    }
+    Ok(())
+}
+
+/// The analysis on the terminal.
+fn print(args: &Args, analyzed: &Analyzed, console: &mut Console) -> Result<(), Failure> {
+    let source = &analyzed.source;
     let terminal = Page {
         width: console.width,
-        colour: console.colour,
+        color: console.color,
     };
-    if args.comments {
-        console.out(comments(analysis, terminal))?;
-    } else {
-        console.out(page(source, analysis, terminal))?;
-        parts::pages(&source.title, &analysis.parts, console)?;
-    }
-    match written {
-        Some((dir, Ok(()))) => {
-            console.say(format!("report: {}", dir.join("report.html").display()));
+    match &analyzed.results {
+        Results::Ratings(analysis) if args.comments => {
+            return console.out(comments(analysis, terminal));
         }
-        Some((_, Err(failure))) => study_folder::tables_unwritten(&failure, console),
-        None => {}
+        Results::Ratings(analysis) => console.out(page(source, analysis, terminal))?,
+        Results::Parts(_) => {}
     }
-    Ok(())
-}
-
-/// Writes tables, report and figures.
-fn write_all(dir: &Path, analysed: &Analysed) -> Result<(), Failure> {
-    let Analysed {
-        source,
-        details,
-        traces,
-        analysis,
-    } = analysed;
-    let tables = (csv::tables(source, analysis).into_iter()).chain([wide::file(analysis)]);
-    let mut files: Vec<report::Output> = tables.map(report::Output::table).collect();
-    files.extend(report::files(source, details, analysis, traces)?);
-    write_files(dir, &files)?;
-    report::clear_figures(dir, &files);
-    Ok(())
-}
-
-fn include(args: &Args) -> Include {
-    Include {
-        pilot: args.include.contains(&Who::Pilot),
-        simulated: args.include.contains(&Who::Simulated),
+    for analysis in analyzed.parts() {
+        let title = format!("{}: {}", source.title, analysis.part.as_str());
+        console.out(format!("{}\n", part(&title, analysis, terminal)))?;
     }
-}
-
-/// Analyzes a table of ratings without a study.
-fn of_csv(path: &Path, args: &Args) -> Result<Analysed, Failure> {
-    let file = File::open(path).map_err(|e| Failure::file(path, &e))?;
-    let name = path.display().to_string();
-    let length = file.metadata().map_or(0, |m| m.len());
-    let input = BufReader::with_capacity(1 << 16, progress::Reader::new(file, length));
-    let ratings =
-        Ratings::read_csv(&name, input, args.question.as_deref()).map_err(Failure::input)?;
-    let rules = Rules {
-        include: include(args),
-        scale: args.scale,
-        better: args.direction.into(),
-        ..Rules::default()
-    };
-    let title = path.file_name().unwrap_or_default().to_string_lossy();
-    let source = Source {
-        title: title.into_owned(),
-        study: None,
-        protocol_version: None,
-        path: name,
-        ..Source::default()
-    };
-    Ok(Analysed {
-        source,
-        details: Details {
-            seed: Some(rules.seed),
-            ..Details::default()
-        },
-        traces: Vec::new(),
-        analysis: progress::analyze(&ratings, &rules),
-    })
-}
-
-/// The study for the head of its report.
-fn source_of(study: &StudyFolder, protocol: &Protocol) -> Source {
-    Source {
-        title: protocol.study.title.clone(),
-        study: Some(protocol.study.id.clone()),
-        protocol_version: Some(study.version()),
-        path: study.path().display().to_string(),
-        ..Source::default()
+    match (&analyzed.results, &source.preregistration) {
+        (Results::Parts(_), Some(found)) => console.out(preregistered(found, terminal)),
+        _ => Ok(()),
     }
-}
-
-/// Analyzes a study by the newest version of its protocol. Model files are read too,
-/// because the VAF may be given only there.
-fn of_study(
-    study: &StudyFolder,
-    derived: &Derived,
-    loaded: &Loaded,
-    args: &Args,
-) -> Result<Analysed, Failure> {
-    let protocol = &loaded.protocol;
-    let question = question(protocol, args.question.as_deref())?;
-    let ratings = ratings(loaded, derived, &question);
-    let rules = Rules {
-        deviations: deviations(study)?,
-        ..Rules::of(protocol, question.as_str(), include(args))
-    };
-    let source = source_of(study, protocol);
-    let mut analysis = progress::analyze(&ratings, &rules);
-    let shares = protocol.analysis.share_of(&question).map(|option| Warning {
-        code: "shares",
-        text: format!(
-            "numbers are shares: 1 for the answer “{option}”, and 0 for any other; t tests of shares are \
-             approximate, and the ordinal model is a logistic one"
-        ),
-    });
-    analysis.warnings.splice(0..0, shares);
-    let written = !args.json || args.out.is_some();
-    Ok(Analysed {
-        source,
-        details: report::details(protocol, study, derived, question.as_str()),
-        // Telemetry is large: read it only if figures are written.
-        traces: if written {
-            report::traces(study, &derived.rows, &analysis)
-        } else {
-            Vec::new()
-        },
-        analysis,
-    })
-}
-
-/// The answers to a question, with what the protocol and the model files say of the
-/// realizations.
-fn ratings(loaded: &Loaded, derived: &Derived, question: &QuestionId) -> Ratings {
-    let share_of = loaded.protocol.analysis.share_of(question);
-    let mut ratings = Ratings::from_rows(&derived.rows, question, share_of);
-    ratings.set_states(&derived.participants);
-    ratings.set_failed(&derived.rows, &derived.attempts);
-    describe_realizations(&mut ratings, loaded);
-    ratings
-}
-
-/// Hidden duplicates, and covariates from the model files.
-pub(in crate::cli) fn describe_realizations(ratings: &mut Ratings, loaded: &Loaded) {
-    let Loaded {
-        protocol, models, ..
-    } = loaded;
-    ratings.set_duplicates(protocol.models.iter().filter_map(|m| {
-        let original = m.duplicate_of.as_ref()?;
-        Some((m.id.as_str(), original.as_str()))
-    }));
-    for (id, model) in models {
-        let covariates = [
-            ("memory_mm", model.provenance.memory_mm),
-            ("lambda", model.provenance.lambda),
-        ];
-        for (name, value) in covariates {
-            if let Some(value) = value {
-                ratings.add_covariate(id.as_str(), name, value);
-            }
-        }
-    }
-}
-
-/// The given question or the primary one, which must have numeric answers.
-fn question(protocol: &Protocol, asked: Option<&str>) -> Result<QuestionId, Failure> {
-    let id = match asked {
-        None => protocol.analysis.primary.clone(),
-        Some(id) => QuestionId::new(id).map_err(Failure::input)?,
-    };
-    let numeric: Vec<&str> = protocol
-        .questions
-        .iter()
-        .filter(|q| q.kind.is_number() || protocol.analysis.share_of(&q.id).is_some())
-        .map(|q| q.id.as_str())
-        .collect();
-    if numeric.contains(&id.as_str()) {
-        Ok(id)
-    } else {
-        Err(
-            Failure::input(format!("there is no question `{id}` with numeric answers")).hint(
-                format!("questions with numeric answers: {}", numeric.join(", ")),
-            ),
-        )
-    }
-}
-
-/// The changes of the analysis in later versions of the protocol.
-fn deviations(study: &StudyFolder) -> Result<Vec<Deviation>, Failure> {
-    let mut found = Vec::new();
-    let mut before: Option<Protocol> = None;
-    let versions = &study.manifest().versions;
-    for version in versions.iter().filter(|_| versions.len() > 1) {
-        let after = study_folder::frozen_version(study, version.version)?.protocol;
-        if let Some(before) = &before {
-            let changes = analyze::deviations(before, &after);
-            found.extend(changes.into_iter().map(|change| Deviation {
-                text: format!(
-                    "protocol {} of {}, because \"{}\": {}",
-                    version.version,
-                    version.at.format("%Y-%m-%d"),
-                    version.reason,
-                    change.text
-                ),
-                ..change
-            }));
-        }
-        before = Some(after);
-    }
-    Ok(found)
 }
 
 /// Creates a folder and its parents; only the owner can enter the new ones.
@@ -521,10 +385,10 @@ fn is_private(path: &Path) -> bool {
     }
 }
 
-/// Writes each file atomically, unless it already has this content. Nothing is synced,
+/// Writes each file of a report atomically, unless it already has this content. Nothing is synced,
 /// because all files can be regenerated. Only the owner can read them: they contain
 /// single ratings and comments.
-fn write_files(dir: &Path, files: &[report::Output]) -> Result<(), Failure> {
+fn write_files(dir: &Path, files: &[Output]) -> Result<(), Failure> {
     let figures = dir.join("figures");
     // A link may lead to a folder that is not ours.
     if fs::symlink_metadata(&figures).is_ok_and(|m| m.is_symlink()) {
@@ -555,5 +419,22 @@ fn write_files(dir: &Path, files: &[report::Output]) -> Result<(), Failure> {
             let _ = fs::remove_file(&part);
             Failure::file(&path, &e)
         })
-    })
+    })?;
+    clear_figures(dir, files);
+    Ok(())
+}
+
+/// Removes figures of an earlier analysis that this one did not write.
+fn clear_figures(dir: &Path, files: &[Output]) {
+    let Ok(items) = fs::read_dir(dir.join("figures")) else {
+        return;
+    };
+    for item in items.flatten() {
+        let name = item.file_name().to_string_lossy().into_owned();
+        let path = format!("figures/{name}");
+        if report::is_figure(&name) && !files.iter().any(|f| f.name == path) {
+            // A remaining outdated figure is no reason to fail.
+            let _ = fs::remove_file(item.path());
+        }
+    }
 }

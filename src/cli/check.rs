@@ -1,14 +1,15 @@
 //! `study check`: every fault of a protocol and of the files that it names.
 
-use super::{Console, Failure, load};
+use super::{Console, Failure};
 use serde::Serialize;
 use std::path::PathBuf;
+use study_analysis::load;
+use study_analysis::power;
 use study_base::apa;
 use study_base::diagnostic::{Findings, Severity};
 use study_base::text::{ModelId, Untrusted, counted};
-use study_core::power;
-use study_core::protocol::{DeviceKind, ModelEntry, Protocol, check};
 use study_haptics::model::Realization;
+use study_plan::protocol::{DeviceKind, ModelEntry, Protocol, check};
 use study_stats::power::detectable_correlation;
 
 /// Arguments of `study check`.
@@ -35,7 +36,7 @@ struct Report<'a> {
     models: Option<usize>,
     trials: Option<usize>,
     minutes: Option<f64>,
-    fingerprints: Option<&'a study_core::protocol::fingerprint::Fingerprints>,
+    fingerprints: Option<&'a study_plan::protocol::fingerprint::Fingerprints>,
     certificates: Vec<Certified<'a>>,
     /// Null without three realizations with a VAF.
     sensitivity: Option<Sensitivity>,

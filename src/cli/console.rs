@@ -10,10 +10,10 @@ use study_base::text::{Untrusted, escaped_json};
 pub struct Console {
     out: Box<dyn Write>,
     err: Box<dyn Write>,
-    /// Whether standard output shows colours.
-    pub colour: bool,
-    /// Whether standard error shows colours.
-    pub err_colour: bool,
+    /// Whether standard output shows colors.
+    pub color: bool,
+    /// Whether standard error shows colors.
+    pub err_color: bool,
     /// Whether standard output is a terminal.
     pub terminal: bool,
     /// Columns of the terminal; 100 where there is none.
@@ -60,7 +60,7 @@ fn quoted(word: &str) -> String {
 /// The failure to write standard output; none for a closed pipe, whose reader has ended.
 pub(super) fn unwritten(error: &io::Error) -> Option<Failure> {
     let closed = error.kind() == io::ErrorKind::BrokenPipe;
-    let why = study_core::store::plain(error);
+    let why = study_session::store::plain(error);
     (!closed).then(|| Failure::input(format!("standard output: {why}")))
 }
 
@@ -79,20 +79,20 @@ impl Console {
         Self {
             out: Box::new(io::BufWriter::new(io::stdout())),
             err: Box::new(io::stderr()),
-            colour: terminal && !plain,
-            err_colour: io::stderr().is_terminal() && !plain,
+            color: terminal && !plain,
+            err_color: io::stderr().is_terminal() && !plain,
             terminal,
             width,
         }
     }
 
-    /// A console that writes to `out` and `err`, without colour, 100 columns wide.
+    /// A console that writes to `out` and `err`, without color, 100 columns wide.
     pub fn to(out: impl Write + 'static, err: impl Write + 'static) -> Self {
         Self {
             out: Box::new(out),
             err: Box::new(err),
-            colour: false,
-            err_colour: false,
+            color: false,
+            err_color: false,
             terminal: false,
             width: 100,
         }
@@ -139,7 +139,7 @@ impl Console {
     pub fn findings(&mut self, findings: &[Findings]) {
         for severity in [Severity::Error, Severity::Warning] {
             for f in findings {
-                let shown = f.only(severity).render(self.err_colour);
+                let shown = f.only(severity).render(self.err_color);
                 let _ = write!(self.err, "{shown}");
             }
         }

@@ -15,11 +15,12 @@ mod single_playback;
 #[cfg(not(unix))]
 mod unsupported;
 
-use super::{Console, Failure, load};
+use super::{Console, Failure};
 use serialport::SerialPortType;
 use std::path::{Path, PathBuf};
+use study_analysis::load;
 use study_base::text::Untrusted;
-use study_core::protocol::DeviceKind;
+use study_plan::protocol::DeviceKind;
 
 /// Arguments of `study device`.
 #[derive(Debug, clap::Args)]

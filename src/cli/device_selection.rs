@@ -1,19 +1,20 @@
 //! Selection of the device from the protocol, the arguments and `device.toml`.
 
 use super::{Console, Failure};
-use crate::device::host::HostSettings;
-use crate::device::link::{LinkedDevice, Priority, priority};
-use crate::device::manual::{Manual, WithManual};
-use crate::device::process::{HELLO_TIMEOUT, Opened, Opening, ProcessDevice};
-use crate::device::serial::{BAUD, SerialOpener};
-use crate::device::virtual_device::{Options, VirtualDevice};
-use crate::device::{Device, DeviceError};
+use crate::rehearsal::with_manual_samples;
 use crate::tui;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use study_base::text::Untrusted;
-use study_core::protocol::{DeviceKind, Protocol};
+use study_device::host::HostSettings;
+use study_device::link::{LinkedDevice, Priority, priority};
+use study_device::manual::Manual;
+use study_device::process::{HELLO_TIMEOUT, Opened, Opening, ProcessDevice};
+use study_device::serial::{BAUD, SerialOpener};
+use study_device::virtual_device::{Options, VirtualDevice};
+use study_device::{Device, DeviceError};
+use study_plan::protocol::{DeviceKind, Protocol};
 
 /// Local device configuration in the working directory.
 const CONFIG_FILE: &str = "device.toml";
@@ -186,7 +187,7 @@ impl DeviceAddress {
         })
     }
 
-    /// Starts the program and waits for its hello. `None` if the user cancelled.
+    /// Starts the program and waits for its hello. `None` if the user canceled.
     pub(super) fn open_program(
         &self,
         display: &mut WaitDisplay<'_>,
@@ -203,7 +204,7 @@ impl DeviceAddress {
                 Opened::Device(device) => return Ok(Some(*device)),
                 Opened::NotYet(opening) => opening,
             };
-            if since.elapsed() > QUIET_WAIT && display.cancelled(&name, since.elapsed()) {
+            if since.elapsed() > QUIET_WAIT && display.canceled(&name, since.elapsed()) {
                 return Ok(None);
             }
         }
@@ -265,8 +266,8 @@ impl<'a> WaitDisplay<'a> {
         }
     }
 
-    /// Shows the waiting and returns whether the user cancelled.
-    fn cancelled(&mut self, program: &str, since: Duration) -> bool {
+    /// Shows the waiting and returns whether the user canceled.
+    fn canceled(&mut self, program: &str, since: Duration) -> bool {
         match self {
             Self::Line(_, true) => {}
             Self::Line(console, printed) => {
@@ -292,7 +293,7 @@ impl<'a> WaitDisplay<'a> {
 }
 
 /// Opens a device of the given kind, combined with an experimenter if some samples are
-/// mounted by hand. `None` if the user cancelled.
+/// mounted by hand. `None` if the user canceled.
 pub(super) fn open(
     address: &DeviceAddress,
     kind: DeviceKind,
@@ -322,16 +323,6 @@ pub(super) fn open(
         DeviceKind::Manual => return Ok(Some(Box::new(Manual::default()))),
     };
     Ok(Some(with_manual_samples(device, protocol)))
-}
-
-/// Combines the device with an experimenter if some samples are mounted by hand.
-pub(super) fn with_manual_samples(device: Box<dyn Device>, protocol: &Protocol) -> Box<dyn Device> {
-    let mut models = protocol.models.iter();
-    if models.any(|m| m.device == Some(DeviceKind::Manual)) {
-        Box::new(WithManual::new(device))
-    } else {
-        device
-    }
 }
 
 /// The device that was tested.

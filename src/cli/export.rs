@@ -1,35 +1,27 @@
 //! `study export`: the data of a study for other programs and for archives.
 
 use super::{Console, Failure, study_folder};
-use sha2::{Digest as _, Sha256};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use std::collections::BTreeMap;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
-use study_base::text::{Untrusted, counted};
-use study_core::export::{
-    self, Amendment, Dialect, ExportError, Format, Options, Recorded, Source, Summary,
+use study_analysis::export::{
+    self, Amendment, Dialect, ExportError, FORMATS, FormatInfo, Options, Recorded, Source, Summary,
 };
-use study_core::outcome::Event;
-use study_core::outcome::ratings::Origin;
-use study_core::store::disk::{Disk as _, RealDisk};
-use study_core::store::{Derived, SessionData, StudyFolder, layout};
+use study_analysis::load;
+use study_base::hex::Digest;
+use study_base::text::{Untrusted, counted};
+use study_session::outcome::Event;
+use study_session::outcome::ratings::Origin;
+use study_session::store::disk::{Disk as _, RealDisk};
+use study_session::store::{self, Derived, SessionData, StudyFolder, layout};
 
-/// What a data set is for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum To {
-    /// Tables for spreadsheets, JASP and jamovi
-    Csv,
-    /// One row for each participant
-    Wide,
-    /// Brain Imaging Data Structure 1.10, behavioural data
-    Bids,
-    /// Psych-DS 1.5
-    PsychDs,
-    /// Frictionless Data Package
-    Frictionless,
-    /// Tables with an R script and a Quarto document that come to the numbers of `analyze`
-    R,
+/// The formats, for the help and for completion.
+fn formats() -> impl TypedValueParser<Value = &'static FormatInfo> {
+    let value = |format: &FormatInfo| PossibleValue::new(format.name).help(format.about);
+    PossibleValuesParser::new(FORMATS.iter().map(value))
+        .try_map(|name| FormatInfo::named(&name).ok_or(SignError("a format of the list")))
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -52,9 +44,9 @@ pub(super) struct Args {
     /// A results folder with one study, or the folder of a study in it
     results: PathBuf,
     /// The format
-    #[arg(long, value_enum, value_name = "FORMAT")]
-    to: To,
-    /// Folder for the data set; it must not exist or be empty
+    #[arg(long, value_name = "FORMAT", value_parser = formats())]
+    to: &'static FormatInfo,
+    /// Folder for the data set; if it exists, it must be empty
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Export these sessions instead of the real ones
@@ -119,25 +111,17 @@ fn parse_decimal(given: &str) -> Result<char, SignError> {
 
 impl Args {
     fn options(&self) -> Result<Options, Failure> {
-        let format = match self.to {
-            To::Csv => Format::Csv,
-            To::Wide => Format::Wide,
-            To::Bids => Format::Bids,
-            To::PsychDs => Format::PsychDs,
-            To::Frictionless => Format::Frictionless,
-            To::R => Format::R,
-        };
+        let format = self.to;
         let dialect = Dialect {
             separator: self.sheets.sep.unwrap_or(','),
             decimal_comma: self.sheets.decimal == Some(','),
             bom: self.sheets.bom,
             safe: self.sheets.spreadsheet_safe,
         };
-        let sheets = matches!(self.to, To::Csv | To::Wide);
-        if !sheets && dialect != Dialect::default() {
+        if !format.sheets && dialect != Dialect::default() {
             return Err(Failure::usage(format!(
                 "--sep, --decimal, --bom and --spreadsheet-safe are for csv and wide: {} has a fixed form",
-                format.as_str()
+                format.name
             )));
         }
         if dialect.decimal_comma && dialect.separator == ',' {
@@ -146,10 +130,10 @@ impl Args {
                     .hint("add --sep ';', as spreadsheets with a decimal comma expect"),
             );
         }
-        if self.profile.is_some() && self.to != To::Frictionless {
+        if self.profile.is_some() && !format.profiles {
             return Err(Failure::usage("--profile is for --to frictionless"));
         }
-        if self.with_telemetry && self.to == To::Wide {
+        if self.with_telemetry && !format.telemetry {
             return Err(Failure::usage(
                 "--with-telemetry: one row for each participant has no place for it",
             )
@@ -176,7 +160,7 @@ impl Args {
 /// Runs `study export`.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let options = args.options()?;
-    let mut studies = study_folder::studies(&args.results)?;
+    let mut studies = store::studies(&args.results)?;
     let study = match (studies.pop(), studies.first()) {
         (Some(study), None) => study,
         (_, first) => {
@@ -190,8 +174,8 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     };
     let target = Target::new(&args.out, study.path())?;
     let sessions = study.sessions()?;
-    let loaded = study_folder::frozen(&study)?;
-    let damage = study_folder::warnings(&study, &sessions, Some(&loaded))?;
+    let loaded = load::frozen(&study)?;
+    let damage = load::damage(&study, &sessions, Some(&loaded))?;
     study_folder::warn(&study, &damage, console);
     let derived = Derived::of(&sessions, &loaded.protocol);
     let manifest = study.manifest();
@@ -275,16 +259,13 @@ fn recorded(session: &SessionData) -> Vec<Recorded> {
 
 /// For each participant a text that follows from the journals and is in no data set.
 fn secrets(sessions: &[SessionData]) -> BTreeMap<study_base::text::ParticipantId, String> {
-    let mut hashes: BTreeMap<_, Sha256> = BTreeMap::new();
+    let mut digests: BTreeMap<_, Digest> = BTreeMap::new();
     for session in sessions {
-        let hash: &mut Sha256 = hashes.entry(session.participant.clone()).or_default();
-        hash.update(session.last_hash());
+        let digest = digests.entry(session.participant.clone()).or_default();
+        digest.update(session.last_hash());
     }
-    let text = |hash: Sha256| hash.finalize().iter().map(|b| format!("{b:02x}")).collect();
-    hashes
-        .into_iter()
-        .map(|(id, hash)| (id, text(hash)))
-        .collect()
+    let texts = digests.into_iter();
+    texts.map(|(id, digest)| (id, digest.finish())).collect()
 }
 
 fn read(study: &StudyFolder, recorded: &Recorded) -> io::Result<Vec<u8>> {
@@ -326,11 +307,10 @@ fn explained(error: WriteError, derived: &Derived, study: &StudyFolder) -> Failu
             Failure::results(format!("{path}: {error}"))
                 .hint(format!("`study verify {path}` lists all findings"))
         }
-        WriteError::Export(ExportError::Io(e)) => Failure::results(format!(
-            "{path}: a telemetry file: {}",
-            study_core::store::plain(&e)
-        ))
-        .hint(format!("`study verify {path}` lists all findings")),
+        WriteError::Export(ExportError::Io(e)) => {
+            Failure::results(format!("{path}: a telemetry file: {}", store::plain(&e)))
+                .hint(format!("`study verify {path}` lists all findings"))
+        }
         WriteError::File(path, e) => Failure::file(&path, &e),
     }
 }

@@ -74,7 +74,7 @@ impl Failure {
 
     /// A file could not be read or written.
     pub fn file(path: &std::path::Path, error: &std::io::Error) -> Self {
-        let why = study_core::store::plain(error);
+        let why = study_session::store::plain(error);
         Self::input(format!("{}: {why}", path.display()))
     }
 

@@ -252,7 +252,7 @@ const EXIT: &[(&str, &str)] = &[
 ];
 
 const ENVIRONMENT: &[(&str, &str)] = &[
-    ("NO_COLOR", "no colours if set"),
+    ("NO_COLOR", "no colors if set"),
     ("STUDY_PLAIN", "sessions in plain lines if set and not 0"),
     ("TERM", "dumb: sessions in plain lines, no bars"),
 ];

@@ -1,11 +1,12 @@
 //! `study new`: a commented protocol to start from, or a replication of a study.
 
-use super::{Console, Failure, load};
+use super::{Console, Failure};
 use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
+use study_analysis::load;
 use study_base::text::Untrusted;
-use study_core::protocol::file;
+use study_plan::protocol::file;
 
 /// The files of a new study: a commented protocol and three of the paper's realizations.
 const PROTOCOL: &str = include_str!("new/protocol.toml");
@@ -88,7 +89,7 @@ impl TrialKind {
 /// Arguments of `study new`.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// The folder to create; it must not exist or be empty
+    /// The folder to create; if it exists, it must be empty
     dir: PathBuf,
     /// Start a replication of the study in this results folder
     #[arg(long, value_name = "RESULTS")]

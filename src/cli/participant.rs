@@ -5,8 +5,8 @@ use clap::ValueEnum;
 use std::io::{self, IsTerminal as _};
 use std::path::{Path, PathBuf};
 use study_base::text::{ParticipantId, counted};
-use study_core::outcome::State;
-use study_core::store::{StateChange, StateRequest, layout};
+use study_session::outcome::State;
+use study_session::store::{self, StateChange, StateRequest, layout};
 
 /// Arguments of `study participant`.
 #[derive(Debug, clap::Args)]
@@ -76,7 +76,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         reason: study_folder::reason(&args.reason)?.to_owned(),
         erase: args.erase,
     };
-    let study = study_folder::one_study(&args.results)?;
+    let study = store::one_study(&args.results)?;
     if args.erase && !args.yes && !confirmed(study.path(), &request.participant, console)? {
         return console.out("Nothing is erased.\n");
     }

@@ -4,15 +4,16 @@ mod assume;
 mod shards;
 mod slurm;
 
-use super::{Console, Failure, load};
-use crate::report::picture::png::Painter;
-use crate::report::power::{Report, document, figure, head, results};
-use crate::report::text::Page;
+use super::{Console, Failure};
 use indicatif::ProgressBar;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
+use study_analysis::load;
+use study_analysis::power::{CHUNK, Cell, CellResult, Chunk, Plan, enough, merge, run_chunk};
 use study_base::text::Untrusted;
-use study_core::power::{CHUNK, Cell, CellResult, Chunk, Plan, enough, merge, run_chunk};
+use study_report::picture::png::Painter;
+use study_report::power::{Report, document, figure, head, results};
+use study_report::text::Page;
 
 /// Arguments of `study power`.
 #[derive(Debug, clap::Args)]
@@ -35,13 +36,13 @@ pub(super) struct Args {
     /// Folder for power.json and figures, or for the files of --shard
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Threads; they change no number
+    /// Number of threads (results do not depend on it)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
     /// Divide the work into this many parts, of which --shard is done
     #[arg(long, value_name = "N", requires = "shard", value_parser = clap::value_parser!(u64).range(1..=100_000))]
     shards: Option<u64>,
-    /// The part to do, from 0; --out has its file
+    /// Index of the shard to compute, from 0; it is written to --out
     #[arg(long, value_name = "I", requires = "shards", requires = "out")]
     shard: Option<u64>,
     /// Merge the parts in a folder
@@ -185,7 +186,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     }
     let page = Page {
         width: console.width,
-        colour: console.colour,
+        color: console.color,
     };
     let mut report = Report {
         title: loaded.protocol.study.title.clone(),

@@ -1,21 +1,24 @@
 //! `study preregister`: what a study states before its first session.
 
 use super::power::{simulate, units_of};
-use super::{Console, Failure, analyze, load};
-use crate::report::power::{self as power_report, Report};
-use crate::report::preregistration::{self as document, Content};
+use super::{Console, Failure};
 use chrono::NaiveDate;
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
-use study_base::text::{Untrusted, escaped_json};
-use study_core::analyze::{Include, Rules};
-use study_core::power::{Overrides, Plan, merge};
-use study_core::preregister::{
+use study_analysis::analyze::{Include, Rules};
+use study_analysis::load;
+use study_analysis::power::{Overrides, Plan, merge};
+use study_analysis::preregister::{
     FILE, FORMAT, Preregistration, complete_parts, complete_study, deciding,
 };
-use study_core::protocol::power::PowerPlan;
-use study_core::protocol::{Protocol, Task};
+use study_analysis::study::{describe_realizations, is_rated};
+use study_base::text::{Untrusted, escaped_json};
+use study_plan::protocol::Protocol;
+use study_plan::protocol::power::PowerPlan;
+use study_report::power::{self as power_report, Report};
+use study_report::preregistration::{self as document, Content};
+use study_report::study::track_in_words;
 
 /// The document for people.
 const MARKDOWN: &str = "preregistration.md";
@@ -51,12 +54,12 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let protocol = &loaded.protocol;
     let question = protocol.analysis.primary.clone();
     let mut ratings = complete_study(protocol, &question, n);
-    analyze::describe_realizations(&mut ratings, &loaded);
+    describe_realizations(&mut ratings, &loaded);
     if !is_rated(protocol) {
         ratings = ratings.keep(|_| false);
     }
     let rules = Rules::of(protocol, question.as_str(), Include::default());
-    let analysis = study_core::analyze::analyze(&ratings, &rules);
+    let analysis = study_analysis::analyze::analyze(&ratings, &rules);
     let parts = complete_parts(protocol, n);
     let (power, sentences) = power(protocol, args.studies)?;
     let facts = Preregistration {
@@ -81,7 +84,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         tracks: protocol
             .tracks
             .iter()
-            .map(|track| analyze::of_track(protocol, track))
+            .map(|track| track_in_words(protocol, track))
             .collect(),
         power: sentences,
     });
@@ -98,16 +101,6 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     }
     console.say(format!("written: {}", shown(&folder.join(MARKDOWN))));
     console.out(format!("{}\n", facts.sha256))
-}
-
-/// Whether the primary question is analyzed as a rating: numbers other than estimates of
-/// magnitude, or the share of an answer.
-fn is_rated(protocol: &Protocol) -> bool {
-    let primary = &protocol.analysis.primary;
-    let estimated = (protocol.parts.iter())
-        .any(|part| matches!(part.task, Task::Magnitude(_)) && part.asks.first() == Some(primary));
-    let number = protocol.primary().is_some_and(|q| q.kind.is_number());
-    !estimated && (number || protocol.analysis.share_of(primary).is_some())
 }
 
 fn shown(path: &Path) -> String {

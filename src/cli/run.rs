@@ -1,27 +1,29 @@
 //! `study run`: a session in the terminal.
 
 mod ending;
+mod hurry;
 mod page;
 mod unsaved;
 
 use super::console::shell_command;
 use super::device::record;
 use super::device_selection::{self, DeviceArgs, WaitDisplay};
-use super::{Console, Failure, Kind, load, study_folder};
-use crate::device::Identity;
+use super::{Console, Failure, Kind, study_folder};
 use crate::plain::Plain;
-use crate::runner::clock::{Clock as _, RealClock};
+use crate::runner::clock::{Clock, HurriedClock, RealClock};
 use crate::runner::{Operator, Runner, Setup};
 use crate::screen::Address;
 use crate::tui::{self, Tui};
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use std::sync::Arc;
+use study_analysis::load;
 use study_base::text::{PartId, ParticipantId, Untrusted};
-use study_core::protocol::DeviceKind;
-use study_core::session::roster::Newcomer;
-use study_core::session::{Config, Ending, MAX_OPERATOR, Roster};
-use study_core::store::{
+use study_device::Identity;
+use study_plan::protocol::DeviceKind;
+use study_session::session::roster::Newcomer;
+use study_session::session::{Config, Ending, MAX_OPERATOR, Roster};
+use study_session::store::{
     Copies, Frozen, Plan, SeatKind, SessionData, StudyFolder, check_new_id, layout, next_row,
     next_session, participants,
 };
@@ -55,7 +57,7 @@ pub(super) struct Args {
     /// (default: mirror in device.toml)
     #[arg(long, value_name = "DIR")]
     mirror: Option<PathBuf>,
-    /// Go on with a device whose last check does not speak for it; the session records it
+    /// Start although the device has not passed its check; the session records this
     #[arg(long)]
     unchecked: bool,
     /// Show whether telemetry arrives
@@ -87,8 +89,12 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     // Checks come before the device, and the device before the terminal, so that an
     // error message stays on the screen.
     let participant = check_ids(args)?;
-    refuse_unplayable(kind, &loaded)?;
-    let clock = RealClock::default();
+    loaded.check_playable(kind)?;
+    let times = hurry::hurry(std::env::var(hurry::VARIABLE).ok(), kind)?;
+    let clock: Box<dyn Clock> = match times {
+        1 => Box::new(RealClock::default()),
+        _ => Box::new(HurriedClock::new(times)),
+    };
     let at = clock.now();
     let frozen = Frozen {
         protocol: &loaded.protocol,
@@ -134,7 +140,8 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let options = tui::Options {
         mouse: !args.no_mouse,
         live: args.live,
-        colour: tui::Colour::detect(|name| std::env::var(name).ok()),
+        color: tui::ColorDepth::detect(|name| std::env::var(name).ok()),
+        hurry: times,
     };
     let address = &args.device.address;
     let plain = args.plain || wants_plain(|name| std::env::var(name).ok());
@@ -152,16 +159,20 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         return console.out("Nothing was recorded.\n");
     };
     refuse_unrendered(&device.identity(), kind, &loaded)?;
-    let (deliveries, said) = load::recordings::deliveries(&loaded)?;
+    let (deliveries, said) = load::deliveries(&loaded)?;
     for notice in said {
         console.say(format!("warning: {}", Untrusted(&notice)));
     }
     let within_h = loaded.protocol.device.check_within_h;
     let asked = (kind, within_h, args.unchecked);
     let device_check = record::checked(&*device, &args.results, asked, at.wall, console)?;
+    let device_check = match times {
+        1 => device_check,
+        _ => Some(hurry::mark(times)),
+    };
     // A person feels nothing on the simulated device: such data are never real.
     let overridden = kind != loaded.protocol.device.kind;
-    let seats = if args.pilot || overridden || device.identity().simulated {
+    let seats = if args.pilot || overridden || device.identity().simulated || times > 1 {
         SeatKind::Pilot
     } else {
         SeatKind::Real
@@ -169,7 +180,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     tui::survive_file_size_limit();
     // The terminal comes before the folder: without a terminal nothing is created.
     let mut operator: Box<dyn Operator> = match plain {
-        true => Box::new(Plain::open(args.live).map_err(unusable)?),
+        true => Box::new(Plain::open(args.live, times).map_err(unusable)?),
         false => Box::new(Tui::open(options).map_err(unusable)?),
     };
     if let Some(screen) = screen {
@@ -201,7 +212,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         device_kind: kind,
         device_check,
         device,
-        clock: Box::new(clock),
+        clock,
         threaded: true,
     };
     let config = Config {
@@ -329,42 +340,6 @@ fn check_ids(args: &Args) -> Result<Option<ParticipantId>, Failure> {
     id.map_err(|why| Failure::input(why).hint("use a pseudonym, such as P01"))
 }
 
-/// Refuses realizations that the device cannot play or must not play. Samples mounted by
-/// hand need no table.
-pub(super) fn refuse_unplayable(kind: DeviceKind, loaded: &load::Loaded) -> Result<(), Failure> {
-    if kind == DeviceKind::Manual {
-        return Ok(());
-    }
-    let protocol = &loaded.protocol;
-    let permitted = protocol.device.uncertified.as_ref().is_some_and(|u| u.play);
-    for model in &protocol.models {
-        if model.device == Some(DeviceKind::Manual) {
-            continue;
-        }
-        match loaded.models.get(&model.id) {
-            None if kind != DeviceKind::Process => {
-                return Err(Failure::input(format!(
-                    "realization `{}` has no table for a {} device",
-                    model.id,
-                    kind.as_str()
-                ))
-                .hint(
-                    "add its `file`; only a child program or a sample mounted by hand needs none",
-                ));
-            }
-            Some(table) if !permitted && !table.certificate().passes() => {
-                return Err(Failure::input(format!(
-                    "the table of `{}` can put energy into a hand, which the protocol, made for samples mounted by hand, does not permit",
-                    model.id,
-                ))
-                .hint(load::PERMIT));
-            }
-            _ => {}
-        }
-    }
-    Ok(())
-}
-
 /// Refuses, before anything is recorded, a study with realizations that the device would
 /// refuse: mechanisms where it plays tables only, and what is stiffer than it renders.
 fn refuse_unrendered(
@@ -459,7 +434,7 @@ fn resume_command(args: &Args, participant: &str) -> String {
 fn finish(
     console: &mut Console,
     study: &StudyFolder,
-    protocol: &study_core::protocol::Protocol,
+    protocol: &study_plan::protocol::Protocol,
     participant: &str,
     how: &Ending,
     resume: &str,
@@ -496,9 +471,9 @@ mod tests {
     use std::cell::RefCell;
     use std::path::Path;
     use std::rc::Rc;
-    use study_core::outcome::State;
-    use study_core::protocol::Seat;
-    use study_core::store::StoreError;
+    use study_plan::protocol::Seat;
+    use study_session::outcome::State;
+    use study_session::store::StoreError;
 
     #[derive(Clone, Default)]
     struct Written(Rc<RefCell<Vec<u8>>>);

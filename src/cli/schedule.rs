@@ -7,10 +7,11 @@ mod table;
 use super::{Console, Failure, Kind, study_folder};
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
+use study_analysis::load;
 use study_base::text::PartId;
-use study_core::protocol::{Assign, Assigned, FileOrders, Groups, Protocol, Seat, Stimuli, Trial};
-use study_core::schedule::{Planner, ScheduleError};
-use study_core::store::{StudyFolder, layout};
+use study_plan::protocol::{Assign, Assigned, FileOrders, Groups, Protocol, Seat, Stimuli, Trial};
+use study_plan::schedule::{Planner, ScheduleError};
+use study_session::store::{StudyFolder, layout};
 
 /// Most rows that are shown at once; more are probably a typing error.
 const MAX_ROWS: u32 = 100_000;
@@ -53,7 +54,7 @@ pub(super) struct Args {
 
 /// Runs `study schedule`.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
-    let loaded = super::load::load(&args.protocol)?;
+    let loaded = load::load(&args.protocol)?;
     let protocol = &loaded.protocol;
     let rows = match &args.answers {
         Some(_) => answers::only_row(args.rows.as_ref())?,
@@ -347,8 +348,8 @@ mod tests {
     use std::io::Write;
     use std::rc::Rc;
     use study_base::text::ModelId;
-    use study_core::protocol::example::protocol;
-    use study_core::protocol::{ModelEntry, Order, Role};
+    use study_plan::protocol::example::protocol;
+    use study_plan::protocol::{ModelEntry, Order, Role};
 
     #[derive(Clone, Default)]
     struct Shared(Rc<RefCell<Vec<u8>>>);

@@ -1,7 +1,7 @@
 //! `study schema`: the JSON Schema of the protocol file, for editors.
 
 use super::{Console, Failure};
-use study_core::protocol::schema::json_schema;
+use study_plan::protocol::schema::json_schema;
 
 /// Arguments of `study schema`.
 #[derive(Debug, clap::Args)]

@@ -3,9 +3,12 @@
 use super::{Console, Failure, study_folder};
 use std::fmt::Write as _;
 use std::path::PathBuf;
+use study_analysis::load;
 use study_base::text::Untrusted;
-use study_core::outcome::{ParticipantRow, State, Verdict};
-use study_core::store::{Plan, SessionData, StudyFolder, next_row, next_session, participants};
+use study_session::outcome::{ParticipantRow, State, Verdict};
+use study_session::store::{
+    self, Plan, SessionData, StudyFolder, next_row, next_session, participants,
+};
 
 /// Arguments of `study status`.
 #[derive(Debug, clap::Args)]
@@ -17,20 +20,16 @@ pub(super) struct Args {
 /// Prints the participants and their states, never an order.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let mut truncated = Ok(());
-    for (n, study) in study_folder::studies(&args.results)?.iter().enumerate() {
+    for (n, study) in store::studies(&args.results)?.iter().enumerate() {
         if n > 0 {
             console.out("\n")?;
         }
         let sessions = study.sessions()?;
-        study_folder::warn(
-            study,
-            &study_folder::warnings(study, &sessions, None)?,
-            console,
-        );
-        // Bars and colours are for eyes: a pipe and a dumb terminal get words.
+        study_folder::warn(study, &load::damage(study, &sessions, None)?, console);
+        // Bars and colors are for eyes: a pipe and a dumb terminal get words.
         let look = Look {
             bars: console.terminal && !super::run::wants_plain(|name| std::env::var(name).ok()),
-            colour: console.colour,
+            color: console.color,
         };
         console.out(of_study(study, &sessions, look))?;
         truncated = truncated.and(study_folder::whole(study, &sessions));
@@ -42,7 +41,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
 #[derive(Debug, Clone, Copy)]
 struct Look {
     bars: bool,
-    colour: bool,
+    color: bool,
 }
 
 fn of_study(study: &StudyFolder, sessions: &[SessionData], look: Look) -> String {
@@ -92,7 +91,7 @@ fn of_study(study: &StudyFolder, sessions: &[SessionData], look: Look) -> String
 /// Who comes again, and from when on, in a study of repeated sessions; their groups.
 fn again(study: &StudyFolder, sessions: &[SessionData]) -> String {
     let mut out = String::new();
-    let Ok(loaded) = study_folder::frozen(study) else {
+    let Ok(loaded) = load::frozen(study) else {
         return out;
     };
     let protocol = &loaded.protocol;
@@ -217,13 +216,13 @@ fn table(rows: &[&ParticipantRow], runs: impl Fn(&ParticipantRow) -> bool, look:
         }
         let text = text.trim_end();
         // Green and yellow of the terminal; the words say the same.
-        let colour = match state {
+        let color = match state {
             Some(State::Done) => "\u{1b}[32m",
             Some(State::Unfinished) => "\u{1b}[33m",
             _ => "",
         };
-        let _ = match look.colour && !colour.is_empty() {
-            true => writeln!(out, "{colour}{text}\u{1b}[0m"),
+        let _ = match look.color && !color.is_empty() {
+            true => writeln!(out, "{color}{text}\u{1b}[0m"),
             false => writeln!(out, "{text}"),
         };
     }
@@ -253,7 +252,7 @@ fn summary(study: &StudyFolder, real: &[&ParticipantRow]) -> String {
         n => format!("{n} participants: {}", counts.join(", ")),
     };
     // A damaged frozen protocol is reported among the warnings.
-    match study_folder::frozen(study) {
+    match load::frozen(study) {
         Ok(loaded) => format!("{people}; {} planned", loaded.protocol.design.participants),
         Err(_) => people,
     }
@@ -267,7 +266,7 @@ mod tests {
     fn the_bar_is_full_at_the_last_trial_only() {
         let look = Look {
             bars: true,
-            colour: false,
+            color: false,
         };
         let bar = |done: u32, planned: u32| trials((done, planned), look);
         assert_eq!(bar(0, 15), "──────────  0/15");
@@ -278,7 +277,7 @@ mod tests {
         assert_eq!(bar(16, 15), "━━━━━━━━━━ 16/15");
         let plain = Look {
             bars: false,
-            colour: false,
+            color: false,
         };
         assert_eq!(trials((7, 15), plain), "7/15");
     }

@@ -1,15 +1,17 @@
 //! Opening the studies of a results folder; shared by the commands on it.
 
 use super::failure::Kind;
-use super::load::{self, Loaded};
 use super::{Console, Failure};
-use std::path::Path;
+use study_analysis::load::{self, FrozenError, LoadError, Loaded, RecordingError, Unplayable};
+use study_analysis::study::{Difference, PoolError, StudyError};
 use study_base::diagnostic::{Fault, Findings};
-use study_core::outcome::Moment;
-use study_core::protocol::difference::{self, Change};
-use study_core::protocol::file;
-use study_core::protocol::question::MAX_TEXT_BYTES;
-use study_core::store::{Finding, SessionData, StoreError, StudyFolder, layout, plain};
+use study_base::text::Untrusted;
+use study_plan::protocol::answer::MAX_TEXT_BYTES;
+use study_plan::protocol::difference::Change;
+use study_plan::protocol::file;
+use study_session::outcome::Moment;
+use study_session::outcome::ratings::Origin;
+use study_session::store::{SessionData, StoreError, StudyFolder, layout};
 
 impl From<StoreError> for Failure {
     fn from(error: StoreError) -> Self {
@@ -26,68 +28,103 @@ impl From<StoreError> for Failure {
     }
 }
 
-/// The studies of RESULTS, a results folder or the folder of one study in it.
-pub(super) fn studies(path: &Path) -> Result<Vec<StudyFolder>, Failure> {
-    // A link that leads nowhere is there, too.
-    let is_study = |folder: &Path| folder.join(layout::MANIFEST).symlink_metadata().is_ok();
-    if is_study(path) {
-        return Ok(vec![StudyFolder::open(path)?]);
+impl From<LoadError> for Failure {
+    fn from(error: LoadError) -> Self {
+        Self::faults(error.0)
     }
-    let failed = |e: &std::io::Error| {
-        let why = match e.kind() {
-            std::io::ErrorKind::NotADirectory => "a file, not a results folder".to_owned(),
-            _ => plain(e),
+}
+
+impl From<FrozenError> for Failure {
+    fn from(error: FrozenError) -> Self {
+        Self {
+            kind: Kind::Results,
+            ..error.0.into()
+        }
+    }
+}
+
+impl From<Unplayable> for Failure {
+    fn from(error: Unplayable) -> Self {
+        Self::input(&error).hint(error.hint())
+    }
+}
+
+impl From<RecordingError> for Failure {
+    fn from(error: RecordingError) -> Self {
+        Self::input(error)
+    }
+}
+
+impl From<StudyError> for Failure {
+    fn from(error: StudyError) -> Self {
+        match error {
+            StudyError::Store(error) => error.into(),
+            StudyError::Frozen(error) => error.into(),
+            StudyError::NotNumeric { ref numeric, .. } => {
+                Self::input(&error).hint(format!("questions with numeric answers: {numeric}"))
+            }
+            StudyError::OnlyPilots(ref path) => Self::input(&error).hint(format!(
+                "`study analyze {} --include pilot` analyzes them",
+                path.display()
+            )),
+            StudyError::Preregistration { .. } => Self::results(error)
+                .hint("`study verify` says whether it was changed since the study began"),
+            StudyError::Table(_) | StudyError::Id(_) => Self::input(error),
+        }
+    }
+}
+
+impl From<PoolError> for Failure {
+    fn from(error: PoolError) -> Self {
+        let hint = match &error {
+            PoolError::Table(path) => {
+                return Self::input(format!(
+                    "{}: --pool compares the fingerprints of studies, and a table has none",
+                    Untrusted(&path.display().to_string())
+                ))
+                .hint("name the results folder of each site");
+            }
+            PoolError::TooFew => {
+                return Self::usage("--pool takes two sites or more")
+                    .hint("study analyze --pool SITE-A SITE-B");
+            }
+            PoolError::Several { first, .. } => format!(
+                "name one, such as {}",
+                Untrusted(&first.display().to_string())
+            ),
+            PoolError::Differ { what, .. } => match what {
+                Difference::Stimuli => {
+                    "only sites with the same stimulus fingerprint can be pooled; analyze them apart"
+                }
+                Difference::Rules => {
+                    "amend one of them, so that one set of rules holds for both sites"
+                }
+            }
+            .to_owned(),
+            PoolError::SameSession { .. } => {
+                "a site is counted once; was a folder copied?".to_owned()
+            }
+            PoolError::NotPooled { .. } => {
+                "analyze each site; `--question` names a rating of the study, if it has one"
+                    .to_owned()
+            }
+            PoolError::Mixed { other, .. } => {
+                let flag = match other.1 {
+                    Origin::Simulated => "simulated",
+                    _ => "pilot",
+                };
+                format!("--include {flag} mixes them, under a banner")
+            }
+            PoolError::OnlyPilots => "--include pilot analyzes them".to_owned(),
+            PoolError::Study(_) | PoolError::Twice(_) | PoolError::Empty(_) => {
+                return match error {
+                    PoolError::Study(error) => error.into(),
+                    other => Self::input(other),
+                };
+            }
         };
-        Failure::results(format!("{}: {why}", path.display()))
-    };
-    let mut folders = Vec::new();
-    for item in std::fs::read_dir(path).map_err(|e| failed(&e))? {
-        let folder = item.map_err(|e| failed(&e))?.path();
-        if is_study(&folder) {
-            folders.push(folder);
-        }
+        Self::input(error).hint(hint)
     }
-    folders.sort();
-    if folders.is_empty() {
-        let none = format!("{}: contains no results of a study", path.display());
-        return Err(Failure::results(none)
-            .hint("RESULTS is a results folder, or the folder of one study in it"));
-    }
-    folders
-        .iter()
-        .map(|folder| Ok(StudyFolder::open(folder)?))
-        .collect()
-}
-
-/// The only study of RESULTS.
-pub(super) fn one_study(path: &Path) -> Result<StudyFolder, Failure> {
-    let mut studies = studies(path)?;
-    match (studies.pop(), studies.len()) {
-        (Some(only), 0) => Ok(only),
-        (_, others) => {
-            let many = format!("{}: contains {} studies", path.display(), others + 1);
-            Err(Failure::input(many).hint("give the folder of one of them"))
-        }
-    }
-}
-
-/// The newest frozen protocol of a study, with the VAF of its models.
-pub(super) fn frozen(study: &StudyFolder) -> Result<Loaded, Failure> {
-    frozen_version(study, study.version())
-}
-
-/// The same for any version.
-pub(super) fn frozen_version(study: &StudyFolder, version: u32) -> Result<Loaded, Failure> {
-    let file = layout::protocol(study.path(), version).join(layout::PROTOCOL);
-    load::load_frozen(&file).map_err(|mut failure| {
-        failure.kind = Kind::Results;
-        failure
-    })
-}
-
-/// What differs between the newest frozen protocol of a study and another.
-pub(super) fn changes(study: &StudyFolder, loaded: &Loaded) -> Result<Vec<Change>, Failure> {
-    Ok(difference::changes(&frozen(study)?.parts, &loaded.parts))
 }
 
 /// The failure to open or amend a study with a protocol. If the stimuli differ, each
@@ -97,7 +134,7 @@ pub(super) fn refused(error: StoreError, loaded: &Loaded) -> Failure {
         return error.into();
     };
     let study = StudyFolder::open(path).ok();
-    let found = study.and_then(|study| changes(&study, loaded).ok());
+    let found = study.and_then(|study| load::changes(&study, loaded).ok());
     let bytes = loaded.files.first().map(|(_, bytes)| bytes.as_slice());
     let text = String::from_utf8_lossy(bytes.unwrap_or_default());
     let path = loaded.path.display().to_string();
@@ -128,51 +165,7 @@ pub(super) fn values(change: &Change) -> String {
     }
 }
 
-/// The problems of the journals and the frozen protocol of a study, as `study verify`
-/// reports them; one sentence each.
-pub(super) fn warnings(
-    study: &StudyFolder,
-    sessions: &[SessionData],
-    newest: Option<&Loaded>,
-) -> Result<Vec<String>, Failure> {
-    let mut found = study.faults(sessions)?;
-    found.extend(frozen_versions(study, newest));
-    let path = study.path().display();
-    Ok(found
-        .iter()
-        .map(|f| format!("{path}/{}: {}", f.place, f.what))
-        .collect())
-}
-
-/// Reads each frozen protocol and compares its fingerprints with study.json. `newest`
-/// is the newest version, if it has been read already.
-pub(super) fn frozen_versions(study: &StudyFolder, newest: Option<&Loaded>) -> Vec<Finding> {
-    let mut found = Vec::new();
-    for version in &study.manifest().versions {
-        let number = version.version;
-        let folder = layout::protocol(study.path(), number);
-        let is_link = folder.is_symlink();
-        let path = folder.join(layout::PROTOCOL);
-        let prints = match newest {
-            Some(loaded) if number == study.version() => Ok(loaded.fingerprints.clone()),
-            _ => load::load_frozen(&path).map(|loaded| loaded.fingerprints),
-        };
-        let what = match prints {
-            Ok(_) if is_link => "a symbolic link in the place of a folder".to_owned(),
-            Ok(prints) if prints == version.fingerprints => continue,
-            Ok(_) => "its fingerprints differ from those in study.json".to_owned(),
-            Err(_) => format!("it cannot be read; see `study check {}`", path.display()),
-        };
-        found.push(Finding {
-            is_problem: true,
-            place: format!("{}/{number}/{}", layout::PROTOCOLS, layout::PROTOCOL),
-            what,
-        });
-    }
-    found
-}
-
-/// Prints [`warnings`] on standard error.
+/// Prints [`study_analysis::load::damage`] on standard error.
 pub(super) fn warn(study: &StudyFolder, warnings: &[String], console: &mut Console) {
     for warning in warnings {
         console.say(format!("warning: {warning}"));
@@ -212,7 +205,7 @@ pub(super) fn tables_unwritten(failure: &Failure, console: &mut Console) {
 
 /// Writes the derived tables again.
 pub(super) fn refresh(study: &StudyFolder, console: &mut Console) -> Result<(), Failure> {
-    study.refresh(&frozen(study)?.protocol)?;
+    study.refresh(&load::frozen(study)?.protocol)?;
     if study.path().join(layout::ANALYSIS).exists() {
         console.say("analysis/ is out of date: run `study analyze` again");
     }

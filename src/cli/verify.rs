@@ -1,9 +1,10 @@
 //! `study verify`
 
-use super::{Console, Failure, study_folder};
+use super::{Console, Failure};
 use std::path::{Path, PathBuf};
+use study_analysis::load;
 use study_base::text::{Untrusted, counted};
-use study_core::store::{Finding, SessionData, StudyFolder, layout};
+use study_session::store::{self, Finding, SessionData, StudyFolder, layout};
 
 /// Arguments of `study verify`.
 #[derive(Debug, clap::Args)]
@@ -24,13 +25,13 @@ pub(super) struct Args {
 /// Prints the findings and fails if there is a problem.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let mut problems = 0;
-    for study in study_folder::studies(&args.results)? {
-        let protocol = study_folder::frozen(&study);
+    for study in store::studies(&args.results)? {
+        let protocol = load::frozen(&study);
         if let (true, Ok(loaded)) = (args.rebuild, &protocol) {
             study.refresh_with(&loaded.protocol, args.drop_missing)?;
         }
         let mut found = study.verify(protocol.as_ref().ok().map(|l| &l.protocol))?;
-        found.extend(study_folder::frozen_versions(&study, None));
+        found.extend(load::frozen_versions(&study, None));
         if let Some(copy) = &args.against {
             found.extend(study.verify_against(&copy_of(&study, copy)?)?);
         }

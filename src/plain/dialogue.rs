@@ -2,13 +2,13 @@
 
 use super::answers;
 use super::pages::{self, Page};
-use crate::tui::views::prose::Stopped;
-use study_base::text::{QuestionId, Untrusted};
-use study_core::outcome::{Author, Choice};
-use study_core::protocol::Answer;
-use study_core::protocol::phrases::{Phrase, Words};
-use study_core::session::view::{Correctable, DeviceState, Mirror, Telemetry};
-use study_core::session::{Input, Roster, Screen, View};
+use study_base::text::{QuestionId, Untrusted, sentence};
+use study_plan::protocol::phrases::{Phrase, Words};
+use study_plan::protocol::{Answer, Given, Question};
+use study_session::outcome::{Author, Choice};
+use study_session::page::{self, Does};
+use study_session::session::view::{Correctable, DeviceState, Mirror, Telemetry};
+use study_session::session::{Input, Roster, Screen, View};
 
 /// What the lines that begin with a slash do, in the order of the help.
 const COMMANDS: [(&str, Phrase); 11] = [
@@ -187,10 +187,10 @@ impl Dialogue {
             lines.push(view.words.get(Phrase::PlainHelp).to_owned());
         }
         if !self.banner
-            && let Some(banner) = pages::banner(view)
+            && let Some(banner) = page::page(view).banner
         {
             self.banner = true;
-            lines.push(banner);
+            lines.push(sentence(&banner));
         }
         if self.notice != view.notice {
             self.notice.clone_from(&view.notice);
@@ -375,7 +375,8 @@ impl Dialogue {
                 "" => Ok(vec![Input::PlayAgain]),
                 "r" if *can_rate => Ok(vec![Input::RateStopped]),
                 _ => {
-                    let again = view.words.get(Stopped::of(view).again);
+                    let page = page::page(view);
+                    let again = page.button_of(Does::PlayAgain).map_or("", |b| &b.label);
                     let enter = view.words.get(Phrase::PlainEnterAlone);
                     say(&format!("{enter}: {again}."))
                 }
@@ -390,7 +391,7 @@ impl Dialogue {
                 let given = view.given(*form, &question.id);
                 let answer = match given {
                     Some(given) if key.is_empty() => Some(given.clone()),
-                    _ => answers::read(question, line, &view.words).map_err(|what| vec![what])?,
+                    _ => read(question, line, &view.words)?,
                 };
                 self.entered
                     .extend(answer.map(|answer| (question.id.clone(), answer)));
@@ -475,7 +476,7 @@ impl Dialogue {
                     }
                 }
             }
-            Asking::NewAnswer(item) => match answers::read(&item.question, line, &view.words) {
+            Asking::NewAnswer(item) => match read(&item.question, line, &view.words) {
                 Ok(Some(answer)) if answer == item.answer => {
                     self.repeat();
                     say("That is already the answer.")
@@ -487,7 +488,7 @@ impl Dialogue {
                 }
                 Err(what) => {
                     self.asking = Some(Asking::NewAnswer(item));
-                    say(&what)
+                    Err(what)
                 }
             },
             Asking::Why(item, answer) => {
@@ -510,6 +511,12 @@ impl Dialogue {
 
 fn say<T>(words: &str) -> Result<T, Vec<String>> {
     Err(vec![words.to_owned()])
+}
+
+/// A typed line as the answer to a question; `None` if it is left empty.
+fn read(question: &Question, line: &str, words: &Words) -> Result<Option<Answer>, Vec<String>> {
+    let read = question.read(Some(&Given::Typed(line.to_owned())));
+    read.or_else(|why| say(&why.words(words)))
 }
 
 fn listed(number: usize, item: &Correctable, words: &Words) -> String {

@@ -10,7 +10,7 @@ pub(super) use other::Lines;
 #[cfg(unix)]
 pub(super) use unix::Lines;
 
-/// Something typed.
+/// A line or a key that was typed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Typed {
     /// A line, without its end.

@@ -1,17 +1,14 @@
-//! The words of a page.
+//! The lines of a page.
 
 use super::answers;
-use crate::tui::theme::{Colour, Theme};
-use crate::tui::views::prose::{attending, prose};
-use crate::tui::views::status::of_banner;
-use crate::tui::views::trouble::Trouble;
-use crate::tui::widgets::clock;
-use std::fmt::Display;
+use crate::tui::views::prose::choices;
+use crate::tui::wrap;
 use study_base::text::sentence;
-use study_core::outcome::FormId;
-use study_core::protocol::phrases::{Phrase, Words};
-use study_core::protocol::{Entry, Question};
-use study_core::session::{Screen, View};
+use study_plan::protocol::Question;
+use study_plan::protocol::phrases::{Phrase, Words};
+use study_session::outcome::FormId;
+use study_session::page::{self, Does, Kind, attending};
+use study_session::session::{Screen, View};
 
 /// A page in words.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -27,89 +24,32 @@ pub struct Page {
     pub prompt: String,
 }
 
-/// The words of a view, with its form at question number `at`. `keys` says whether single
+/// The lines of a view, with its form at question number `at`. `keys` says whether single
 /// keys can be read.
 pub fn page(view: &View, at: usize, keys: bool) -> Page {
-    let words = &view.words;
+    let content = page::page(view);
+    let parts = [&content.progress, &content.sheet, &content.done];
+    let top: Vec<String> = (parts.into_iter().flatten())
+        .map(|part| sentence(&part.words))
+        .collect();
     let mut page = Page {
-        top: top(view),
+        top: Some(top.join(" "))
+            .filter(|top| !top.is_empty())
+            .into_iter()
+            .collect(),
         ..Page::default()
     };
     match &view.screen {
-        Screen::Who { claiming: true, .. } => {
-            page.lines.push(words.get(Phrase::OneMoment).to_owned())
-        }
-        Screen::Who { .. } => {}
+        Screen::Who {
+            claiming: false, ..
+        } => {}
         Screen::Form {
-            form,
-            questions,
-            to_experimenter,
-            ..
-        } => page.form(view, (*form, questions, at), *to_experimenter),
-        Screen::Playing {
-            keep_exploring,
-            interval,
-            exposure,
-            ..
-        } => {
-            if let Some((at, of)) = interval {
-                let which = sentence(view.interval_name(*at));
-                page.lines.push(format!("{which} ({at} / {of})"));
-            }
-            page.lines.push(
-                match attending(view).0 {
-                    Phrase::FeelDevice => words.get(Phrase::PlainPlays),
-                    other => words.get(other),
-                }
-                .to_owned(),
-            );
-            // Said once; a countdown would never end to be read.
-            let left = exposure.max_s.map(|max_s| clock(max_s.ceil()));
-            let left = left.map(|time| words.fill(Phrase::TimeLeft, &[("time", &time)]));
-            page.wait = left.map(|left| sentence(&left));
-            page.prompt = match (keep_exploring, keys) {
-                (true, _) => words.get(attending(view).1),
-                (false, true) => words.get(Phrase::PlainRate),
-                (false, false) => words.get(Phrase::PlainContinue),
-            }
-            .to_owned();
-        }
-        Screen::DeviceTrouble { .. } | Screen::SaveTrouble { .. } => page.trouble(view),
-        _ => page.prose(view),
+            form, questions, ..
+        } => page.form(view, &content, (*form, questions, at)),
+        Screen::Playing { .. } => page.playing(view, &content, keys),
+        _ => page.prose(view, &content),
     }
     page
-}
-
-/// Progress of the participant, and the page of the form.
-fn top(view: &View) -> Vec<String> {
-    let mut parts = Vec::new();
-    if let Some(progress) = view.progress {
-        let number = ("n", &progress.current as &dyn Display);
-        let phrase = match (progress.practice, progress.total) {
-            (true, _) => Phrase::PracticeOf,
-            (false, Some(_)) => Phrase::TrialOf,
-            (false, None) => Phrase::TrialNumber,
-        };
-        let total = progress.total.unwrap_or(progress.current);
-        let values = [number, ("total", &total as &dyn Display)];
-        parts.push(sentence(&view.words.fill(phrase, &values)));
-    }
-    if let Screen::Form { page, pages, .. } = &view.screen
-        && *pages > 1
-    {
-        let values = [("n", page as &dyn Display), ("total", pages)];
-        parts.push(sentence(&view.words.fill(Phrase::PageOf, &values)));
-    }
-    match parts.is_empty() {
-        true => Vec::new(),
-        false => vec![parts.join(" ")],
-    }
-}
-
-/// Whose data these are, if not those of a real participant.
-pub fn banner(view: &View) -> Option<String> {
-    let banner = view.words.get(of_banner(view.banner?));
-    Some(sentence(banner))
 }
 
 impl Page {
@@ -121,17 +61,14 @@ impl Page {
     fn form(
         &mut self,
         view: &View,
+        content: &page::Page,
         (form, questions, at): (FormId, &[Question], usize),
-        to_experimenter: bool,
     ) {
         let Some(question) = questions.get(at) else {
             return;
         };
-        if to_experimenter {
-            self.lines.push("For the experimenter:".to_owned());
-        } else if view.entry == Entry::Experimenter {
-            self.lines.push("Ask the participant:".to_owned());
-        }
+        let instruction = content.instruction.map(|words| format!("{words}:"));
+        self.lines.extend(instruction);
         let (lines, prompt) = answers::ask(question, &view.words);
         self.lines.extend(lines);
         if let Some(given) = view.given(form, &question.id) {
@@ -144,59 +81,63 @@ impl Page {
             let back = view.words.get(Phrase::CommandBack);
             self.prompt.push_str(&format!(" /back: {back}."));
         }
-        if view.can_replay {
-            let again = view.words.get(Phrase::FeelAgain);
-            self.prompt.push_str(&format!(" /replay: {again}."));
+        if let Some(again) = content.button_of(Does::Replay) {
+            self.prompt.push_str(&format!(" /replay: {}.", again.label));
         }
     }
 
-    fn trouble(&mut self, view: &View) {
-        let Some(trouble) = Trouble::new(view, Theme::new(Colour::None)) else {
-            return;
-        };
-        let (title, what, then) = trouble.words();
-        self.lines.push(format!("{title}:"));
-        self.lines.extend(answers::text(what));
-        self.prompt = then.to_owned();
-    }
-
-    fn prose(&mut self, view: &View) {
-        let Some(words) = prose(view) else {
-            return;
-        };
-        let waits = matches!(&view.screen, Screen::Reference { wait_s, .. } | Screen::Break { wait_s, .. } if *wait_s > 0.0);
-        let (title, body) = match &view.screen {
-            // These two show the time left in the body or the title.
-            Screen::Reference { .. } if waits => (words.title, String::new()),
-            Screen::Break { .. } => (String::new(), words.body),
-            Screen::Paused { .. } => (words.title, String::new()),
-            _ => (words.title, words.body),
-        };
-        if waits
-            && let Screen::Reference { wait_s, .. } | Screen::Break { wait_s, .. } = view.screen
-        {
-            self.wait = Some(view.words.wait(wait_s));
-        }
-        for part in [&words.above, &title, &body] {
-            // The full screen marks some titles with a symbol.
+    fn playing(&mut self, view: &View, content: &page::Page, keys: bool) {
+        let words = &view.words;
+        if let Some(interval) = &content.interval {
+            let which = sentence(&interval.name);
             self.lines
-                .extend(answers::text(part.trim_start_matches(['■', ' '])));
+                .push(format!("{which} ({} / {})", interval.at, interval.of));
         }
-        self.prompt = match &view.screen {
-            Screen::ResumeChoice { .. } | Screen::Consent { .. } | Screen::Stopped { .. } => {
-                let choices = words.choices.iter().map(|(key, what, more)| match *more {
+        // A device cannot be seen to play by those who only hear.
+        let attend = match attending(view).0 {
+            Phrase::FeelDevice => Phrase::PlainPlays,
+            other => other,
+        };
+        self.lines.push(words.get(attend).to_owned());
+        // Said once; a countdown would never end to be read.
+        let whole = content.playback.as_ref().and_then(|p| p.whole.as_ref());
+        self.wait = whole.map(|whole| sentence(whole));
+        self.prompt = match (&content.wait, keys) {
+            (Some(more), _) => more.clone(),
+            (None, true) => words.get(Phrase::PlainRate).to_owned(),
+            (None, false) => words.get(Phrase::PlainContinue).to_owned(),
+        };
+    }
+
+    fn prose(&mut self, view: &View, content: &page::Page) {
+        let text = match content.kind {
+            Kind::Message | Kind::Break | Kind::End => &wrap::flow(&content.text),
+            _ => &content.text,
+        };
+        let title = match &content.advice {
+            Some(_) => &format!("{}:", content.title),
+            None => &content.title,
+        };
+        for part in [content.instruction.unwrap_or_default(), title, text] {
+            self.lines.extend(answers::text(part));
+        }
+        self.wait.clone_from(&content.wait);
+        self.prompt = match content.kind {
+            Kind::Resume | Kind::Consent | Kind::Stopped => {
+                let choice = |(key, what, note): (&str, String, &str)| match note {
                     "" => format!("{}: {what}.", typed(key, &view.words)),
-                    more => format!("{}: {what}, {more}.", typed(key, &view.words)),
-                });
+                    note => format!("{}: {what}, {note}.", typed(key, &view.words)),
+                };
+                let choices = choices(content).into_iter().map(choice);
                 choices.collect::<Vec<_>>().join(" ")
             }
-            Screen::Message { .. } => view.words.get(Phrase::PlainContinue).to_owned(),
-            Screen::Paused { .. } => view.words.get(Phrase::PlainUnpause).to_owned(),
-            Screen::End { .. } => view.words.get(Phrase::PlainClose).to_owned(),
-            Screen::Reference { .. } | Screen::Break { .. } if view.can_advance => {
+            Kind::Message => view.words.get(Phrase::PlainContinue).to_owned(),
+            Kind::Paused => view.words.get(Phrase::PlainUnpause).to_owned(),
+            Kind::End => view.words.get(Phrase::PlainClose).to_owned(),
+            Kind::Reference | Kind::Break if view.can_advance => {
                 view.words.get(Phrase::PlainReady).to_owned()
             }
-            _ => String::new(),
+            _ => content.advice.clone().unwrap_or_default(),
         };
     }
 }

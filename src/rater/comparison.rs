@@ -10,8 +10,8 @@ use super::{Effect, Impression, MIDPOINT, Rater, Reference};
 use std::collections::BTreeMap;
 use study_base::rng::Stream;
 use study_base::text::{ModelId, PartId};
-use study_core::protocol::{Answer, Method, Protocol, Question, Role, Stimuli, Task, Trial};
 use study_haptics::model::Realization;
+use study_plan::protocol::{Answer, Method, Protocol, Question, Role, Stimuli, Task, Trial};
 
 /// Median standard deviation of the noise of an interval of a track, N: the just
 /// noticeable difference of a force.
@@ -291,7 +291,7 @@ mod tests {
 
     #[test]
     fn without_noise_every_method_finds_the_comparison() {
-        use study_core::protocol::Interval;
+        use study_plan::protocol::Interval;
         for method in [
             Method::TwoIntervals,
             Method::ThreeIntervals,

@@ -31,7 +31,7 @@ pub struct Impression {
 }
 
 const SECONDS: f64 = 6.0;
-/// Centre and amplitude of the exploration of switch B, mm.
+/// Center and amplitude of the exploration of switch B, mm.
 const OF_B_MM: [f64; 2] = [17.5, 15.0];
 /// Amplitude of another exploration, as a share of the trained range.
 const SHARE: f64 = 0.45;
@@ -46,7 +46,7 @@ const SMOOTHING: usize = 10;
 /// The exploration and the target's force in it.
 #[derive(Debug)]
 pub struct Reference {
-    centre_mm: f64,
+    center_mm: f64,
     amplitude_mm: f64,
     motion: Vec<Motion>,
     force_n: Vec<f64>,
@@ -57,8 +57,8 @@ pub struct Reference {
 impl Reference {
     /// The simulated switch B.
     pub fn switch_b() -> Self {
-        let [centre_mm, amplitude_mm] = OF_B_MM;
-        let mut target = Target::new(Parameters::b(), centre_mm)
+        let [center_mm, amplitude_mm] = OF_B_MM;
+        let mut target = Target::new(Parameters::b(), center_mm)
             .expect("a unit test checks the built-in parameters");
         let steps = (SECONDS / DT_S) as usize;
         let mut sampled = Vec::with_capacity(steps / STEPS_PER_SAMPLE + 1);
@@ -71,7 +71,7 @@ impl Reference {
                 felt.push(force_n);
             }
         }
-        Self::new([centre_mm, amplitude_mm], sampled, smoothed(&felt))
+        Self::new([center_mm, amplitude_mm], sampled, smoothed(&felt))
     }
 
     /// A realization that stands for the target.
@@ -86,9 +86,9 @@ impl Reference {
         Self::new(around, motion, force_n)
     }
 
-    fn new([centre_mm, amplitude_mm]: [f64; 2], motion: Vec<Motion>, force_n: Vec<f64>) -> Self {
+    fn new([center_mm, amplitude_mm]: [f64; 2], motion: Vec<Motion>, force_n: Vec<f64>) -> Self {
         Self {
-            centre_mm,
+            center_mm,
             amplitude_mm,
             largest_n: largest(&force_n),
             rate: rate(&force_n),
@@ -98,8 +98,8 @@ impl Reference {
     }
 }
 
-/// Motion of an exploration with this centre and amplitude at `t_s`.
-fn exploration(t_s: f64, [centre_mm, amplitude_mm]: [f64; 2]) -> Motion {
+/// Motion of an exploration with this center and amplitude at `t_s`.
+fn exploration(t_s: f64, [center_mm, amplitude_mm]: [f64; 2]) -> Motion {
     let turn = TAU / SECONDS;
     // 2πφ and its two derivatives, rad.
     let phase = TAU * t_s - 0.5 * SECONDS * libm::sin(turn * t_s);
@@ -107,7 +107,7 @@ fn exploration(t_s: f64, [centre_mm, amplitude_mm]: [f64; 2]) -> Motion {
     let change = TAU * 0.5 * turn * libm::sin(turn * t_s);
     let (sin, cos) = (libm::sin(phase), libm::cos(phase));
     Motion {
-        x_mm: centre_mm + amplitude_mm * sin,
+        x_mm: center_mm + amplitude_mm * sin,
         v_mm_s: amplitude_mm * cos * rate,
         a_m_s2: 1e-3 * amplitude_mm * (cos * change - sin * rate * rate),
     }
@@ -130,7 +130,7 @@ impl Impression {
         Self {
             force_error_n: difference(&|_| true),
             end_error_n: difference(&|motion| {
-                (motion.x_mm - reference.centre_mm).abs() > reference.amplitude_mm - END_MM
+                (motion.x_mm - reference.center_mm).abs() > reference.amplitude_mm - END_MM
             }),
             activeness: activeness(realization),
             detent: largest(&predicted) / reference.largest_n,

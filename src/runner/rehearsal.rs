@@ -11,8 +11,8 @@ use crate::rater::{Percepts, Rater};
 use chrono::{DateTime, FixedOffset};
 use std::time::Duration;
 use study_base::text::{ModelId, QuestionId};
-use study_core::protocol::{Answer, Protocol, Question, Trial};
-use study_core::session::{Config, Ending, Input, Screen, View};
+use study_plan::protocol::{Answer, Protocol, Question, Trial};
+use study_session::session::{Config, Ending, Input, Screen, View};
 
 /// Time that a rater spends on a screen without a question, s.
 const GLANCE_S: f64 = 2.0;
@@ -152,7 +152,7 @@ impl Plan {
                 Vec::new()
             }
             Screen::ResumeChoice { .. } => {
-                vec![Input::Resume(study_core::outcome::Choice::Continue)]
+                vec![Input::Resume(study_session::outcome::Choice::Continue)]
             }
             Screen::Consent { .. } => {
                 pass(GLANCE_S);

@@ -11,8 +11,8 @@ use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
-use study_core::outcome::{Event, Moment, Sample, TelemetryFile};
-use study_core::store::{Journal, Receipt, SessionFolder, TelemetryWriter};
+use study_session::outcome::{Event, Moment, Sample, TelemetryFile};
+use study_session::store::{Journal, Receipt, SessionFolder, TelemetryWriter};
 
 /// How long the end of a session waits for the disk. A disk may never answer.
 const LAST_WAIT: Duration = Duration::from_secs(5);

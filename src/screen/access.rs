@@ -16,7 +16,7 @@ const STRANGERS: (f64, f64) = (20.0, 60.0);
 pub(super) fn secret() -> Result<String, getrandom::Error> {
     let mut bytes = [0; BYTES];
     getrandom::fill(&mut bytes)?;
-    Ok(bytes.iter().map(|b| format!("{b:02x}")).collect())
+    Ok(study_base::hex::hex(&bytes))
 }
 
 /// What is known about who may talk to the page.

@@ -193,7 +193,7 @@
       node.append(field);
       return { id: ask.id, read, fill };
     });
-    const key = JSON.stringify([now.questions, now.progress]);
+    const key = JSON.stringify([now.questions, now.progress, now.sheet]);
     now.questions.forEach((ask, n) => { if (ask.given !== null) fields[n].fill(ask.given); });
     if (draft && draft.key === key) for (const f of fields) f.fill(draft.values[f.id]);
     const keep = () => { draft = { key, values: answers() }; };
@@ -238,9 +238,10 @@
   function render(now) {
     const isNew = !page || page.id !== now.id;
     page = now;
-    $("where").textContent = now.progress ? now.progress.words : "";
-    $("bar").hidden = !(now.progress && now.progress.of);
-    if (now.progress && now.progress.of) { $("bar").max = now.progress.of; $("bar").value = now.progress.at; }
+    const where = [now.progress, now.sheet].filter((part) => part);
+    $("where").textContent = where.map((part) => part.words).join(" · ");
+    $("bar").hidden = !(where.length && where[0].of);
+    if (where.length && where[0].of) { $("bar").max = where[0].of; $("bar").value = where[0].at; }
     $("banner").textContent = now.banner ?? "";
     if (!isNew) { update(now); return; }
     since = performance.now();

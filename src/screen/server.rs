@@ -3,7 +3,6 @@
 use super::access::{Access, secret};
 use super::board::{Board, Outcome};
 use super::http::{self, Request, Response};
-use super::pages::Does;
 use super::replies::Reply;
 use super::{Address, ScreenError};
 use maud::{DOCTYPE, html};
@@ -12,7 +11,8 @@ use std::net::{IpAddr, Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
-use study_core::protocol::phrases::{Phrase, Words, is_right_to_left};
+use study_plan::protocol::phrases::{Phrase, Words, is_right_to_left};
+use study_session::page::Does;
 
 /// How many connections are served at a time. One more ends the oldest whose request has
 /// not arrived.

@@ -8,7 +8,7 @@
 
 use super::keys::Key;
 use super::wrap::{self, Line};
-use study_core::protocol::question::{MAX_TEXT_BYTES, cut_to_fit};
+use study_plan::protocol::answer::{MAX_TEXT_BYTES, cut_to_fit};
 use unicode_segmentation::{GraphemeCursor, UnicodeSegmentation as _};
 
 /// A text with a cursor.

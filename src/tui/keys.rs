@@ -5,6 +5,7 @@
 //! Esc: an unnecessary stop of the device is harmless, a missed one is not.
 
 use crossterm::event::{KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
+use study_session::page::Does;
 
 /// A key press.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -67,6 +68,24 @@ pub enum Key {
     Quit,
     /// Ctrl-Z.
     Suspend,
+}
+
+/// The name of the key that does something on the page that offers it.
+pub fn of(does: Does) -> &'static str {
+    match does {
+        Does::Advance | Does::Answer | Does::PlayAgain | Does::RetrySave => "Enter",
+        Does::Agree => "y",
+        Does::Refuse => "n",
+        Does::RateStopped => "r",
+        Does::RestartBlock => "b",
+        Does::Continue => "c",
+        Does::DropOut => "d",
+        Does::Back => "Shift-Tab",
+        Does::Decline => "F6",
+        Does::Replay => "F7",
+        Does::Quit => "F10",
+        Does::Stop => "Esc",
+    }
 }
 
 /// The key of an event; `None` for releases and for keys without a function.

@@ -36,6 +36,8 @@ pub struct Pace {
     pressed: Option<Instant>,
     /// Whether the page asks for lines of text only, which may be pasted.
     of_lines: bool,
+    /// [`QUIET`] and [`SEEN`] are divided by this.
+    times: u32,
 }
 
 impl Pace {
@@ -47,7 +49,14 @@ impl Pace {
             entered: None,
             pressed: None,
             of_lines: false,
+            times: 1,
         }
+    }
+
+    /// With less time between keys, for tests of the program.
+    pub fn hurried(self, times: u32) -> Self {
+        let times = times.max(1);
+        Self { times, ..self }
     }
 
     /// Another page is on the screen since a moment; `of_lines`: it asks for lines of text
@@ -61,8 +70,9 @@ impl Pace {
     /// Whether an Enter at a moment would not advance.
     pub fn waits(&self, at: Instant) -> bool {
         let since = |before: Instant| at.saturating_duration_since(before);
-        let unseen = !self.used && since(self.shown) < SEEN;
-        unseen || self.entered.is_some_and(|before| since(before) < QUIET)
+        let (seen, quiet) = (SEEN / self.times, QUIET / self.times);
+        let unseen = !self.used && since(self.shown) < seen;
+        unseen || self.entered.is_some_and(|before| since(before) < quiet)
     }
 
     /// Whether an Enter at a moment comes with the key before it.

@@ -3,14 +3,15 @@
 //! Everything that the terminal shows and does is here, so that a test can drive whole
 //! sessions by keys.
 
-use super::theme::{Colour, Theme};
-use super::ui_state::{UiState, same_page};
+use super::theme::{ColorDepth, Theme};
+use super::ui_state::UiState;
 use super::views::Page;
 use crossterm::event::{Event, KeyEvent, KeyModifiers, MouseButton, MouseEventKind};
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 use ratatui::widgets::Widget as _;
-use study_core::session::{Input, Screen, View};
+use study_session::page::{self, same_page};
+use study_session::session::{Input, Screen, View};
 
 /// The state of the interface, its styles and its size.
 #[derive(Debug, Clone)]
@@ -25,10 +26,10 @@ pub struct Surface {
 
 impl Surface {
     /// An empty interface of size 0.
-    pub fn new(colour: Colour) -> Self {
+    pub fn new(color: ColorDepth) -> Self {
         Self {
             state: UiState::default(),
-            theme: Theme::new(colour),
+            theme: Theme::new(color),
             area: Rect::ZERO,
             screen: None,
             live: false,
@@ -77,6 +78,7 @@ impl Surface {
     fn page<'a>(&'a self, view: &'a View) -> Page<'a> {
         Page {
             view,
+            content: page::page(view),
             state: &self.state,
             live: self.live,
             waits: self.waits,

@@ -1,23 +1,23 @@
-//! All colours and text styles of the terminal.
+//! All colors and text styles of the terminal.
 //!
-//! No information depends on colour: a page has the same characters in the same cells
-//! with every [`Colour`]. The terminal's own background is kept, dark or light: each of
-//! the 256 colours in use has a contrast of at least 4.5 : 1 to black and to white.
+//! No information depends on color: a page has the same characters in the same cells
+//! with every [`ColorDepth`]. The terminal's own background is kept, dark or light: each of
+//! the 256 colors in use has a contrast of at least 4.5 : 1 to black and to white.
 
 use ratatui::style::{Color, Modifier, Style};
 
-/// The colours that the terminal can show.
+/// The colors that the terminal can show.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Colour {
-    /// 256 colours.
+pub enum ColorDepth {
+    /// 256 colors.
     Full,
-    /// The 16 colours of the terminal's scheme.
+    /// The 16 colors of the terminal's scheme.
     Sixteen,
-    /// No colour: bold, dim and reversed only.
+    /// No color: bold, dim and reversed only.
     None,
 }
 
-impl Colour {
+impl ColorDepth {
     /// From the environment: `NO_COLOR` (any value that is not empty), `TERM`
     /// and `COLORTERM`, read with `var`.
     pub fn detect(var: impl Fn(&str) -> Option<String>) -> Self {
@@ -39,29 +39,29 @@ impl Colour {
 /// The styles of everything on the terminal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Theme {
-    colour: Colour,
+    color: ColorDepth,
 }
 
 impl Theme {
     /// The styles for a terminal.
-    pub fn new(colour: Colour) -> Self {
-        Self { colour }
+    pub fn new(color: ColorDepth) -> Self {
+        Self { color }
     }
 
-    /// Text in a colour. Of the 16 colours none is legible on black and on white in every
+    /// Text in a color. Of the 16 colors none is legible on black and on white in every
     /// scheme, so that text there keeps the terminal's own.
     fn tint(self, full: u8) -> Style {
-        match self.colour {
-            Colour::Full => Style::new().fg(Color::Indexed(full)),
-            Colour::Sixteen | Colour::None => Style::new(),
+        match self.color {
+            ColorDepth::Full => Style::new().fg(Color::Indexed(full)),
+            ColorDepth::Sixteen | ColorDepth::None => Style::new(),
         }
     }
 
-    /// A line or a bar in a colour.
+    /// A line or a bar in a color.
     fn line(self, full: u8) -> Style {
-        match self.colour {
-            Colour::Sixteen => Style::new().fg(Color::Magenta),
-            Colour::Full | Colour::None => self.tint(full),
+        match self.color {
+            ColorDepth::Sixteen => Style::new().fg(Color::Magenta),
+            ColorDepth::Full | ColorDepth::None => self.tint(full),
         }
     }
 
@@ -77,10 +77,10 @@ impl Theme {
 
     /// Secondary text: the experimenter's status line, explanations.
     pub fn quiet(self) -> Style {
-        match self.colour {
-            Colour::Full => Style::new().fg(Color::Indexed(243)),
+        match self.color {
+            ColorDepth::Full => Style::new().fg(Color::Indexed(243)),
             // Dim text is too faint on many terminals.
-            Colour::Sixteen | Colour::None => Style::new(),
+            ColorDepth::Sixteen | ColorDepth::None => Style::new(),
         }
     }
 
@@ -142,10 +142,10 @@ impl Theme {
 
     /// The force trace.
     pub fn trace(self) -> Color {
-        match self.colour {
-            Colour::Full => Color::Indexed(63),
-            Colour::Sixteen => Color::Magenta,
-            Colour::None => Color::Reset,
+        match self.color {
+            ColorDepth::Full => Color::Indexed(63),
+            ColorDepth::Sixteen => Color::Magenta,
+            ColorDepth::None => Color::Reset,
         }
     }
 }
@@ -173,8 +173,8 @@ mod tests {
         ]
     }
 
-    fn detect(vars: &[(&str, &str)]) -> Colour {
-        Colour::detect(|name| {
+    fn detect(vars: &[(&str, &str)]) -> ColorDepth {
+        ColorDepth::detect(|name| {
             let found = vars.iter().find(|(n, _)| *n == name);
             found.map(|(_, value)| (*value).to_owned())
         })
@@ -184,31 +184,31 @@ mod tests {
     fn no_color_wins_over_everything() {
         assert_eq!(
             detect(&[("NO_COLOR", "1"), ("TERM", "xterm-256color")]),
-            Colour::None
+            ColorDepth::None
         );
         assert_eq!(
             detect(&[("NO_COLOR", ""), ("TERM", "xterm-256color")]),
-            Colour::Full
+            ColorDepth::Full
         );
     }
 
     #[test]
-    fn a_plain_terminal_gets_sixteen_colours() {
-        assert_eq!(detect(&[("TERM", "linux")]), Colour::Sixteen);
-        assert_eq!(detect(&[("TERM", "vt100")]), Colour::None);
+    fn a_plain_terminal_gets_sixteen_colors() {
+        assert_eq!(detect(&[("TERM", "linux")]), ColorDepth::Sixteen);
+        assert_eq!(detect(&[("TERM", "vt100")]), ColorDepth::None);
         assert_eq!(
             detect(&[("TERM", "xterm"), ("COLORTERM", "truecolor")]),
-            Colour::Full
+            ColorDepth::Full
         );
     }
 
-    /// Relative luminance of one of the 256 colours above the first 16, after WCAG 2.2.
+    /// Relative luminance of one of the 256 colors above the first 16, after WCAG 2.2.
     fn luminance(index: u8) -> f64 {
         let level = |n: u8| if n == 0 { 0 } else { 55 + 40 * n };
         let (r, g, b) = match index {
             232.. => {
-                let grey = 8 + 10 * (index - 232);
-                (grey, grey, grey)
+                let gray = 8 + 10 * (index - 232);
+                (gray, gray, gray)
             }
             _ => {
                 let n = index - 16;
@@ -223,8 +223,8 @@ mod tests {
     }
 
     #[test]
-    fn every_colour_is_legible_on_black_and_on_white() {
-        let theme = Theme::new(Colour::Full);
+    fn every_color_is_legible_on_black_and_on_white() {
+        let theme = Theme::new(ColorDepth::Full);
         let trace = Style::new().fg(theme.trace());
         for style in styles(theme).into_iter().chain([trace]) {
             let Some(Color::Indexed(index)) = style.fg else {
@@ -234,11 +234,11 @@ mod tests {
             let bright = luminance(index);
             let (on_black, on_white) = ((bright + 0.05) / 0.05, 1.05 / (bright + 0.05));
             let contrast = on_black.min(on_white);
-            assert!(contrast >= 4.5, "colour {index}: {contrast:.2}");
+            assert!(contrast >= 4.5, "color {index}: {contrast:.2}");
         }
-        // Of 16 colours the terminal's own is text, and magenta, 4.48 : 1 on black and
+        // Of 16 colors the terminal's own is text, and magenta, 4.48 : 1 on black and
         // 4.69 : 1 on white as in xterm, a line.
-        let sixteen = Theme::new(Colour::Sixteen);
+        let sixteen = Theme::new(ColorDepth::Sixteen);
         for style in styles(sixteen) {
             assert!(!style.add_modifier.contains(Modifier::DIM));
             assert!(style.fg.is_none() || style == sixteen.focus(), "{style:?}");
@@ -246,8 +246,8 @@ mod tests {
     }
 
     #[test]
-    fn without_colour_no_style_has_one() {
-        let theme = Theme::new(Colour::None);
+    fn without_color_no_style_has_one() {
+        let theme = Theme::new(ColorDepth::None);
         for style in styles(theme) {
             assert_eq!((style.fg, style.bg), (None, None));
         }

@@ -18,10 +18,11 @@ use crossterm::event::Event;
 use dialog::Dialog;
 use field::Field;
 use study_base::text::QuestionId;
-use study_core::outcome::FormId;
-use study_core::protocol::phrases::{Phrase, Words};
-use study_core::protocol::question::MAX_TEXT_BYTES;
-use study_core::session::{Input, Screen, View};
+use study_plan::protocol::answer::MAX_TEXT_BYTES;
+use study_plan::protocol::phrases::{Phrase, Words};
+use study_session::outcome::FormId;
+use study_session::page::same_page;
+use study_session::session::{Input, Screen, View};
 
 /// The state of the interface.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -293,28 +294,6 @@ impl Who {
         } else {
             &mut self.participant
         }
-    }
-}
-
-/// Whether two screens are the same page, apart from numbers on it.
-pub fn same_page(a: &Screen, b: &Screen) -> bool {
-    match (a, b) {
-        (
-            Screen::Form {
-                form: p1,
-                page: n1,
-                questions: q1,
-                ..
-            },
-            Screen::Form {
-                form: p2,
-                page: n2,
-                questions: q2,
-                ..
-            },
-        ) => (p1, n1, q1) == (p2, n2, q2),
-        (Screen::Message { kind: a, .. }, Screen::Message { kind: b, .. }) => a == b,
-        (a, b) => std::mem::discriminant(a) == std::mem::discriminant(b),
     }
 }
 

@@ -3,7 +3,7 @@
 //! A widget borrows its data and implements `Widget for &…`: drawing changes nothing.
 //! Everything on the page comes from the `View`, which holds nothing that identifies a
 //! realization, and from the `UiState`. The participant's part is
-//! large and centred; the experimenter's status line is the last row.
+//! large and centered; the experimenter's status line is the last row.
 
 pub mod answer;
 pub mod choice;

@@ -4,7 +4,7 @@ use super::keys::{self, Key};
 use super::terminal::Terminal;
 use super::theme::Theme;
 use super::views::prose::{Prose, ProseView};
-use super::widgets::{centre, hints, row, rows};
+use super::widgets::{center, hints, row, rows};
 use super::{Options, TuiError};
 use crate::tui::ui_state::Reading;
 use crossterm::event::Event;
@@ -29,7 +29,7 @@ impl Waiting {
     pub fn open(options: Options) -> Result<Self, TuiError> {
         Ok(Self {
             terminal: Terminal::open(false)?,
-            theme: Theme::new(options.colour),
+            theme: Theme::new(options.color),
         })
     }
 
@@ -75,5 +75,5 @@ fn draw(frame: &mut Frame<'_>, prose: &Prose, theme: Theme) {
     let buf = frame.buffer_mut();
     view.render(rows(area, 1, area.height.saturating_sub(5)), buf);
     let keys = hints(theme, &[("Esc", "quit")], area.width);
-    centre(buf, row(area, area.height.saturating_sub(3)), &keys);
+    center(buf, row(area, area.height.saturating_sub(3)), &keys);
 }

@@ -11,7 +11,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Widget};
 use std::borrow::Cow;
 
-/// A centred part of `area`, at most `width` by `height` cells.
+/// A centered part of `area`, at most `width` by `height` cells.
 pub fn middle(area: Rect, width: u16, height: u16) -> Rect {
     let width = width.min(area.width);
     let height = height.min(area.height);
@@ -57,8 +57,8 @@ pub fn cells(line: &Line<'_>) -> u16 {
     u16::try_from(wide.sum::<usize>()).unwrap_or(u16::MAX)
 }
 
-/// Draws a centred line.
-pub fn centre(buf: &mut Buffer, area: Rect, line: &Line<'_>) {
+/// Draws a centered line.
+pub fn center(buf: &mut Buffer, area: Rect, line: &Line<'_>) {
     left(buf, middle(area, cells(line), area.height), line);
 }
 
@@ -69,11 +69,11 @@ pub fn right(buf: &mut Buffer, area: Rect, line: &Line<'_>) {
     left(buf, Rect { x, width, ..area }, line);
 }
 
-/// Draws wrapped lines, each centred.
-pub fn centre_all(buf: &mut Buffer, area: Rect, lines: &[String], style: Style) {
+/// Draws wrapped lines, each centered.
+pub fn center_all(buf: &mut Buffer, area: Rect, lines: &[String], style: Style) {
     for (y, line) in (0..area.height).zip(lines) {
         let line = styled(line.as_str(), style);
-        centre(buf, row(area, y), &line);
+        center(buf, row(area, y), &line);
     }
 }
 
@@ -119,21 +119,7 @@ pub fn hints_fit(keys: &[(&str, &str)], columns: u16) -> bool {
     hints_width(keys, 3) <= usize::from(columns)
 }
 
-/// A duration in s as `m:ss` or `h:mm:ss`; `0:00` if it is not finite.
-pub fn clock(seconds: f64) -> String {
-    let s = if seconds.is_finite() {
-        seconds.clamp(0.0, 1e9) as u64
-    } else {
-        0
-    };
-    if s < 3600 {
-        format!("{}:{:02}", s / 60, s % 60)
-    } else {
-        format!("{}:{:02}:{:02}", s / 3600, s / 60 % 60, s % 60)
-    }
-}
-
-/// Draws a frame; a thick one marks what is chosen or urgent without colour.
+/// Draws a frame; a thick one marks what is chosen or urgent without color.
 pub fn frame(buf: &mut Buffer, area: Rect, thick: bool, style: Style) {
     let area = area.intersection(buf.area);
     if area.is_empty() {
@@ -201,7 +187,7 @@ pub fn big(buf: &mut Buffer, area: Rect, text: &str, style: Style) {
     for i in 0..BIG_ROWS {
         let line: Vec<&str> = text.chars().map(|c| glyph(c)[usize::from(i)]).collect();
         let line = styled(line.join(" "), style);
-        centre(buf, row(area, top + i), &line);
+        center(buf, row(area, top + i), &line);
     }
 }
 
@@ -230,7 +216,7 @@ pub fn cap(buf: &mut Buffer, area: Rect, (key, what): (&str, &str), border: Styl
         ),
         Span::styled(format!(": {what}"), theme.text()),
     ]);
-    centre(buf, row(area, area.height / 2), &line);
+    center(buf, row(area, area.height / 2), &line);
 }
 
 /// A text field: a bar at its left, thick if it has the focus, and the text.
@@ -296,18 +282,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_clock_shows_any_number() {
-        assert_eq!(clock(0.0), "0:00");
-        assert_eq!(clock(761.9), "12:41");
-        assert_eq!(clock(3600.0), "1:00:00");
-        assert_eq!(clock(f64::NAN), "0:00");
-        assert_eq!(clock(-1.0), "0:00");
-    }
-
-    #[test]
     fn arabic_with_ligatures_is_drawn_whole() {
         let question = "هل لا لا لا لا نهاية؟";
-        for draw in [centre, right] {
+        for draw in [center, right] {
             let mut buf = Buffer::empty(Rect::new(0, 0, 40, 1));
             let area = buf.area;
             draw(&mut buf, area, &styled(question, Style::new()));

@@ -2,8 +2,8 @@
 //! with R 4.2.2 (lme4 1.1-31, lmerTest 3.1-3) on the ratings of [`table`].
 #![allow(clippy::unwrap_used)]
 
-use study_core::analyze::{Analysis, Question, Rules, Verdict, analyze};
-use study_core::outcome::ratings::Ratings;
+use study_analysis::analyze::{Analysis, Question, Rules, Verdict, analyze};
+use study_session::outcome::ratings::Ratings;
 
 /// Eight participants who differ in their slope on VAF, four realizations, three
 /// repetitions; the rating of the third realization rises.

@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::BufReader;
 use std::path::Path;
-use study_core::analyze::{Rules, analyze};
-use study_core::outcome::ratings::Ratings;
+use study_analysis::analyze::{Rules, analyze};
+use study_session::outcome::ratings::Ratings;
 
 /// The words in the documents' code spans, split at `/`, with `a_{b,c}` and `a/{b,c}`
 /// expanded. A word that ends in `*` stands for all words with that prefix.

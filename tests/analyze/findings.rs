@@ -5,15 +5,15 @@ use crate::report_support::{analysis_of, part, source, words};
 use rayon::prelude::*;
 use serde_json::Value as Json;
 use std::fmt::Write as _;
-use study::report::html::{Details, document};
-use study::report::json;
-use study::report::text::{Page, page};
-use study_base::rng::Stream;
-use study_core::analyze::findings::Direction;
-use study_core::analyze::{
+use study_analysis::analyze::findings::Direction;
+use study_analysis::analyze::{
     Analysis, Finding, Include, Question, Rules, TestKind, Verdict, all_findings, analyze,
 };
-use study_core::outcome::ratings::Ratings;
+use study_base::rng::Stream;
+use study_report::html::{Details, document};
+use study_report::json;
+use study_report::text::{Page, page};
+use study_session::outcome::ratings::Ratings;
 
 /// Random numbers of a design.
 struct Numbers(Stream);
@@ -43,7 +43,7 @@ impl Printed {
     fn of(a: &Analysis) -> Self {
         let wide = Page {
             width: 100,
-            colour: false,
+            color: false,
         };
         let terminal = page(&source(), a, wide);
         Self {
@@ -450,8 +450,8 @@ fn a_p_that_is_the_level_is_a_yes() {
 
 #[test]
 fn level_and_construct_come_from_the_protocol() {
-    let mut protocol = crate::designs::design(3, 1, study_core::protocol::Order::Blocked);
-    let rules = |p: &study_core::protocol::Protocol| Rules::of(p, "realism", Include::default());
+    let mut protocol = crate::designs::design(3, 1, study_plan::protocol::Order::Blocked);
+    let rules = |p: &study_plan::protocol::Protocol| Rules::of(p, "realism", Include::default());
     assert_eq!(
         (rules(&protocol).alpha, rules(&protocol).construct),
         (0.05, None)
@@ -488,7 +488,7 @@ fn level_and_construct_come_from_the_protocol() {
 #[test]
 fn the_table_of_tests_has_all_findings() {
     let a = lenient_and_severe();
-    let tables = study::report::csv::tables(&source(), &a);
+    let tables = study_report::csv::tables(&source(), &a);
     let table = tables.iter().find(|t| t.name == "tests.csv").unwrap();
     let mut reader = csv_lines(&table.content);
     let head = reader.remove(0);

@@ -10,8 +10,8 @@ use serde_json::Value as Json;
 use std::fs::{self, File};
 use std::io::BufReader;
 use std::path::PathBuf;
-use study_core::analyze::{Rules, Value, Values, analyze};
-use study_core::outcome::ratings::Ratings;
+use study_analysis::analyze::{Rules, Value, Values, analyze};
+use study_session::outcome::ratings::Ratings;
 
 fn sets() -> Vec<PathBuf> {
     let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/golden/data");

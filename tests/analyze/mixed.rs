@@ -1,8 +1,8 @@
 //! Mixed models on tables that do not permit them, or barely.
 #![allow(clippy::unwrap_used)]
 
-use study_core::analyze::{Rules, Values, analyze};
-use study_core::outcome::ratings::Ratings;
+use study_analysis::analyze::{Rules, Values, analyze};
+use study_session::outcome::ratings::Ratings;
 
 fn analyzed(rows: &str) -> Values {
     let csv = format!("subject,model,repetition,rating,vaf\n{rows}");

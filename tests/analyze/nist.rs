@@ -6,8 +6,8 @@
 //! error: the required numbers of digits are what doubles permit.
 #![allow(clippy::unwrap_used)]
 
-use study_core::analyze::{Rules, analyze};
-use study_core::outcome::ratings::Ratings;
+use study_analysis::analyze::{Rules, analyze};
+use study_session::outcome::ratings::Ratings;
 
 /// Values certified by NIST.
 struct Certified {

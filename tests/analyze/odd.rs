@@ -1,10 +1,10 @@
 //! Tables that are odd in one way each: nothing else may suffer from it.
 #![allow(clippy::unwrap_used)]
 
-use study::report::Source;
-use study::report::text::{Page, page};
-use study_core::analyze::{Analysis, Rules, Value, analyze};
-use study_core::outcome::ratings::Ratings;
+use study_analysis::analyze::{Analysis, Rules, Value, analyze};
+use study_report::Source;
+use study_report::text::{Page, page};
+use study_session::outcome::ratings::Ratings;
 
 fn of(csv: &str) -> Analysis {
     let ratings = Ratings::read_csv("a.csv", csv.as_bytes(), None).unwrap();
@@ -22,7 +22,7 @@ fn shown(a: &Analysis) -> String {
     };
     let form = Page {
         width: 100,
-        colour: false,
+        color: false,
     };
     page(&source, a, form)
 }

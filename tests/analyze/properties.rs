@@ -3,11 +3,11 @@
 #![allow(clippy::unwrap_used)]
 
 use proptest::prelude::*;
-use study::report::html::Details;
-use study::report::text::{Page, comments, page};
-use study::report::{Source, csv, figures, html, json};
-use study_core::analyze::{Analysis, Better, Finding, Pair, Question, Rules, Value, analyze};
-use study_core::outcome::ratings::Ratings;
+use study_analysis::analyze::{Analysis, Better, Finding, Pair, Question, Rules, Value, analyze};
+use study_report::html::Details;
+use study_report::text::{Page, comments, page};
+use study_report::{Source, csv, figures, html, json};
+use study_session::outcome::ratings::Ratings;
 
 fn source() -> Source {
     Source {
@@ -92,7 +92,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 64, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn any_table_is_analysed_and_every_number_is_one(rows in rows(number())) {
+    fn any_table_is_analyzed_and_every_number_is_one(rows in rows(number())) {
         let a = of(&table(&rows));
         for (id, value) in a.values.iter() {
             let finite = match value {
@@ -107,7 +107,7 @@ proptest! {
             }
         }
         for width in [20, 80, 100] {
-            let text = page(&source(), &a, Page { width, colour: false });
+            let text = page(&source(), &a, Page { width, color: false });
             prop_assert!(has_no_number_that_is_none(&text), "{text}");
         }
         let document = json::document(&source(), &a);
@@ -221,7 +221,7 @@ const ORDINAL: [&str; 7] = [
 ];
 
 #[test]
-fn a_shift_and_a_scale_leave_every_standardised_statistic() {
+fn a_shift_and_a_scale_leave_every_standardized_statistic() {
     let a = of(SMALL);
     let b = of(&changed(SMALL, |x| 2.0 * x + 1000.0, str::to_owned));
     same(
@@ -335,7 +335,7 @@ fn lower_ratings_are_better_where_they_are_said_to_be() {
         assert_eq!(pairs(&lower), pairs(&mirrored));
         let wide = Page {
             width: 100,
-            colour: false,
+            color: false,
         };
         let text = page(&source(), &lower, wide);
         let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
@@ -373,7 +373,7 @@ fn a_hostile_name_stays_text() {
     let a = of(&csv);
     let wide = Page {
         width: 100,
-        colour: false,
+        color: false,
     };
     let shown = page(&source(), &a, wide) + &comments(&a, wide);
     assert!(!shown.contains(['\u{1b}', '\u{7}', '\u{202e}']), "{shown}");
@@ -401,7 +401,7 @@ fn a_page_fits_its_width() {
                     &a,
                     Page {
                         width,
-                        colour: false,
+                        color: false,
                     },
                 );
                 for line in text.lines() {
@@ -413,7 +413,7 @@ fn a_page_fits_its_width() {
 }
 
 #[test]
-fn a_hundred_thousand_subjects_are_analysed_and_not_listed() {
+fn a_hundred_thousand_subjects_are_analyzed_and_not_listed() {
     let mut csv = String::from("subject,model,repetition,rating,vaf,trial_index\n");
     let mut noise = study_base::rng::Stream::new(5, &["many"]);
     for s in 0..100_000 {
@@ -432,7 +432,7 @@ fn a_hundred_thousand_subjects_are_analysed_and_not_listed() {
         &a,
         Page {
             width: 80,
-            colour: false
+            color: false
         }
     )));
 }
@@ -465,7 +465,7 @@ fn the_number_of_threads_changes_no_bit() {
 
 /// Every row alike but for one thing that should break something.
 #[test]
-fn degenerate_tables_are_analysed() {
+fn degenerate_tables_are_analyzed() {
     let head = "subject,model,repetition,rating,vaf,trial_index\n";
     let tables = [
         "S,a,1,4,0.5,1\n",
@@ -484,7 +484,7 @@ fn degenerate_tables_are_analysed() {
             &a,
             Page {
                 width: 80,
-                colour: false,
+                color: false,
             },
         );
         assert!(has_no_number_that_is_none(&text), "{rows}\n{text}");

@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used)]
 
 use crate::report_support::{html, words};
-use study_core::analyze::{Analysis, Exclusion, Question, Rules, Verdict, analyze};
-use study_core::outcome::ratings::Ratings;
+use study_analysis::analyze::{Analysis, Exclusion, Question, Rules, Verdict, analyze};
+use study_session::outcome::ratings::Ratings;
 
 const DELIVERED: [f64; 6] = [0.71, 0.80, 0.78, 0.88, 0.93, 0.95];
 

@@ -3,14 +3,14 @@
 
 use crate::report_support::{FIVE, analysis_of, golden, html, part, ratings, source, words};
 use std::fmt::Write as _;
-use study::report::Source;
-use study::report::html::{Details, document};
-use study::report::text::{Page, page};
-use study_core::analyze::{Analysis, Rules, analyze};
-use study_core::outcome::ratings::Ratings;
+use study_analysis::analyze::{Analysis, Rules, analyze};
+use study_report::Source;
+use study_report::html::{Details, document};
+use study_report::text::{Page, page};
+use study_session::outcome::ratings::Ratings;
 const WIDE: Page = Page {
     width: 100,
-    colour: false,
+    color: false,
 };
 
 /// The terminal page on one line.
@@ -64,7 +64,7 @@ fn with_incomplete_tables_the_mixed_model_decides() {
 
 #[test]
 fn an_undefined_test_of_equivalence_gives_its_reason() {
-    use study_core::protocol::Role;
+    use study_plan::protocol::Role;
     // Everybody rates a one above the reference: no variance, no test.
     let text = "study,participant,session,row,trial,block,position,planned_position,model,role,\
          repetition,practice,pilot,simulated,protocol_version,realism,corrected,strokes,attempt,\
@@ -182,7 +182,7 @@ fn a_single_participant_has_no_intervals() {
     assert!(!text.contains("t intervals over participants"), "{text}");
     assert!(!text.contains("95 % t interval of the mean"), "{text}");
     for text in [text, terminal(&a)] {
-        assert!(text.contains("nly one participant is analysed"), "{text}");
+        assert!(text.contains("nly one participant is analyzed"), "{text}");
         assert!(text.contains("there is only one participant"), "{text}");
     }
     let two = analysis_of(&ratings(2, &FIVE, |s, m, k| 1.0 + ((m * k + s) % 5) as f64));
@@ -192,7 +192,7 @@ fn a_single_participant_has_no_intervals() {
 
 #[test]
 fn with_all_rows_excluded_nothing_is_reported() {
-    use study_core::analyze::Exclusion;
+    use study_analysis::analyze::Exclusion;
     let constant = ratings(3, &FIVE, |s, _, _| 2.0 + s as f64);
     let ratings = Ratings::read_csv("data.csv", constant.as_bytes(), None).unwrap();
     let rules = Rules {
@@ -207,9 +207,9 @@ fn with_all_rows_excluded_nothing_is_reported() {
     };
     let page = words(&document(&study, &Details::default(), &a, &[]));
     assert!(!page.contains("r = –"), "{page}");
-    assert!(page.contains("No rating is included: there is nothing to analyse."));
+    assert!(page.contains("No rating is included: there is nothing to analyze."));
     for text in [page, terminal(&a)] {
-        assert!(text.contains("there is nothing to analyse"), "{text}");
+        assert!(text.contains("there is nothing to analyze"), "{text}");
     }
 }
 
@@ -398,14 +398,14 @@ fn correlations_in_warnings_read_as_on_the_page() {
 #[test]
 fn symbols_are_explained_only_where_they_occur() {
     let text = words(&html(&analysis_of(&ratings_of_three())));
-    for letter in ["ε: ", "Generalised η²: ", "W: ", "α: ", "dz: "] {
+    for letter in ["ε: ", "Generalized η²: ", "W: ", "α: ", "dz: "] {
         assert!(text.contains(letter), "{letter}: {text}");
     }
     assert!(text.contains("Shares are rounded"));
     let one = words(&html(&analysis_of(&ratings(1, &FIVE, |_, m, k| {
         1.0 + ((m * k) % 5) as f64
     }))));
-    assert!(!one.contains("Generalised η²") && !one.contains("Shares are rounded"));
+    assert!(!one.contains("Generalized η²") && !one.contains("Shares are rounded"));
 }
 
 #[test]
@@ -428,4 +428,18 @@ fn page_and_terminal_give_the_same_verdicts() {
             assert_eq!(page, printed, "{}: {question}", path.display());
         }
     }
+}
+
+/// A correlation of two points is always ±1 and says nothing.
+#[test]
+fn participants_are_not_screened_by_a_correlation_of_two_realizations() {
+    let dashes = |models: usize| {
+        let rate = |s: usize, m: usize, k: usize| (1 + (2 * s + 3 * m + k) % 7) as f64;
+        let page = html(&analysis_of(&ratings(4, &FIVE[..models], rate)));
+        let table = page.split_once("Screening of participants (").unwrap().1;
+        table.split_once("</table>").unwrap().0.matches('–').count()
+    };
+    // Of four participants: the longest run, whose order is not known, and of two
+    // realizations also r with the others and with VAF.
+    assert_eq!((dashes(2), dashes(3)), (4 + 8, 4));
 }

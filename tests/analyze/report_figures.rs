@@ -4,8 +4,8 @@
 
 use super::report_support::{FIVE, analysis_of, ratings};
 use std::collections::BTreeSet;
-use study::report::figures::{self, Drawn};
-use study_core::analyze::Analysis;
+use study_analysis::analyze::Analysis;
+use study_report::figures::{self, Drawn};
 
 fn figure(a: &Analysis, name: &str) -> Option<Drawn> {
     figures::all(a, &[]).into_iter().find(|f| f.name == name)

@@ -6,14 +6,14 @@
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
-use study::report::Source;
-use study::report::figures::{self, Trace};
-use study::report::html::{Details, document};
-use study::report::picture::png::Painter;
-use study_core::analyze::{
+use study_analysis::analyze::{
     Analysis, Comment, Deviation, Exclusion, PreregisteredRule, Rules, analyze,
 };
-use study_core::outcome::ratings::Ratings;
+use study_report::Source;
+use study_report::figures::{self, Trace};
+use study_report::html::{Details, document};
+use study_report::picture::png::Painter;
+use study_session::outcome::ratings::Ratings;
 
 const EVIL: &str = "</p><script>alert(1)</script>\"' onerror=\u{202e}x]]>&amp;\u{0}";
 
@@ -43,7 +43,7 @@ fn golden() -> Vec<PathBuf> {
         .unwrap()
         .map(|e| e.unwrap().path().join("data.csv"));
     let mut sets: Vec<PathBuf> = sets.filter(|p| p.exists()).collect();
-    // Its 15,000 ratings take a minute unoptimised and draw nothing that others do not.
+    // Its 15,000 ratings take a minute unoptimized and draw nothing that others do not.
     sets.retain(|p| !p.to_string_lossy().contains("sim_large"));
     sets.sort();
     assert!(sets.len() > 5, "the data sets were not found");
@@ -146,7 +146,7 @@ fn absent_results_are_left_out() {
     assert!(!page.contains("For these realizations only"));
     let nothing = analysis_of("subject,model,repetition,rating,vaf\nS1,a,1,,\n");
     let page = report(&nothing, &[]);
-    assert!(page.contains("there is nothing to analyse"));
+    assert!(page.contains("there is nothing to analyze"));
 }
 
 #[test]
@@ -307,12 +307,12 @@ fn rules_changed_after_the_study_began_are_not_called_preregistered() {
     };
     let told = |rules: &Rules| {
         let a = analyze(&ratings, rules);
-        let page = study::report::text::page(
+        let page = study_report::text::page(
             &source("A study"),
             &a,
-            study::report::text::Page {
+            study_report::text::Page {
                 width: 100,
-                colour: false,
+                color: false,
             },
         );
         // The heading of the changes themselves, and their warnings.

@@ -5,8 +5,8 @@
 
 use crate::report_support::{FIVE, analysis_of, golden, html, part, ratings, source, words};
 use std::fmt::Write as _;
-use study::report::text::{Page, page};
-use study_core::analyze::{Question, TestKind, Value};
+use study_analysis::analyze::{Question, TestKind, Value};
+use study_report::text::{Page, page};
 #[test]
 fn counts_and_nouns_agree_and_empty_phrases_are_absent() {
     for (path, a) in golden() {
@@ -16,7 +16,7 @@ fn counts_and_nouns_agree_and_empty_phrases_are_absent() {
                 a,
                 Page {
                     width: 80,
-                    colour: false,
+                    color: false,
                 },
             );
         let nouns = [
@@ -202,7 +202,7 @@ fn tied_means_are_reported_where_they_limit_p() {
         &a,
         Page {
             width: 100,
-            colour: false,
+            color: false,
         },
     );
     assert!(told.contains("Four of the 5 means are tied"), "{told}");
@@ -229,7 +229,7 @@ fn a_monte_carlo_p_has_its_own_lower_bound() {
             &a,
             Page {
                 width: 100,
-                colour: false,
+                color: false,
             },
         ),
     ] {
@@ -321,7 +321,7 @@ fn the_terminal_page_is_bounded() {
         &a,
         Page {
             width: 80,
-            colour: false,
+            color: false,
         },
     );
     assert!(told.lines().count() < 150, "{}", told.lines().count());

@@ -6,11 +6,11 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
-use study::report::Source;
-use study::report::figures;
-use study::report::html::{Details, document};
-use study_core::analyze::{Analysis, Rules, analyze};
-use study_core::outcome::ratings::Ratings;
+use study_analysis::analyze::{Analysis, Rules, analyze};
+use study_report::Source;
+use study_report::figures;
+use study_report::html::{Details, document};
+use study_session::outcome::ratings::Ratings;
 
 pub fn source() -> Source {
     Source {
@@ -37,7 +37,7 @@ pub fn read_golden() -> Vec<(PathBuf, Analysis)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/data");
     let sets = fs::read_dir(root).unwrap();
     let mut sets: Vec<PathBuf> = sets.map(|e| e.unwrap().path().join("data.csv")).collect();
-    // What takes long unoptimised has no sentence that others have not.
+    // What takes long unoptimized has no sentence that others have not.
     sets.retain(|p| p.exists() && fs::metadata(p).unwrap().len() < 20_000);
     sets.sort();
     assert!(sets.len() > 8, "the data sets were not found");

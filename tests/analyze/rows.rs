@@ -3,14 +3,14 @@
 
 use chrono::DateTime;
 use std::collections::BTreeMap;
-use study::report::text::{Page, comments, page};
-use study::report::{Source, csv};
+use study_analysis::analyze::{Analysis, Exclusion, Include, Rules, analyze};
 use study_base::text::{ModelId, ParticipantId, QuestionId};
-use study_core::analyze::{Analysis, Exclusion, Include, Rules, analyze};
-use study_core::outcome::ratings::Ratings;
-use study_core::outcome::{ParticipantRow, RatingRow, State, Status};
-use study_core::protocol::columns::UsedColumn;
-use study_core::protocol::{Answer, DeviceKind, Role, Unfinished};
+use study_plan::protocol::columns::UsedColumn;
+use study_plan::protocol::{Answer, DeviceKind, Role, Unfinished};
+use study_report::text::{Page, comments, page};
+use study_report::{Source, csv};
+use study_session::outcome::ratings::Ratings;
+use study_session::outcome::{ParticipantRow, RatingRow, State, Status};
 
 fn id(text: &str) -> QuestionId {
     QuestionId::new(text).unwrap()
@@ -124,7 +124,7 @@ fn source() -> Source {
 fn printed(a: &Analysis) -> String {
     let set = Page {
         width: 100,
-        colour: false,
+        color: false,
     };
     page(&source(), a, set)
 }
@@ -352,7 +352,7 @@ fn comments_are_listed_by_realization_as_text() {
     let a = analyze(&ratings(&rows, &[]), &Rules::default());
     let set = Page {
         width: 80,
-        colour: true,
+        color: true,
     };
     let said = comments(&a, set);
     assert!(

@@ -2,9 +2,9 @@
 //! and every row states whether it is included.
 #![allow(clippy::unwrap_used)]
 
-use study::report::{Source, csv};
-use study_core::analyze::{Analysis, Exclusion, Rules, analyze};
-use study_core::outcome::ratings::Ratings;
+use study_analysis::analyze::{Analysis, Exclusion, Rules, analyze};
+use study_report::{Source, csv};
+use study_session::outcome::ratings::Ratings;
 
 /// Realizations A, B, C, a hidden reference R, an anchor L and D, a repeat of A.
 /// Strokes of the first trial of each participant as given.
@@ -67,6 +67,12 @@ fn lost(a: &Analysis) -> (Vec<String>, usize) {
     (who, gone.len())
 }
 
+/// One of the tables of the report.
+fn file(a: &Analysis, name: &str) -> String {
+    let mut files = csv::tables(&Source::default(), a).into_iter();
+    files.find(|f| f.name == name).unwrap().content
+}
+
 #[test]
 fn each_rule_excludes_exactly_the_participants_it_describes() {
     let of = |rule| lost(&under(rule));
@@ -78,6 +84,25 @@ fn each_rule_excludes_exactly_the_participants_it_describes() {
     // P1 has exactly 2 strokes.
     assert_eq!(of(Exclusion::StrokesBelow(2.0)), (vec!["P2".to_owned()], 1));
     assert_eq!(of(Exclusion::HiddenReferenceBelow(2.0)), (vec![], 0));
+}
+
+#[test]
+fn the_order_of_presentation_does_not_decide_who_is_excluded() {
+    let under = |references: [&str; 3]| {
+        let mut text = String::from("subject,model,rating,role\np,A,5,test\n");
+        for rating in references {
+            text += &format!("p,R,{rating},hidden-reference\n");
+        }
+        let rules = Rules {
+            exclude: vec![Exclusion::HiddenReferenceBelow(0.2)],
+            ..Rules::default()
+        };
+        let ratings = Ratings::read_csv("r.csv", text.as_bytes(), None).unwrap();
+        lost(&analyze(&ratings, &rules)).1
+    };
+    assert_eq!(under(["0.1", "0.2", "0.3"]), 0);
+    assert_eq!(under(["0.3", "0.2", "0.1"]), 0);
+    assert_eq!(under(["0.3", "0.2", "0.09"]), 4);
 }
 
 #[test]
@@ -94,6 +119,9 @@ fn the_main_results_are_given_with_and_without_the_exclusions() {
         (Some(4.0), Some(5.0))
     );
     assert!(a.warnings.iter().any(|w| w.code == "with-and-without"));
+    let table = file(&a, "with_and_without.csv");
+    assert!(table.starts_with("identifier,with,without\r\n"));
+    assert!(table.contains("\r\ndesc/A/n,4,5\r\n"), "{table}");
     // Without exclusions there is nothing to show twice.
     let twice = |a: &Analysis| a.values.iter().any(|(id, _)| id.starts_with("before_"));
     assert!(!twice(&plain) && !twice(&under(Exclusion::HiddenReferenceBelow(1.0))));
@@ -125,21 +153,12 @@ fn rules_judge_the_same_rows_whatever_their_order() {
 #[test]
 fn every_row_states_whether_it_is_included_and_why_not() {
     let a = under(Exclusion::ConstantRater);
-    let source = Source {
-        title: "t".to_owned(),
-        study: None,
-        protocol_version: None,
-        path: "r.csv".to_owned(),
-        ..Source::default()
-    };
-    let files = csv::tables(&source, &a);
-    let used = files.iter().find(|f| f.name == "ratings_used.csv").unwrap();
-    assert_eq!(used.content.lines().count(), 31);
-    assert!(used.content.contains("P1,A,1,1,2,0.7,true,\r\n"));
-    assert!(
-        used.content
-            .contains("P4,A,1,1,4,0.7,false,rule constant-rater\r\n")
-    );
+    let counted = "rule,rows,participants,problem\r\nconstant-rater,6,1,\r\n";
+    assert_eq!(file(&a, "exclusions.csv"), counted);
+    let used = file(&a, "ratings_used.csv");
+    assert_eq!(used.lines().count(), 31);
+    assert!(used.contains("P1,A,1,1,2,0.7,true,\r\n"));
+    assert!(used.contains("P4,A,1,1,4,0.7,false,rule constant-rater\r\n"));
 }
 
 #[test]
@@ -264,12 +283,12 @@ fn excluded_participants_count_as_finished_and_make_no_interim_analysis() {
         path: "r.csv".to_owned(),
         ..Source::default()
     };
-    let width = study::report::text::Page {
+    let width = study_report::text::Page {
         width: 100,
-        colour: false,
+        color: false,
     };
-    let page = study::report::text::page(&source, &a, width);
-    assert!(page.contains("5 of 5 participants, 4 analysed"), "{page}");
+    let page = study_report::text::page(&source, &a, width);
+    assert!(page.contains("5 of 5 participants, 4 analyzed"), "{page}");
     let rules = Rules {
         planned: Some(6),
         ..rules

@@ -5,9 +5,9 @@ use crate::world::{at, fingerprints, real, session};
 use assert_cmd::Command;
 use std::fs;
 use std::path::{Path, PathBuf};
-use study_core::outcome::Event;
-use study_core::protocol::fingerprint::Fingerprints;
-use study_core::store::{Frozen, StudyFolder};
+use study_plan::protocol::fingerprint::Fingerprints;
+use study_session::outcome::Event;
+use study_session::store::{Frozen, StudyFolder};
 
 const PROTOCOL: &str = r#"
 format = "study-protocol/1"
@@ -51,7 +51,7 @@ primary = "realism"
 /// A study in `results` with one finished session, as another process left it.
 fn study(results: &Path, id: &str) -> PathBuf {
     let text = PROTOCOL.replace("ID", id);
-    let parsed = study_core::protocol::file::parse("protocol.toml", &text);
+    let parsed = study_plan::protocol::file::parse("protocol.toml", &text);
     let protocol = parsed
         .protocol
         .unwrap_or_else(|| panic!("{}", parsed.findings.render(false)));

@@ -111,6 +111,43 @@ fn thresholds_of_a_forced_choice() {
 }
 
 #[test]
+fn names_are_printed_as_the_data_have_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let shown = |table: &str, task: &str| {
+        let page = text(&mut analyze(folder.path(), table, &["--task", task]));
+        for escaped in ["%2F", "%7C", "%25"] {
+            assert!(!page.contains(escaped), "{page}");
+        }
+        page
+    };
+    let mut table = "participant,condition,target,answer\n".to_owned();
+    for condition in ["a/b", "c%d"] {
+        for target in ["first", "second"] {
+            writeln!(table, "p|1,{condition},{target},first").unwrap();
+        }
+    }
+    let page = shown(&table, "2ifc");
+    assert!(page.contains("p|1") && page.contains("a/b") && page.contains("c%d"));
+    let mut table = "participant,first,second,answer\n".to_owned();
+    for (better, worse) in [("new/old", "b|c"), ("b|c", "50%"), ("new/old", "50%")] {
+        for (first, second, answer) in [
+            (better, worse, "first"),
+            (worse, better, "second"),
+            (better, worse, "second"),
+        ] {
+            writeln!(table, "p,{first},{second},{answer}").unwrap();
+        }
+    }
+    let page = shown(&table, "pairs");
+    assert!(
+        page.contains("b|c − new/old") && page.contains("50% − b|c"),
+        "{page}"
+    );
+    // An ability that is 0 but for rounding.
+    assert!(page.contains(" 0.00 ") && !page.contains("e−"), "{page}");
+}
+
+#[test]
 fn a_comparison_has_a_pse() {
     let folder = tempfile::tempdir().unwrap();
     let file = golden("fit_sim_pse");
@@ -229,8 +266,8 @@ fn a_ladder_over_logarithms_has_a_ratio() {
     assert!(width("0.02..0.6:1.1") > 1.5 * width("0.09..0.12:1.1"));
     for (scale, ladder, says) in [
         ("log", "0..0.6:1.1", "above 0"),
-        ("log", "0.02..0.6:0.05", "the ratio of two neighbours"),
-        ("log", "0.02..0.6:1", "the ratio of two neighbours"),
+        ("log", "0.02..0.6:0.05", "the ratio of two neighbors"),
+        ("log", "0.02..0.6:1", "the ratio of two neighbors"),
         ("lin", "0.6..0.02:0.1", "the step"),
         ("lin", "0..1", "--ladder"),
     ] {

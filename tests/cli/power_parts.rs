@@ -69,10 +69,10 @@ fn pairs_have_power_by_their_own_analysis() {
         (&["--part", "other"], "there is no part `other`"),
         (&["--realizations", "8"], "realizations of part `more-real`"),
         (&["--slope", "1", "--from", "x"], "x"),
-        (&["--track", "d=1"], "`--track` means nothing for pairs"),
+        (&["--track", "d=1"], "`--track` does not apply to pairs"),
         (
             &["--sd", "residual=1"],
-            "`--sd residual` means nothing for pairs",
+            "`--sd residual` does not apply to pairs",
         ),
     ] {
         let (code, _, err) = run(more);
@@ -148,12 +148,12 @@ fn tracks_have_power_by_their_own_rule_and_fit() {
         (
             &abx,
             &["--slope", "1"],
-            "`--slope` means nothing for tracks",
+            "`--slope` does not apply to tracks",
         ),
         (
             &staircase,
             &["--ties", "0.1"],
-            "`--ties` means nothing for tracks",
+            "`--ties` does not apply to tracks",
         ),
     ] {
         let (code, _, err) = study(&[&["power", protocol], more].concat(), dir);

@@ -55,6 +55,7 @@ fn report(dir: &Path) -> (i32, Vec<String>, Vec<String>) {
     assert_eq!(err, "");
     let json: serde_json::Value = serde_json::from_str(&out).unwrap();
     assert_eq!(json["format"], "study-check/1");
+    assert_eq!(json["ok"], code == 0);
     let messages = |key: &str| -> Vec<String> {
         json[key]
             .as_array()

@@ -8,8 +8,8 @@
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
-use study_core::protocol::file::{self, ROOT};
-use study_core::protocol::keys::{Absent, Key, Kind, Variants, Word};
+use study_plan::protocol::file::{self, ROOT};
+use study_plan::protocol::keys::{Absent, Key, Kind, Variants, Word};
 
 const HEAD: &str = "\
 # The protocol file

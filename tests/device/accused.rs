@@ -3,13 +3,13 @@
 use crate::rendering::{Heard, Shipped, judged, play, shipped};
 use std::collections::BTreeMap;
 use std::fmt;
-use study::device::Report;
-use study::device::link::memory::Noise;
-use study::device::virtual_device::Options;
 use study_base::text::ModelId;
-use study_core::outcome::{Fidelity, Verdict};
+use study_device::Report;
+use study_device::link::memory::Noise;
+use study_device::virtual_device::Options;
 use study_haptics::model::Realization;
 use study_haptics::plant::HandParameters;
+use study_session::outcome::{Fidelity, Verdict};
 use study_wire::message::Fault;
 
 /// How fast hands move, mm/s. The third is hardly above rest, the last one slower than a

@@ -4,10 +4,10 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::time::Duration;
-use study::device::check::{Commissioning, Connection, commission};
-use study::device::firmware::{Firmware, Flaw, Options};
-use study::device::link::LinkError;
-use study::device::link::memory::{Line, Noise};
+use study_device::check::{Commissioning, Connection, commission};
+use study_device::firmware::{Firmware, Flaw, Options};
+use study_device::link::LinkError;
+use study_device::link::memory::{Line, Noise};
 
 /// A simulated device on a line with a latency of half a millisecond.
 struct Bench {
@@ -133,7 +133,7 @@ fn without_a_device_there_is_one_verdict() {
 /// path, one period late, and a force of the target's magnitude.
 #[test]
 fn a_path_is_followed_and_recorded_completely() {
-    use study::device::probe::{ProbePath, record};
+    use study_device::probe::{ProbePath, record};
     let rate_hz = 1000.0;
     let x_mm: Vec<f64> = (0..3000)
         .map(|i| 17.5 - 12.0 * (std::f64::consts::TAU * 0.5 * f64::from(i) / rate_hz).cos())

@@ -6,12 +6,12 @@
 use crate::tables;
 use proptest::prelude::*;
 use std::time::Duration;
-use study::device::faults::{FaultPlan, InjectedFault};
-use study::device::virtual_device::{Options, VirtualDevice};
-use study::device::{Device, DeviceError, Report, Stimulus};
 use study_base::limits::{Limit, Limits};
-use study_core::outcome::{Playback, Sample};
+use study_device::faults::{FaultPlan, InjectedFault};
+use study_device::virtual_device::{Options, VirtualDevice};
+use study_device::{Device, DeviceError, Report, Stimulus};
 use study_haptics::model::{Branch, Realization, Trained};
+use study_session::outcome::{Playback, Sample};
 use study_wire::predict::Direction;
 
 /// A name and an action on a `T`.

@@ -7,14 +7,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
-use study::device::firmware::{Firmware, Options, Wrong, WrongLoads};
-use study::device::host::HostSettings;
-use study::device::link::memory::Noise;
-use study::device::link::pty::Simulator;
-use study::device::link::{LinkedDevice, priority};
-use study::device::serial::SerialOpener;
-use study::device::{Device, Report, Stimulus};
-use study_core::outcome::{Defect, Sample, Verdict};
+use study_device::firmware::{Firmware, Options, Wrong, WrongLoads};
+use study_device::host::HostSettings;
+use study_device::link::memory::Noise;
+use study_device::link::pty::Simulator;
+use study_device::link::{LinkedDevice, priority};
+use study_device::serial::SerialOpener;
+use study_device::{Device, Report, Stimulus};
+use study_session::outcome::{Defect, Sample, Verdict};
 
 /// Plays for some seconds; the samples and the end, or why there is none.
 fn play(
@@ -22,7 +22,7 @@ fn play(
     what: &Stimulus<'_>,
     limits: study_base::limits::Limits,
     seconds: f64,
-) -> Result<(Vec<Sample>, study_core::outcome::Playback), String> {
+) -> Result<(Vec<Sample>, study_session::outcome::Playback), String> {
     let start = Instant::now();
     device.load(what, limits, start.elapsed()).unwrap();
     let (mut samples, mut stop_at) = (Vec::new(), None);

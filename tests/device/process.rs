@@ -5,11 +5,11 @@
 #![allow(clippy::print_stderr, reason = "what is skipped is told")]
 
 use std::time::{Duration, Instant};
-use study::device::process::{Opened, Opening, ProcessDevice};
-use study::device::{Device, DeviceError, Report, Stimulus};
 use study_base::limits::Limits;
-use study_core::outcome::Sample;
+use study_device::process::{Opened, Opening, ProcessDevice};
+use study_device::{Device, DeviceError, Report, Stimulus};
 use study_haptics::model::Realization;
+use study_session::outcome::Sample;
 
 /// Long, because the machine may be busy; the tests do not depend on it.
 const PATIENCE: Duration = Duration::from_secs(30);
@@ -96,6 +96,26 @@ const HELLO: &str = r#"echo '{"say":"hello","format":"study-process/1","id":"sh"
 /// A program that waits for `load` before it does anything; `alive` may come first.
 const UNTIL_LOAD: &str =
     r#"while read line; do case "$line" in *'"do":"load"'*) break;; esac; done; "#;
+
+/// The samples of a session come from one device.
+#[test]
+fn another_device_does_not_go_on_after_a_restart() {
+    let folder = tempfile::tempdir().unwrap();
+    let begun = folder.path().join("begun");
+    let other = HELLO.replace("\"sh\"", "\"other\"");
+    let script = format!(
+        "if [ -e '{0}' ]; then {other} else touch '{0}'; {HELLO} fi; {UNTIL_LOAD}",
+        begun.display()
+    );
+    let mut bench = Bench::shell(&script);
+    bench.load().unwrap();
+    bench.lost();
+    let ready_or_lost = |r: &Report| matches!(r, Report::Ready | Report::Lost(_));
+    let Report::Lost(why) = bench.until("the restart", ready_or_lost) else {
+        panic!("another device is ready");
+    };
+    assert!(why.contains("other"), "{why}");
+}
 
 #[test]
 fn the_documented_example_plays() {

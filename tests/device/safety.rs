@@ -5,11 +5,11 @@
 
 use crate::tables;
 use std::time::Duration;
-use study::device::firmware::{Firmware, Options};
-use study::device::host::{Host, HostSettings, SUPERVISION_TIMEOUT};
-use study::device::link::memory::{Line, Noise};
-use study::device::{Report, Stimulus};
 use study_base::limits::{Limit, Limits};
+use study_device::firmware::{Firmware, Options};
+use study_device::host::{Host, HostSettings, SUPERVISION_TIMEOUT};
+use study_device::link::memory::{Line, Noise};
+use study_device::{Report, Stimulus};
 use study_haptics::model::Realization;
 use study_wire::frame::Decoder;
 use study_wire::message::{DeviceState, Fault, Request};

@@ -5,11 +5,11 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::time::Duration;
-use study::device::virtual_device::{Options, VirtualDevice};
-use study::device::{Device, Report, Stimulus};
 use study_base::limits::{Limit, Limits};
-use study_core::outcome::Playback;
+use study_device::virtual_device::{Options, VirtualDevice};
+use study_device::{Device, Report, Stimulus};
 use study_haptics::model::{Realization, file};
+use study_session::outcome::Playback;
 
 /// Force limit of the protocols for uncertified tables.
 const UNCERTIFIED_N: f64 = 9.0;

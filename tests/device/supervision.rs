@@ -6,18 +6,18 @@ use crate::tables;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
-use study::device::virtual_device::{Options, VirtualDevice};
-use study::device::{Device, DeviceError, Identity, Report, Stimulus};
 use study::rater::{Effect, Percepts, Rater};
 use study::runner::clock::{Clock as _, VirtualClock};
 use study::runner::rehearsal::{first_day, run_one};
 use study::runner::{Setup, playback_limits};
 use study_base::limits::{Limit, Limits};
 use study_base::text::QuestionId;
-use study_core::protocol::fingerprint::Fingerprints;
-use study_core::protocol::*;
-use study_core::store::{Frozen, SeatKind, StudyFolder};
+use study_device::virtual_device::{Options, VirtualDevice};
+use study_device::{Device, DeviceError, Identity, Report, Stimulus};
 use study_haptics::model::Realization;
+use study_plan::protocol::fingerprint::Fingerprints;
+use study_plan::protocol::*;
+use study_session::store::{Frozen, SeatKind, StudyFolder};
 
 /// What the runner asked a device to load.
 #[derive(Debug, Clone, PartialEq)]
@@ -100,11 +100,11 @@ fn protocol(uncertified_n: Option<f64>) -> Protocol {
     protocol.questions = vec![Question {
         id: QuestionId::new("realism").unwrap(),
         prompt: "How realistic?".to_owned(),
-        kind: QuestionKind::Rating {
+        kind: QuestionKind::Rating(kinds::Rating {
             from: 1,
             to: 7,
             labels: BTreeMap::new(),
-        },
+        }),
         required: true,
     }];
     protocol

@@ -3,16 +3,16 @@
 use crate::support::{repository, study};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use study::cli::load;
-use study::device::firmware::{Wrong, WrongLoads};
-use study::device::virtual_device::{Options, VirtualDevice};
 use study::rater::{Effect, Percepts, Rater};
 use study::runner::Setup;
 use study::runner::clock::{Clock as _, VirtualClock};
 use study::runner::rehearsal::{first_day, run_one};
-use study_core::outcome::{AttemptRow, Failure, RatingRow, Status, Verdict};
-use study_core::protocol::DeviceKind;
-use study_core::store::{Derived, Frozen, SeatKind, StudyFolder};
+use study_analysis::load;
+use study_device::firmware::{Wrong, WrongLoads};
+use study_device::virtual_device::{Options, VirtualDevice};
+use study_plan::protocol::DeviceKind;
+use study_session::outcome::{AttemptRow, Failure, RatingRow, Status, Verdict};
+use study_session::store::{Derived, Frozen, SeatKind, StudyFolder};
 
 /// The results folder and the tables of a rehearsal of the study of the paper on a device that is wrong at some loads.
 fn rehearsed(home: &Path, wrong: Wrong, loads: [u32; 2]) -> (PathBuf, Derived) {

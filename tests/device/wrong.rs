@@ -5,13 +5,13 @@ use crate::accused::{hand, others, playbacks};
 use crate::rendering::{Heard, Shipped, judged, mixed, play, shipped};
 use crate::tables;
 use std::collections::BTreeMap;
-use study::device::firmware::{Wrong, WrongLoads};
-use study::device::rendering_of;
-use study::device::virtual_device::Options;
 use study_base::limits::Limits;
 use study_base::text::ModelId;
-use study_core::outcome::{Sample, Verdict};
+use study_device::firmware::{Wrong, WrongLoads};
+use study_device::rendering_of;
+use study_device::virtual_device::Options;
 use study_haptics::model::Realization;
+use study_session::outcome::{Sample, Verdict};
 use study_wire::predict::{Direction, Motion};
 use study_wire::servo::{Servo, ServoSettings};
 

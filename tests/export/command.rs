@@ -8,8 +8,8 @@ use serde_json::Value;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
-use study_core::outcome::Event;
-use study_core::protocol::Answer;
+use study_plan::protocol::Answer;
+use study_session::outcome::Event;
 
 const FORMATS: [&str; 6] = ["csv", "wide", "bids", "psych-ds", "frictionless", "r"];
 
@@ -75,7 +75,7 @@ fn hostile_texts_are_text_in_every_format() {
         "https://orcid.org/0000-0002-1825-0097"
     );
     // No text of a study is in the code.
-    let script = include_str!("../../crates/study-core/src/export/analysis.R");
+    let script = include_str!("../../crates/study-analysis/src/export/analysis.R");
     let r = home.path().join("r");
     assert_eq!(fs::read_to_string(r.join("analysis.R")).unwrap(), script);
     assert!(

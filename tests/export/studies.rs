@@ -6,9 +6,9 @@ use crate::support::{changed_protocol, copy_folder, study};
 use crate::world::real;
 use std::fs;
 use std::path::{Path, PathBuf};
-use study_core::outcome::{Event, FormId};
-use study_core::protocol::Answer;
-use study_core::store::{Frozen, StudyFolder};
+use study_plan::protocol::Answer;
+use study_session::outcome::{Event, FormId};
+use study_session::store::{Frozen, StudyFolder};
 
 /// Text with everything that a format may take for its own.
 pub(crate) const HOSTILE: &str = "=HYPERLINK(\"http://e\",\"x\")\tTab\r\nnew line, \"quoted\"; 'a' \u{202e}RTL\u{202c} \
@@ -31,7 +31,7 @@ pub(crate) fn real_study(
     mut change: impl FnMut(usize, &mut Event) -> bool,
 ) -> PathBuf {
     let rehearsal = rehearsed(protocol, ids.len(), home, &[]);
-    let loaded = study::cli::load::load(protocol).unwrap();
+    let loaded = study_analysis::load::load(protocol).unwrap();
     let frozen = Frozen {
         protocol: &loaded.protocol,
         files: &loaded.files,

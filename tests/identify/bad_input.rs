@@ -243,7 +243,7 @@ fn a_far_force_is_moved_and_said() {
 /// Lengths that are looked for are in proportion to the travel: a button and a joint have the
 /// table of the switch.
 #[test]
-fn a_travel_of_a_tenth_of_a_millimetre_or_of_metres_gives_the_same_table() {
+fn a_travel_of_a_tenth_of_a_millimeter_or_of_meters_gives_the_same_table() {
     let vaf = |times: f64| {
         let dir = tempfile::tempdir().unwrap();
         let path = |name: &str, rows: Vec<[f64; 5]>| {
@@ -466,7 +466,7 @@ fn metres_are_refused_and_a_wrong_unit_of_velocity_gives_a_warning() {
         }
         text(NAMES, &rows)
     };
-    refused(&scaled(1, 1e-3), "x_mm seems to be in metres");
+    refused(&scaled(1, 1e-3), "x_mm seems to be in meters");
     warned(&scaled(2, 1e-3), "times v_mm_s: check its unit and sign");
     warned(&scaled(3, 1e3), "times a_m_s2: check its unit and sign");
     warned(&scaled(2, -1.0), "check its unit and sign");

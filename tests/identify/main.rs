@@ -4,6 +4,7 @@ mod bad_input;
 mod cli;
 mod estimators_switches;
 mod estimators_tables;
+mod evidence;
 mod golden;
 mod grid;
 mod mechanism;

@@ -43,7 +43,7 @@ fn shipped(protocol: &str) -> BTreeMap<String, Realization> {
 /// Starts from the trajectories. Takes a minute without optimization:
 /// `cargo test --release --test identify shipped -- --ignored`
 #[test]
-#[ignore = "a minute unoptimised"]
+#[ignore = "a minute unoptimized"]
 fn the_script_reproduces_every_file_byte_for_byte() {
     let dir = tempfile::tempdir().unwrap();
     Command::new("sh")

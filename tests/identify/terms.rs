@@ -17,7 +17,7 @@ fn a_passive_table_has_only_the_terms_that_are_asked_for() {
     let r = target("r", 10, 0.1);
     let with = |m, b| {
         let method = Method::Passive(Passive {
-            terms: Terms { m, b, k: true },
+            terms: Terms { m, b, ..Terms::ALL },
             ..Passive::default()
         });
         identified(&r, method, 1.0).realization
@@ -40,6 +40,7 @@ fn a_recursion_without_mass_and_stiffness_is_the_regression_on_the_speed() {
             m: false,
             b: true,
             k: false,
+            ..Terms::ALL
         },
         ..Ewls::paper(1.0, Resample::Point)
     };
@@ -67,6 +68,7 @@ fn a_term_that_is_left_out_is_0_at_every_node_of_every_method() {
         m: false,
         b: true,
         k: false,
+        ..Terms::ALL
     };
     let of = |change: &dyn Fn(&mut Ewls)| {
         let mut options = Ewls {

@@ -5,12 +5,12 @@ use chrono::{DateTime, FixedOffset, TimeDelta};
 use std::sync::Arc;
 use study_base::rng::Stream;
 use study_base::text::{ModelId, ParticipantId};
-use study_core::outcome::{Choice, Entry, Event, Failure, Moment, Playback};
-use study_core::protocol::Order::{Blocked, Fixed, LatinSquare, Shuffled, Williams};
-use study_core::protocol::fingerprint::Fingerprints;
-use study_core::protocol::{Design, DeviceKind, Protocol, Role, Seat, Trial};
-use study_core::schedule::plan;
-use study_core::session::{Claim, Config, Effect, Input, Screen, Session};
+use study_plan::protocol::Order::{Blocked, Fixed, LatinSquare, Shuffled, Williams};
+use study_plan::protocol::fingerprint::Fingerprints;
+use study_plan::protocol::{Design, DeviceKind, Protocol, Role, Seat, Trial};
+use study_plan::schedule::plan;
+use study_session::outcome::{Choice, Entry, Event, Failure, Moment, Playback};
+use study_session::session::{Claim, Config, Effect, Input, Screen, Session};
 
 const SESSIONS: u32 = 10_000;
 
@@ -172,7 +172,7 @@ impl Run {
             device_id: "simulated-1".to_owned(),
             device_check: None,
             device_telemetry: true,
-            assigned: study_core::protocol::Assigned::default(),
+            assigned: study_plan::protocol::Assigned::default(),
             notices: Vec::new(),
         }
     }

@@ -5,9 +5,9 @@
 //! orders.
 
 use crate::designs::{constrained, design};
-use study_core::protocol::Order::{Blocked, LatinSquare, Shuffled, Williams};
-use study_core::protocol::{Protocol, Seat};
-use study_core::schedule::plan;
+use study_plan::protocol::Order::{Blocked, LatinSquare, Shuffled, Williams};
+use study_plan::protocol::{Protocol, Seat};
+use study_plan::schedule::plan;
 
 /// The order of a seat as one text, a blank between blocks.
 fn order(protocol: &Protocol, seat: Seat) -> String {

@@ -5,9 +5,9 @@ use crate::designs::constrained;
 use crate::second;
 use proptest::prelude::*;
 use std::process::Command;
-use study_core::protocol::Order::{Blocked, Fixed, LatinSquare, Shuffled, Williams};
-use study_core::protocol::{Order, Seat, Trial};
-use study_core::schedule::{Felt, Planner, requeue};
+use study_plan::protocol::Order::{Blocked, Fixed, LatinSquare, Shuffled, Williams};
+use study_plan::protocol::{Order, Seat, Trial};
+use study_plan::schedule::{Felt, Planner, requeue};
 
 /// Models, repetitions, order, `max_run`, `min_distance`, numbers up to.
 type Case = (usize, u32, Order, Option<u32>, Option<u32>, u32);

@@ -3,9 +3,9 @@
 
 use crate::designs::constrained;
 use proptest::prelude::*;
-use study_core::protocol::Order::{Blocked, Shuffled};
-use study_core::protocol::{Seat, Trial};
-use study_core::schedule::{Felt, breaks_constraint, plan, requeue};
+use study_plan::protocol::Order::{Blocked, Shuffled};
+use study_plan::protocol::{Seat, Trial};
+use study_plan::schedule::{Felt, breaks_constraint, plan, requeue};
 
 proptest! {
     #[test]

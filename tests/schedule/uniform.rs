@@ -9,10 +9,10 @@ use proptest::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 use std::collections::{BTreeMap, BTreeSet};
 use study_base::text::ModelId;
-use study_core::protocol::Order::{Blocked, Shuffled};
-use study_core::protocol::{Order, Protocol, Seat, Trial};
-use study_core::schedule::constraints::first_violation;
-use study_core::schedule::{Planner, orders};
+use study_plan::protocol::Order::{Blocked, Shuffled};
+use study_plan::protocol::{Order, Protocol, Seat, Trial};
+use study_plan::schedule::constraints::first_violation;
+use study_plan::schedule::{Planner, orders};
 
 /// All orders of the design as texts, by trying every permutation.
 fn enumerate(protocol: &Protocol) -> BTreeSet<String> {
@@ -109,7 +109,7 @@ fn blocked_orders_are_uniform() {
 
 #[test]
 fn shuffled_orders_are_uniform() {
-    // 6!/2!³ = 90; of these 30 without neighbours alike (OEIS A114938).
+    // 6!/2!³ = 90; of these 30 without neighbors alike (OEIS A114938).
     is_uniform(&constrained(3, 2, Shuffled, None, None), 90);
     is_uniform(&constrained(3, 2, Shuffled, Some(1), None), 30);
     is_uniform(&constrained(3, 3, Shuffled, Some(1), None), 174);
@@ -137,7 +137,7 @@ proptest! {
         let infeasible = repetitions > 1
             && (min_distance.is_some_and(|d| d as usize > n)
                 || n == 1 && max_run.is_some_and(|k| k < repetitions));
-        let planned = study_core::schedule::plan(&protocol, None, Seat::Row(row));
+        let planned = study_plan::schedule::plan(&protocol, None, Seat::Row(row));
         prop_assert_eq!(planned.is_err(), infeasible);
         let Ok(planned) = planned else { return Ok(()) };
         let models: Vec<_> = planned.iter().filter_map(|t| t.model()).collect();

@@ -9,19 +9,21 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
-use study::cli::load::{Loaded, load};
-use study::device::faults::{FaultPlan, InjectedFault};
-use study::device::virtual_device::{Options, VirtualDevice};
-use study::device::{Device, DeviceError, Identity, Report, Stimulus};
 use study::runner::clock::VirtualClock;
 use study::runner::rehearsal::first_day;
 use study::runner::{Runner, Setup};
-use study::tui::{Colour, Surface};
+use study::tui::{ColorDepth, Surface};
+use study_analysis::load::{Loaded, load};
 use study_base::limits::Limits;
 use study_base::text::ModelId;
-use study_core::protocol::{Answer, Entry, FileOrders, Order, Protocol, QuestionKind, Role};
-use study_core::session::{Config, Input, Screen, View};
-use study_core::store::{Frozen, SeatKind, StudyFolder};
+use study_device::faults::{FaultPlan, InjectedFault};
+use study_device::virtual_device::{Options, VirtualDevice};
+use study_device::{Device, DeviceError, Identity, Report, Stimulus};
+use study_plan::protocol::{
+    Answer, Control, Entry, FileOrders, Order, Protocol, QuestionKind, Role, kinds,
+};
+use study_session::session::{Config, Input, Screen, View};
+use study_session::store::{Frozen, SeatKind, StudyFolder};
 
 /// Time between two looks at the screen.
 const LOOK: Duration = Duration::from_millis(20);
@@ -40,12 +42,12 @@ fn inputs(view: &View) -> Vec<Input> {
             can_go_on: true, ..
         } if view.line.elapsed_s > 8.0 => vec![Input::Advance],
         Screen::Form { questions, .. } => {
-            let answer = |kind: &QuestionKind| match kind {
-                QuestionKind::Rating { from, .. } => Answer::Rating(*from),
-                QuestionKind::Slider { from, .. } => Answer::Number(*from),
-                QuestionKind::Number { min, .. } => Answer::Number(min.unwrap_or(1.0)),
-                QuestionKind::Choice { options, .. } => Answer::Choice(vec![options[0].clone()]),
-                QuestionKind::Text => Answer::Text("something".to_owned()),
+            let answer = |kind: &QuestionKind| match kind.control() {
+                Control::Boxes { from, .. } => Answer::Rating(from),
+                Control::Track { from, .. } => Answer::Number(from),
+                Control::Digits { min, .. } => Answer::Number(min.unwrap_or(1.0)),
+                Control::List { options, .. } => Answer::Choice(vec![options[0].clone()]),
+                Control::Text => Answer::Text("something".to_owned()),
             };
             let given = questions.iter().map(|q| (q.id.clone(), answer(&q.kind)));
             vec![Input::Answer(given.collect())]
@@ -91,7 +93,7 @@ fn session(
         kind: SeatKind::Real,
         rows: None,
         group: None,
-        device_kind: study_core::protocol::DeviceKind::Simulated,
+        device_kind: study_plan::protocol::DeviceKind::Simulated,
         device: device(options),
         device_check: None,
         deliveries: Default::default(),
@@ -133,13 +135,13 @@ fn pages(
     order.insert(0, first.clone());
     let orders = BTreeMap::from([(1, order)]);
     let (mut runner, clock) = session(loaded, Some(orders), fault, device);
-    let mut surface = Surface::new(Colour::None).with_live(true);
+    let mut surface = Surface::new(ColorDepth::None).with_live(true);
     let mut pages = Vec::new();
     let (mut played, mut over) = (false, false);
     for _ in 0..20_000 {
         let view = runner.view();
         // What the participant's own page shows has to be as blind.
-        let own = serde_json::to_string(&study::screen::pages::page(&view)).unwrap();
+        let own = serde_json::to_string(&study_session::page::participant(&view)).unwrap();
         pages.push(picture(&drawn(&mut surface, &view, 80, 24)) + &own);
         match &view.screen {
             Screen::Playing { .. } if over => return pages,
@@ -305,11 +307,11 @@ fn looks_at_a_track(
     std::fs::write(folder.join("protocol.toml"), text).unwrap();
     let loaded = load(folder).unwrap();
     let (mut runner, clock) = session(loaded, None, None, device);
-    let mut surface = Surface::new(Colour::None).with_live(true);
+    let mut surface = Surface::new(ColorDepth::None).with_live(true);
     let (mut pages, mut felt) = (Vec::new(), String::new());
     for _ in 0..20_000 {
         let view = runner.view();
-        let own = serde_json::to_string(&study::screen::pages::page(&view)).unwrap();
+        let own = serde_json::to_string(&study_session::page::participant(&view)).unwrap();
         pages.push(picture(&drawn(&mut surface, &view, 80, 24)) + &own);
         if matches!(view.screen, Screen::Playing { .. }) {
             let model = runner.felt().unwrap().as_str();
@@ -321,7 +323,7 @@ fn looks_at_a_track(
         }
         let given = match &view.screen {
             Screen::Form { questions, .. } => {
-                let QuestionKind::Choice { options, .. } = &questions[0].kind else {
+                let QuestionKind::Choice(kinds::Choice { options, .. }) = &questions[0].kind else {
                     panic!()
                 };
                 let chosen = Answer::Choice(vec![options[answer].clone()]);

@@ -12,9 +12,7 @@ use std::time::Duration;
 
 fn start(folder: &Path, protocol: &Path) -> Terminal {
     let path = protocol.to_str().unwrap();
-    let mut terminal = Terminal::start(&["run", path, "--operator", "lw"], folder, 24, 80);
-    terminal.wait_for("Who takes part?");
-    terminal
+    Terminal::hurried(&["run", path, "--operator", "lw"], folder)
 }
 
 fn play_until(terminal: &mut Terminal, text: &str) {
@@ -202,7 +200,10 @@ fn held_quick_or_early_keys_answer_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let protocol = folder.path().join("paper");
     changed_protocol("turn-signal", &protocol, &[PATIENT]);
-    let mut terminal = start(folder.path(), &protocol);
+    // At a person's pace, which is the matter here.
+    let run = ["run", protocol.to_str().unwrap(), "--operator", "lw"];
+    let mut terminal = Terminal::start(&run, folder.path(), 24, 80);
+    terminal.wait_for("Who takes part?");
     play_until(&mut terminal, "Enter: when ready");
     terminal.keys("\r\r\r\r");
     // held: the first repeat comes late, the others quickly, until well after the device plays

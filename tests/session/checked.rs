@@ -1,4 +1,4 @@
-//! A session on a device whose last check does not speak for it.
+//! A session on a device that has not passed its check.
 
 use crate::support::{Terminal, changed_protocol, study};
 use std::fs;

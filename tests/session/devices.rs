@@ -271,7 +271,7 @@ fn info_shows_the_identity_of_a_program() {
     assert!(err.contains("unexpected argument '--command'"), "{err}");
 }
 
-/// Codes on samples do not identify a realization; a command lists them for labelling.
+/// Codes on samples do not identify a realization; a command lists them for labeling.
 #[test]
 fn a_session_on_samples_mounted_by_hand_shows_their_codes_and_nothing_else() {
     let folder = tempfile::tempdir().unwrap();

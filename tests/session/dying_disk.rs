@@ -8,13 +8,13 @@ use std::io::ErrorKind;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
-use study::device::manual::Manual;
 use study::runner::clock::VirtualClock;
 use study::runner::{Ended, Runner, Setup};
-use study_core::outcome::Event;
-use study_core::protocol::{Answer, DeviceKind};
-use study_core::session::{Config, Ending, Input, Screen, View};
-use study_core::store::{SeatKind, StudyFolder};
+use study_device::manual::Manual;
+use study_plan::protocol::{Answer, DeviceKind};
+use study_session::outcome::Event;
+use study_session::session::{Config, Ending, Input, Screen, View};
+use study_session::store::{SeatKind, StudyFolder};
 
 /// What an operator does who plays until something is not saved, tries once more to save
 /// it, and then leaves.

@@ -5,15 +5,15 @@ use crate::support::repository;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
-use study::cli::load::load;
-use study::device::virtual_device::{Options, VirtualDevice};
 use study::runner::clock::{Clock as _, VirtualClock};
 use study::runner::rehearsal::first_day;
 use study::runner::{Operator, OperatorError, Runner, Setup};
-use study_core::outcome::{Channel, Event};
-use study_core::protocol::{DeviceKind, Exposure};
-use study_core::session::{Config, Input, Screen, View};
-use study_core::store::{Frozen, SeatKind, StudyFolder};
+use study_analysis::load::load;
+use study_device::virtual_device::{Options, VirtualDevice};
+use study_plan::protocol::{DeviceKind, Exposure};
+use study_session::outcome::{Channel, Event};
+use study_session::session::{Config, Input, Screen, View};
+use study_session::store::{Frozen, SeatKind, StudyFolder};
 
 /// How long it is felt, s: no multiple of anything in the program.
 const FELT_S: f64 = 2.5037;
@@ -39,7 +39,7 @@ impl Operator for Patient {
             }
             Screen::Form { questions, .. } if self.rated < 3 => {
                 self.rated += 1;
-                let answer = study_core::protocol::Answer::Rating(4);
+                let answer = study_plan::protocol::Answer::Rating(4);
                 vec![Input::Answer(vec![(questions[0].id.clone(), answer)])]
             }
             Screen::Form { .. } => vec![Input::Quit],

@@ -12,8 +12,8 @@ use crate::support::{PATIENT, Terminal, changed_protocol, study};
 use std::path::Path;
 use std::time::{Duration, Instant};
 use study_base::rng::Stream;
-use study_core::outcome::{Event, State};
-use study_core::store::{StudyFolder, participants};
+use study_session::outcome::{Event, State};
+use study_session::store::{StudyFolder, participants};
 
 /// The number after `saved ✓`, if the screen shows one.
 fn saved(screen: &str) -> Option<usize> {

@@ -2,19 +2,17 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use crate::views::{
-    choice, form, number, picture, question, rating, realism, screens, slider, view,
-};
+use crate::views::{form, picture, question, realism, screens, view};
 use crossterm::event::{Event, KeyCode, KeyEvent, KeyModifiers};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use study::plain::dialogue::Dialogue;
-use study::screen;
-use study::tui::{Colour, Surface};
-use study_core::protocol::phrases::{Phrase, Words, languages};
-use study_core::protocol::{Question, QuestionKind};
-use study_core::session::Screen;
-use study_core::session::view::{Banner, View};
+use study::tui::{ColorDepth, Surface};
+use study_plan::protocol::kinds::{self, KINDS};
+use study_plan::protocol::phrases::{Phrase, Words, languages};
+use study_plan::protocol::{Question, QuestionKind};
+use study_session::session::Screen;
+use study_session::session::view::{Banner, View};
 
 /// What a participant sees of a session.
 fn pages_of_a_session(words: &Arc<Words>) -> Vec<(&'static str, View)> {
@@ -72,7 +70,7 @@ fn pages_of_a_session(words: &Arc<Words>) -> Vec<(&'static str, View)> {
 
 /// The page after these keys.
 fn page(view: &View, keys: &[KeyCode]) -> String {
-    let mut surface = Surface::new(Colour::None);
+    let mut surface = Surface::new(ColorDepth::None);
     crate::views::drawn(&mut surface, view, 80, 24);
     for key in keys {
         surface.event(&Event::Key(KeyEvent::new(*key, KeyModifiers::NONE)), view);
@@ -100,55 +98,31 @@ fn pages_in_every_language() {
 
 /// Pages of questions and of a pilot, without a word of a language.
 fn questions_of_a_pilot(words: &Arc<Words>) -> Vec<(&'static str, View)> {
-    let kinds = [
-        ("a rating", rating(1, 7, &[(1, "◇"), (7, "◆")])),
-        ("a slider", slider().kind),
-        ("a choice", choice(false).kind),
-        ("several", choice(true).kind),
-        ("a number", number().kind),
-        ("a text", QuestionKind::Text),
-    ];
-    let shown = |(name, kind): (&'static str, QuestionKind)| {
-        let kind = match kind {
-            QuestionKind::Slider { from, to, step, .. } => QuestionKind::Slider {
-                from,
-                to,
-                step,
-                labels: BTreeMap::from(
-                    [("0", "◇"), ("100", "◆")].map(|(n, l)| (n.into(), l.into())),
-                ),
-            },
-            QuestionKind::Choice { multiple, .. } => QuestionKind::Choice {
-                options: ["◇", "◆", "○"].map(str::to_owned).to_vec(),
-                multiple,
-            },
-            QuestionKind::Number {
-                min, max, above, ..
-            } => QuestionKind::Number {
-                unit: None,
-                min,
-                max,
-                above,
-            },
-            kind => kind,
-        };
+    let kinds = KINDS.iter().flat_map(|known| {
+        let examples = (known.examples)().into_iter();
+        examples.map(|kind| (known.word, kind))
+    });
+    let shown = |(name, mut kind): (&'static str, QuestionKind)| {
+        for (text, symbol) in kind.texts_mut().into_iter().zip(["◇", "◆", "○"]) {
+            *text = symbol.to_owned();
+        }
         let mut asked = question("asked", "？", kind);
-        asked.required = name != "a text";
+        asked.required = name != "text";
         let text = Question {
             required: false,
-            ..question("comment", "？", QuestionKind::Text)
+            ..question("comment", "？", QuestionKind::Text(kinds::Text))
         };
         let mut view = view(form(vec![asked, text]));
         view.words = words.clone();
         view.banner = Some(Banner::Pilot);
         view.can_go_back = true;
         view.can_replay = true;
-        if name == "a number" {
+        if name == "number" {
             view.line.all_saved = false;
         }
         (name, view)
     };
-    kinds.into_iter().map(shown).collect()
+    kinds.map(shown).collect()
 }
 
 /// The words of a text in Latin letters that are not keys or commands.
@@ -217,7 +191,7 @@ fn nothing_of_a_participants_page_stays_english() {
             let plain = plain.join("\n");
             assert_eq!(latin(&plain), [""; 0], "{lang} {name}\n{plain}");
             let mut shown = Vec::new();
-            let of_page = screen::pages::page(&view);
+            let of_page = study_session::page::participant(&view);
             texts(&serde_json::to_value(of_page).unwrap(), &mut shown);
             let shown = shown.join("\n");
             assert_eq!(latin(&shown), [""; 0], "{lang} {name}\n{shown}");
@@ -253,7 +227,7 @@ fn enter_is_offered_on_every_page_in_every_language() {
         let words = Arc::new(Words::new(Some(lang), &BTreeMap::new()));
         for (name, view) in questions_of_a_pilot(&words) {
             for columns in [80, 100, 200] {
-                let mut surface = Surface::new(Colour::None);
+                let mut surface = Surface::new(ColorDepth::None);
                 let shown = picture(&crate::views::drawn(&mut surface, &view, columns, 24));
                 for (key, what) in [("Enter", Phrase::Save), ("F7", Phrase::FeelAgain)] {
                     let hint = format!("{key}: {}", words.get(what));

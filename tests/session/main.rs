@@ -15,6 +15,7 @@ mod exposure;
 mod flow;
 mod groups;
 mod kill;
+mod kinds;
 mod languages;
 #[path = "../store/memory.rs"]
 mod memory;

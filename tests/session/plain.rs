@@ -1,15 +1,15 @@
 //! Whole sessions in plain lines, typed at a pseudo-terminal and through a pipe.
 
 use crate::support::player::play_to_end;
-use crate::support::{PATIENCE, PATIENT, Terminal, changed_protocol, study};
+use crate::support::{HURRY, PATIENCE, PATIENT, Terminal, changed_protocol, study};
 use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, native_pty_system};
 use serde_json::Value;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io::{Read as _, Write};
 use std::path::Path;
 use std::sync::mpsc::{Receiver, channel};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// `study` with its lines.
 pub(crate) struct Lines {
@@ -23,9 +23,18 @@ pub(crate) struct Lines {
     read: usize,
     /// The trial that was named last.
     trial: u32,
+    /// How long an Enter would be taken for a held key.
+    unread: Duration,
 }
 
 impl Lines {
+    /// A session that goes faster than a person would: see [`HURRY`].
+    pub(crate) fn hurried(folder: &Path, arguments: &[&str]) -> Self {
+        let mut lines = Self::start(folder, arguments, Some(HURRY));
+        lines.unread /= HURRY.1.parse().unwrap();
+        lines
+    }
+
     pub(crate) fn start(folder: &Path, arguments: &[&str], variable: Option<(&str, &str)>) -> Self {
         let size = PtySize {
             rows: 24,
@@ -60,6 +69,7 @@ impl Lines {
             seen: String::new(),
             read: 0,
             trial: 0,
+            unread: Duration::from_millis(320),
         }
     }
 
@@ -84,7 +94,7 @@ impl Lines {
                 }
             }
             assert!(begin.elapsed() < PATIENCE, "{starts:?}:\n{}", self.seen);
-            let interval = std::time::Duration::from_millis(100);
+            let interval = Duration::from_millis(100);
             if let Ok(bytes) = self.output.recv_timeout(interval) {
                 self.seen.push_str(&String::from_utf8_lossy(&bytes));
             } else if let Ok(Some(_)) = self.child.try_wait()
@@ -98,7 +108,7 @@ impl Lines {
     /// Waits for the line, and until an Enter is no longer taken for a held key.
     pub(crate) fn asked(&mut self, starts: &[&str]) -> String {
         let line = self.line(starts);
-        std::thread::sleep(std::time::Duration::from_millis(320));
+        std::thread::sleep(self.unread);
         line
     }
 
@@ -189,15 +199,32 @@ pub(crate) fn events_of(folder: &Path, study: &str) -> Vec<Value> {
     lines.map(told).collect()
 }
 
-/// The events of a journal and of its next segments.
-pub(crate) fn segments(journal: &Path) -> Vec<Value> {
+/// The records of a journal and of its next segments, as lines. A session that is continued
+/// after a kill repeats the records that were written and not yet acknowledged (the kill
+/// came between the sync of the journal and that of its head): they count once. A line
+/// without its end is no record.
+pub(crate) fn records(journal: &Path) -> Vec<String> {
     let next = (2..).map(|n| journal.with_file_name(format!("journal-{n}.jsonl")));
     let all = std::iter::once(journal.to_owned()).chain(next.take_while(|path| path.exists()));
-    let texts: String = all.map(|path| fs::read_to_string(path).unwrap()).collect();
-    let lines = texts
-        .lines()
-        .map(|line| serde_json::from_str(line).unwrap());
-    lines.collect()
+    let mut known = BTreeSet::new();
+    let mut records = Vec::new();
+    for path in all {
+        let text = fs::read_to_string(path).unwrap();
+        let lines = text
+            .split_inclusive('\n')
+            .filter(|line| line.ends_with('\n'));
+        let new = lines.filter(|line| known.insert((*line).to_owned()));
+        records.extend(new.map(|line| line.trim_end().to_owned()));
+    }
+    records
+}
+
+/// The events of a journal and of its next segments.
+pub(crate) fn segments(journal: &Path) -> Vec<Value> {
+    let lines = records(journal).into_iter();
+    lines
+        .map(|line| serde_json::from_str(&line).unwrap())
+        .collect()
 }
 
 pub(crate) fn find(folder: &Path, journals: &mut Vec<std::path::PathBuf>) {
@@ -226,7 +253,7 @@ fn the_journal_is_that_of_the_full_screen_and_the_lines_are_plain() {
     let path = protocol.to_str().unwrap();
 
     let lines = tempfile::tempdir().unwrap();
-    let mut plain = Lines::start(lines.path(), &["run", path, "--plain"], None);
+    let mut plain = Lines::hurried(lines.path(), &["run", path, "--plain"]);
     let end = plain.play(None);
     assert!(end.starts_with("The session is finished"), "{}", plain.seen);
     plain.is_plain();
@@ -234,7 +261,7 @@ fn the_journal_is_that_of_the_full_screen_and_the_lines_are_plain() {
 
     let screen = tempfile::tempdir().unwrap();
     let arguments = ["run", path, "--operator", "lw"];
-    let mut full = Terminal::start(&arguments, screen.path(), 24, 80);
+    let mut full = Terminal::hurried(&arguments, screen.path());
     play_to_end(&mut full, "P01");
 
     let (plain, full) = (events(lines.path()), events(screen.path()));
@@ -252,6 +279,20 @@ pub(crate) fn last_answers(events: &[Value]) -> BTreeMap<String, Value> {
     let answers = events.iter().filter(|e| e["event"] == "answered");
     let place = |e: &Value| format!("{} {}", e["place"]["trial"]["trial"], e["question"]);
     answers.map(|e| (place(e), e["answer"].clone())).collect()
+}
+
+/// A kill between the sync of the journal and that of its head, and one in a write.
+#[test]
+fn a_repeated_record_counts_once_and_a_torn_one_not_at_all() {
+    let folder = tempfile::tempdir().unwrap();
+    let journal = folder.path().join("journal.jsonl");
+    fs::write(&journal, "{\"seq\":1}\n{\"seq\":2}\n{\"se").unwrap();
+    let second = folder.path().join("journal-2.jsonl");
+    fs::write(second, "{\"seq\":2}\n{\"seq\":3}\n").unwrap();
+    let found: Vec<u64> = (segments(&journal).iter())
+        .map(|event| event["seq"].as_u64().unwrap())
+        .collect();
+    assert_eq!(found, [1, 2, 3]);
 }
 
 #[test]
@@ -274,7 +315,7 @@ fn lines_can_remark_correct_stop_pause_quit_and_resume() {
     plain.types("1\n");
     plain.asked(&["Type a number from 1 to 7"]);
     plain.types("9\n");
-    plain.asked(&["That is not an answer here."]);
+    plain.asked(&["The scale goes from 1 to 7."]);
     plain.types("7\n");
     plain.asked(&["Type the reason"]);
     plain.types("mistyped\n");

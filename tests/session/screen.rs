@@ -6,7 +6,7 @@
 mod guarded;
 mod tap;
 
-use crate::plain::{events, last_answers, short};
+use crate::plain::{events, last_answers, records, short};
 use crate::support::{PATIENCE, PATIENT, Terminal, changed_protocol, player, study};
 use serde_json::{Value, json};
 use std::fs;
@@ -294,8 +294,9 @@ fn count(folder: &Path, word: &str) -> usize {
     let journal = folder.join("results/turn-signal");
     let mut journals = Vec::new();
     crate::plain::find(&journal, &mut journals);
-    let text = fs::read_to_string(&journals[0]).unwrap();
-    text.lines().filter(|line| line.contains(word)).count()
+    assert_eq!(journals.len(), 1, "{journals:?}");
+    let records = records(&journals[0]);
+    records.iter().filter(|line| line.contains(word)).count()
 }
 
 #[test]

@@ -9,11 +9,11 @@ use crossterm::event::{
     Event, KeyCode, KeyEvent, KeyModifiers, MouseButton, MouseEvent, MouseEventKind,
 };
 use proptest::prelude::*;
-use study::tui::{Colour, Surface};
+use study::tui::{ColorDepth, Surface};
 use study_base::text::is_unsafe;
-use study_core::protocol::{Answer, QuestionKind};
-use study_core::session::Screen;
-use study_core::session::view::View;
+use study_plan::protocol::{Answer, QuestionKind, kinds};
+use study_session::session::Screen;
+use study_session::session::view::View;
 
 /// Replaces every text of a view by hostile text.
 fn poison(view: &mut View, text: &str, n: f64) {
@@ -50,19 +50,11 @@ fn poison(view: &mut View, text: &str, n: f64) {
         Screen::Form { questions, .. } => {
             for question in questions {
                 question.prompt = t();
-                match &mut question.kind {
-                    QuestionKind::Rating { labels, .. } => {
-                        labels.values_mut().for_each(|label| *label = t());
-                    }
-                    QuestionKind::Slider { labels, .. } => {
-                        labels.values_mut().for_each(|label| *label = t());
-                    }
-                    QuestionKind::Choice { options, .. } => {
-                        options.iter_mut().for_each(|option| *option = t());
-                    }
-                    QuestionKind::Number { unit, .. } => *unit = Some(t()),
-                    QuestionKind::Text => {}
-                }
+                question
+                    .kind
+                    .texts_mut()
+                    .into_iter()
+                    .for_each(|text| *text = t());
             }
         }
         _ => {}
@@ -121,7 +113,7 @@ proptest! {
         let at = which % all.len();
         let (name, mut view) = all.swap_remove(at);
         poison(&mut view, &text, number);
-        let mut surface = Surface::new(Colour::Full);
+        let mut surface = Surface::new(ColorDepth::Full);
         drawn(&mut surface, &view, w, h);
         for n in keys {
             surface.event(&key(n), &view);
@@ -137,7 +129,7 @@ proptest! {
             }
         }
         let esc = Event::Key(KeyEvent::new(KeyCode::Esc, KeyModifiers::NONE));
-        prop_assert_eq!(surface.event(&esc, &view), vec![study_core::session::Input::Stop]);
+        prop_assert_eq!(surface.event(&esc, &view), vec![study_session::session::Input::Stop]);
     }
 }
 
@@ -158,14 +150,14 @@ fn extreme_scales_are_drawn() {
         (1.0, 1.0),
     ] {
         let mut slider = slider();
-        slider.kind = QuestionKind::Slider {
+        slider.kind = QuestionKind::Slider(kinds::Slider {
             from,
             to,
             step: 0.0,
             labels: std::collections::BTreeMap::new(),
-        };
+        });
         let view = view(form(vec![slider]));
-        let mut surface = Surface::new(Colour::None);
+        let mut surface = Surface::new(ColorDepth::None);
         drawn(&mut surface, &view, 80, 24);
         for n in 0..24 {
             surface.event(&key(n), &view);

@@ -7,12 +7,12 @@ use crate::views::*;
 use crossterm::event::{
     Event, KeyCode, KeyEvent, KeyModifiers, MouseButton, MouseEvent, MouseEventKind,
 };
-use study::tui::{Colour, Surface};
-use study_core::outcome::{Author, Choice, FormId};
-use study_core::protocol::question::MAX_TEXT_BYTES;
-use study_core::protocol::{Answer, Entry, QuestionKind};
-use study_core::session::view::{DeviceState, Telemetry, View};
-use study_core::session::{Input, Screen};
+use study::tui::{ColorDepth, Surface};
+use study_plan::protocol::answer::MAX_TEXT_BYTES;
+use study_plan::protocol::{Answer, Entry, QuestionKind, kinds};
+use study_session::outcome::{Author, Choice, FormId};
+use study_session::session::view::{DeviceState, Telemetry, View};
+use study_session::session::{Input, Screen};
 
 struct Desk {
     surface: Surface,
@@ -26,7 +26,7 @@ impl Desk {
 
     fn at(view: View) -> Self {
         let mut desk = Self {
-            surface: Surface::new(Colour::Full),
+            surface: Surface::new(ColorDepth::Full),
             view,
         };
         desk.look();
@@ -193,7 +193,7 @@ fn space_in_a_text_is_a_character_even_while_the_device_plays() {
 }
 
 #[test]
-fn a_remark_can_be_cancelled_without_stopping_the_device() {
+fn a_remark_can_be_canceled_without_stopping_the_device() {
     let mut desk = Desk::with(playing());
     desk.press(KeyCode::F(2));
     desk.types("no");
@@ -558,7 +558,7 @@ fn a_question_mark_is_help_or_text() {
 fn a_long_text_is_read_to_its_end_before_enter_advances() {
     let lines: Vec<String> = (1..=60).map(|n| format!("line {n}")).collect();
     let mut desk = Desk::with(Screen::Message {
-        kind: study_core::session::view::MessageKind::Instructions,
+        kind: study_session::session::view::MessageKind::Instructions,
         text: lines.join("\n\n"),
     });
     let mut presses = 0;
@@ -590,7 +590,7 @@ fn several_questions_are_answered_page_by_page() {
         desk.enter(),
         answers(vec![("handedness", Answer::Choice(both))])
     );
-    let mut strategy = question("strategy", "How?", QuestionKind::Text);
+    let mut strategy = question("strategy", "How?", QuestionKind::Text(kinds::Text));
     strategy.required = true;
     desk.goes_to(form(vec![strategy]));
     assert_eq!(desk.enter(), []);

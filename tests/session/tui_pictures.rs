@@ -5,14 +5,14 @@
 
 use crate::views::*;
 use crossterm::event::{Event, KeyCode, KeyEvent, KeyModifiers};
-use study::tui::{Colour, Surface};
-use study_core::session::Screen;
-use study_core::session::view::{DeviceState, Telemetry, View};
+use study::tui::{ColorDepth, Surface};
+use study_session::session::Screen;
+use study_session::session::view::{DeviceState, Telemetry, View};
 
 /// The screen after some keys: function keys as `F2`, characters as they are,
 /// `\n` Enter, `\t` Tab.
 fn after(view: &View, keys: &[&str], w: u16, h: u16) -> String {
-    let mut surface = Surface::new(Colour::None);
+    let mut surface = Surface::new(ColorDepth::None);
     drawn(&mut surface, view, w, h);
     for key in keys {
         let function = key.strip_prefix('F').and_then(|n| n.parse().ok());
@@ -123,7 +123,7 @@ fn the_arrival_of_telemetry_is_shown_on_request() {
         (Telemetry::None, "running · 12:41"),
     ] {
         playing.line.device = DeviceState::Running(telemetry);
-        let mut surface = Surface::new(Colour::None).with_live(true);
+        let mut surface = Surface::new(ColorDepth::None).with_live(true);
         let shown = picture(&drawn(&mut surface, &playing, 80, 24));
         assert!(shown.contains(words), "{shown}");
         let unasked = fresh(&playing, 80, 24).to_lowercase();
@@ -135,12 +135,12 @@ fn the_arrival_of_telemetry_is_shown_on_request() {
 }
 
 #[test]
-fn no_information_depends_on_colour() {
+fn no_information_depends_on_color() {
     for (name, view) in screens() {
-        let of = |colour| drawn(&mut Surface::new(colour), &view, 80, 24);
-        let none = of(Colour::None);
-        for colour in [Colour::Full, Colour::Sixteen] {
-            assert_eq!(picture(&of(colour)), picture(&none), "{name}");
+        let of = |color| drawn(&mut Surface::new(color), &view, 80, 24);
+        let none = of(ColorDepth::None);
+        for color in [ColorDepth::Full, ColorDepth::Sixteen] {
+            assert_eq!(picture(&of(color)), picture(&none), "{name}");
         }
         for cell in &none.content {
             let plain = ratatui::style::Color::Reset;

@@ -14,8 +14,8 @@ use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 use study::runner::Operator as _;
-use study::tui::{Colour, Options, Tui};
-use study_core::session::{Input, Screen};
+use study::tui::{ColorDepth, Options, Tui};
+use study_session::session::{Input, Screen};
 
 /// So long that only a program that hangs exceeds it.
 const PATIENCE: Duration = Duration::from_secs(120);
@@ -31,7 +31,8 @@ fn child_operates_a_terminal() {
     let options = Options {
         mouse: true,
         live: true,
-        colour: Colour::Full,
+        color: ColorDepth::Full,
+        hurry: 1,
     };
     let end = match Tui::open(options) {
         Err(error) => format!("refused: {error}; {}", error.hint()),
@@ -346,7 +347,8 @@ fn without_a_terminal_it_is_refused() {
     let options = Options {
         mouse: false,
         live: false,
-        colour: Colour::None,
+        color: ColorDepth::None,
+        hurry: 1,
     };
     let error = Tui::open(options).err().unwrap();
     assert!(error.to_string().contains("needs a terminal"));

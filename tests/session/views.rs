@@ -5,16 +5,16 @@
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use std::collections::BTreeMap;
-use study::tui::{Colour, Surface};
+use study::tui::{ColorDepth, Surface};
 use study_base::text::QuestionId;
-use study_core::outcome::FormId;
-use study_core::protocol::{Answer, DeviceKind, Entry, Question, QuestionKind};
-use study_core::session::view::{
+use study_plan::protocol::{Answer, DeviceKind, Entry, Question, QuestionKind, kinds};
+use study_session::outcome::FormId;
+use study_session::session::view::{
     Banner, Correctable, DeviceState, MessageKind, Progress, Screen, StatusLine, Telemetry, View,
 };
 
 pub(crate) fn question(id: &str, prompt: &str, kind: QuestionKind) -> Question {
-    let required = kind != QuestionKind::Text;
+    let required = kind != QuestionKind::Text(kinds::Text);
     Question {
         id: QuestionId::new(id).unwrap(),
         prompt: prompt.to_owned(),
@@ -24,11 +24,11 @@ pub(crate) fn question(id: &str, prompt: &str, kind: QuestionKind) -> Question {
 }
 
 pub(crate) fn rating(from: i64, to: i64, labels: &[(i64, &str)]) -> QuestionKind {
-    QuestionKind::Rating {
+    QuestionKind::Rating(kinds::Rating {
         from,
         to,
         labels: labels.iter().map(|(n, l)| (*n, (*l).to_owned())).collect(),
-    }
+    })
 }
 
 pub(crate) fn realism() -> Question {
@@ -41,7 +41,7 @@ pub(crate) fn realism() -> Question {
 }
 
 pub(crate) fn comment() -> Question {
-    question("comment", "Comment", QuestionKind::Text)
+    question("comment", "Comment", QuestionKind::Text(kinds::Text))
 }
 
 pub(crate) fn slider() -> Question {
@@ -49,12 +49,12 @@ pub(crate) fn slider() -> Question {
     question(
         "effort",
         "How much effort did it take?",
-        QuestionKind::Slider {
+        QuestionKind::Slider(kinds::Slider {
             from: 0.0,
             to: 100.0,
             step: 1.0,
             labels: BTreeMap::from(ends.map(|(n, l)| (n.to_owned(), l.to_owned()))),
-        },
+        }),
     )
 }
 
@@ -68,10 +68,10 @@ pub(crate) fn choice(multiple: bool) -> Question {
     question(
         "handedness",
         "Which hand do you write with?",
-        QuestionKind::Choice {
+        QuestionKind::Choice(kinds::Choice {
             options: options.map(str::to_owned).to_vec(),
             multiple,
-        },
+        }),
     )
 }
 
@@ -79,12 +79,12 @@ pub(crate) fn number() -> Question {
     question(
         "age",
         "How old are you?",
-        QuestionKind::Number {
+        QuestionKind::Number(kinds::Number {
             unit: Some("years".to_owned()),
             min: Some(18.0),
             max: Some(120.0),
             above: None,
-        },
+        }),
     )
 }
 
@@ -447,7 +447,7 @@ pub(crate) fn screens() -> Vec<(&'static str, View)> {
             view(form(vec![question(
                 "strategy",
                 "How did you decide?",
-                QuestionKind::Text,
+                QuestionKind::Text(kinds::Text),
             )])),
         ),
         (
@@ -459,12 +459,12 @@ pub(crate) fn screens() -> Vec<(&'static str, View)> {
                     questions: vec![question(
                         "room",
                         "Temperature of the room",
-                        QuestionKind::Number {
+                        QuestionKind::Number(kinds::Number {
                             unit: Some("°C".to_owned()),
                             min: None,
                             max: None,
                             above: None,
-                        },
+                        }),
                     )],
                     page: 1,
                     pages: 2,
@@ -505,5 +505,5 @@ pub(crate) fn picture(buf: &Buffer) -> String {
 
 /// The text of a view without any input.
 pub(crate) fn fresh(view: &View, w: u16, h: u16) -> String {
-    picture(&drawn(&mut Surface::new(Colour::None), view, w, h))
+    picture(&drawn(&mut Surface::new(ColorDepth::None), view, w, h))
 }

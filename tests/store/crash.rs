@@ -7,7 +7,7 @@ use crate::process::{Told, finishes, noticed, open, process};
 use crate::world::protocol;
 use std::io::ErrorKind;
 use std::path::Path;
-use study_core::store::StoreError;
+use study_session::store::StoreError;
 
 fn p01() -> Told {
     Told::of("P01")

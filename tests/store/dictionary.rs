@@ -5,7 +5,7 @@
 
 use std::fs;
 use std::path::Path;
-use study_core::protocol::columns::{
+use study_plan::protocol::columns::{
     AttemptColumn, Column, IntervalColumn, Kind, ParticipantColumn, RatingColumn, SampleColumn,
     UsedColumn,
 };

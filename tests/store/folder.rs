@@ -8,9 +8,9 @@ use crate::world::{
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::Path;
 use std::process::Stdio;
-use study_core::outcome::{Event, Sample, State, Status};
-use study_core::protocol::Seat;
-use study_core::store::{
+use study_plan::protocol::Seat;
+use study_session::outcome::{Event, Sample, State, Status};
+use study_session::store::{
     ClaimRequest, Frozen, SeatKind, StateRequest, StoreError, StudyFolder, next_row, participants,
 };
 

@@ -6,8 +6,8 @@ use crate::world::*;
 use chrono::{DateTime, FixedOffset};
 use std::path::Path;
 use study_base::text::PartId;
-use study_core::protocol::{Assign, GroupRules, Groups, Seat, SessionPlan};
-use study_core::store::{
+use study_plan::protocol::{Assign, GroupRules, Groups, Seat, SessionPlan};
+use study_session::store::{
     ClaimRequest, Next, Plan, SeatKind, StoreError, StudyFolder, next_session,
 };
 

@@ -7,10 +7,10 @@ use crate::memory::MemoryDisk;
 use crate::world::{Kept, at, real};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use study_core::outcome::Event;
-use study_core::store::disk::Disk as _;
-use study_core::store::journal_record::{decode, hash};
-use study_core::store::{DamageKind, StoreError, StudyFolder};
+use study_session::outcome::Event;
+use study_session::store::disk::Disk as _;
+use study_session::store::journal_record::{decode, hash};
+use study_session::store::{DamageKind, StoreError, StudyFolder};
 
 fn open(disk: &MemoryDisk) -> StudyFolder {
     StudyFolder::open_on(Arc::new(disk.clone()), small()).unwrap()

@@ -7,12 +7,12 @@ use crate::world::{Kept, at, participant, real, session};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
-use study_core::outcome::Event;
-use study_core::protocol::Seat;
-use study_core::store::disk::Disk as _;
-use study_core::store::journal_record::{self, Claim, Record};
-use study_core::store::replay::{Replay, Segment, replay};
-use study_core::store::{DamageKind, HeadFile, StudyFolder};
+use study_plan::protocol::Seat;
+use study_session::outcome::Event;
+use study_session::store::disk::Disk as _;
+use study_session::store::journal_record::{self, Claim, Record};
+use study_session::store::replay::{Replay, Segment, replay};
+use study_session::store::{DamageKind, HeadFile, StudyFolder};
 
 /// The lines of a whole session, each with its line end.
 fn lines() -> Vec<Vec<u8>> {
@@ -100,7 +100,7 @@ fn every_missing_byte_is_noticed_and_costs_one_record() {
     }
 }
 
-/// Each line between its neighbours: what a line does to others it does to these.
+/// Each line between its neighbors: what a line does to others it does to these.
 #[test]
 fn every_flipped_bit_is_noticed_and_costs_one_record() {
     let lines = lines();

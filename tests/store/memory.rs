@@ -24,7 +24,7 @@ use std::io;
 use std::path::{Component, Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
-use study_core::store::disk::{Appender, Disk, Item, ItemKind, Lock};
+use study_session::store::disk::{Appender, Disk, Item, ItemKind, Lock};
 
 /// What happens at the chosen call.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

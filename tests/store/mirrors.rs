@@ -9,9 +9,9 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use study_base::rng::Stream;
-use study_core::outcome::Event;
-use study_core::store::disk::Disk;
-use study_core::store::{Finding, StoreError, StudyFolder};
+use study_session::outcome::Event;
+use study_session::store::disk::Disk;
+use study_session::store::{Finding, StoreError, StudyFolder};
 
 /// The results folder and the mirror, each on a disk of its own.
 struct Disks([MemoryDisk; 2]);
@@ -236,8 +236,8 @@ fn a_mirror_that_does_not_exist_is_not_created() {
 #[test]
 fn an_erasure_reaches_the_mirror_at_the_next_start() {
     use crate::world::participant;
-    use study_core::outcome::State;
-    use study_core::store::StateRequest;
+    use study_session::outcome::State;
+    use study_session::store::StateRequest;
     let disks = Disks::new();
     drop(process(&disks, &mut Told::of("P01")).unwrap());
     let request = StateRequest {

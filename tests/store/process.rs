@@ -5,10 +5,10 @@ use crate::memory::MemoryDisk;
 use crate::world::{Kept, at, protocol, real, session};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use study_core::outcome::{Entry, Event, Sample};
-use study_core::protocol::Seat;
-use study_core::store::disk::Disk as _;
-use study_core::store::{SessionFolder, StoreError, StudyFolder};
+use study_plan::protocol::Seat;
+use study_session::outcome::{Entry, Event, Sample};
+use study_session::store::disk::Disk as _;
+use study_session::store::{SessionFolder, StoreError, StudyFolder};
 
 /// What a process was told about the session of a participant.
 #[derive(Debug, Clone)]

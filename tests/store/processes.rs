@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 use std::io::{BufRead as _, BufReader, Read as _};
 use std::path::Path;
 use std::process::{Child, Stdio};
-use study_core::store::{StoreError, StudyFolder};
+use study_session::store::{StoreError, StudyFolder};
 
 fn open(results: &Path) -> StudyFolder {
     StudyFolder::open_or_create(results, &Kept::new().frozen(), at(0)).unwrap()

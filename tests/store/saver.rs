@@ -7,9 +7,9 @@ use crate::process::open;
 use crate::world::{at, begun, ended, real, started};
 use std::path::Path;
 use study::runner::saver::{Job, SaveEvent, Saver};
-use study_core::outcome::{Event, Sample};
-use study_core::store::StudyFolder;
-use study_core::store::disk::Disk as _;
+use study_session::outcome::{Event, Sample};
+use study_session::store::StudyFolder;
+use study_session::store::disk::Disk as _;
 
 const SAMPLE: Sample = Sample {
     t_s: 0.001,

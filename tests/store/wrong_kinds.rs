@@ -2,12 +2,17 @@
 
 #![allow(clippy::unwrap_used)]
 
-use crate::commands::{study_command, turn_signal};
+use crate::commands::turn_signal;
 use crate::world::{Kept, at, real};
+use assert_cmd::Command;
 use predicates::prelude::*;
 use std::os::unix::fs::symlink;
 use std::path::Path;
-use study_core::store::{StoreError, StudyFolder};
+use study_session::store::{StoreError, StudyFolder};
+
+fn study_command() -> Command {
+    Command::cargo_bin("study").unwrap()
+}
 
 /// Moves a file or folder elsewhere and leaves a link.
 fn link(path: &Path, elsewhere: &Path) {

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use study_base::limits::{Limit, Limits};
 use study_base::text::{ModelId, QuestionId};
-use study_core::protocol::*;
+use study_plan::protocol::*;
 
 /// Realizations `A`, `B`, … `Z`, `a`, … and nothing beside the design.
 pub(crate) fn design(models: usize, repetitions: u32, order: Order) -> Protocol {

@@ -19,6 +19,10 @@ use std::time::{Duration, Instant};
 /// machine may be busy; nothing is asserted about time.
 pub const PATIENCE: Duration = Duration::from_secs(120);
 
+/// A session on the simulated device goes ten times as fast with this variable: for tests in
+/// which a person's pace is not the matter. Any other device refuses it.
+pub const HURRY: (&str, &str) = ("STUDY_TEST_HURRY", "10");
+
 /// The emulator does not accept a size of 0.
 fn cells(n: u16) -> NonZero<u16> {
     NonZero::new(n.max(1)).unwrap()
@@ -104,7 +108,15 @@ impl Terminal {
         Self::start_with(arguments, folder, rows, columns, &[])
     }
 
-    /// The same with environment variables.
+    /// A session of `study run` in 24 lines of 80 columns, with [`HURRY`]: its first screen.
+    pub fn hurried(arguments: &[&str], folder: &Path) -> Self {
+        let hurry = (HURRY.0, Path::new(HURRY.1));
+        let mut terminal = Self::start_with(arguments, folder, 24, 80, &[hurry]);
+        terminal.wait_for("Who takes part?");
+        terminal
+    }
+
+    /// Starts `study` with arguments and environment variables.
     pub fn start_with(
         arguments: &[&str],
         folder: &Path,

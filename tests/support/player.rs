@@ -23,16 +23,19 @@ pub enum Did {
     WentOn,
 }
 
+/// How a page says that a playback, one of several intervals or the last of them can be ended.
+const FELT: [&str; 3] = ["Enter: rate", "Enter: next", "Enter: answer"];
+
 /// Interval between two reads of the screen.
 const INTERVAL: Duration = Duration::from_millis(3);
 
-/// Does the one thing that the screen asks for, and waits for its effect.
-pub fn play(terminal: &mut Terminal, participant: &str) -> Did {
-    let page = terminal.shown();
-    act(terminal, participant, &page, None)
+/// Does the one thing that `page` asks for, and waits for its effect. The caller's own look at
+/// the screen decides: another one may show the page after it.
+pub fn play(terminal: &mut Terminal, participant: &str, page: &Shown) -> Did {
+    act(terminal, participant, page, None)
 }
 
-/// The same, but waits no longer than `until`.
+/// The same for the page that is shown now, but waits no longer than `until`.
 pub fn play_before(terminal: &mut Terminal, participant: &str, until: Instant) -> Did {
     let page = terminal.shown();
     act(terminal, participant, &page, Some(until))
@@ -143,7 +146,7 @@ fn act(terminal: &mut Terminal, participant: &str, page: &Shown, until: Option<I
         (participant.to_owned(), look, "\r", Did::Who)
     } else if shows("yes, I agree") {
         (String::new(), String::new(), "y", Did::WentOn)
-    } else if shows("Enter: rate") {
+    } else if FELT.into_iter().any(shows) && shows("Feel the ") {
         (String::new(), String::new(), "\r", Did::Felt)
     } else if shows("Feel the device") || shows("aving …") {
         return Did::Waited;
@@ -242,7 +245,10 @@ fn compact(text: &str) -> String {
 fn asked(page: &Shown) -> (String, Option<(u16, u16)>) {
     let keys = page.text.trim_end().lines().rev().nth(2);
     let mut text = keys.unwrap_or_default().to_owned();
-    if !page.text.contains("Feel the ") {
+    let intervals = ["FIRST", "SECOND", "THIRD"].into_iter();
+    if page.text.contains("Feel the ") {
+        text.extend(intervals.filter(|word| page.text.contains(word)));
+    } else {
         text.push_str(&body(page));
     }
     (text.replace(|c: char| c.is_ascii_digit(), ""), page.cursor)

@@ -4,10 +4,10 @@
 use crate::designs::design;
 use std::collections::BTreeMap;
 use study_base::text::{ModelId, ParticipantId, QuestionId};
-use study_core::outcome::{Author, Event, Failure, FormId, Moment, Playback, Start};
-use study_core::protocol::fingerprint::Fingerprints;
-use study_core::protocol::*;
-use study_core::store::{ClaimRequest, Frozen, Plan, SeatKind};
+use study_plan::protocol::fingerprint::Fingerprints;
+use study_plan::protocol::*;
+use study_session::outcome::{Author, Event, Failure, FormId, Moment, Playback, Start};
+use study_session::store::{ClaimRequest, Frozen, Plan, SeatKind};
 
 pub fn model(id: &str) -> ModelId {
     ModelId::new(id).unwrap()
@@ -25,7 +25,7 @@ fn text_question(id: &str) -> Question {
     Question {
         id: question(id),
         prompt: id.to_owned(),
-        kind: QuestionKind::Text,
+        kind: QuestionKind::Text(kinds::Text),
         required: false,
     }
 }
@@ -51,11 +51,11 @@ pub fn protocol() -> Protocol {
             Question {
                 id: question("realism"),
                 prompt: "How realistic?".to_owned(),
-                kind: QuestionKind::Rating {
+                kind: QuestionKind::Rating(kinds::Rating {
                     from: 1,
                     to: 7,
                     labels: BTreeMap::new(),
-                },
+                }),
                 required: true,
             },
             text_question("comment"),

@@ -3,10 +3,10 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use super::support::{Host, begin, detents, ms};
-use study::device::Stimulus;
-use study::device::firmware::{Firmware, Options};
-use study::device::host::{Host as StudyHost, HostSettings};
 use study_base::limits::Limits;
+use study_device::Stimulus;
+use study_device::firmware::{Firmware, Options};
+use study_device::host::{Host as StudyHost, HostSettings};
 use study_haptics::model::{Branch, Realization, Trained};
 use study_wire::frame::Decoder;
 use study_wire::handler::{Bounds, Handler, Measured, Profile};

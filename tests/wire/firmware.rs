@@ -4,7 +4,7 @@
 
 use crate::support::{Host, begin, detents, ms};
 use std::num::NonZeroU16;
-use study::device::firmware::Options;
+use study_device::firmware::Options;
 use study_wire::message::{
     Commit, DeviceState, Event, EventKind, Fault, FixedVec, Hello, Loaded, Node, Play, Refusal,
     Reply, Request, Stop, TableBegin, TableChunk, TelemetrySample, fixed,

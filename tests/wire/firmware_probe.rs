@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::support::{Host, ms};
-use study::device::firmware::Options;
+use study_device::firmware::Options;
 use study_wire::message::UploadCrc;
 use study_wire::message::{
     Commit, DeviceState, Fault, FixedVec, Loaded, PathBegin, PathChunk, Record, Refusal, Reply,

@@ -6,7 +6,7 @@ use std::num::NonZeroU16;
 use std::time::Duration;
 
 use crate::support::{Host, begin, detents, ms};
-use study::device::firmware::{Flaw, Options};
+use study_device::firmware::{Flaw, Options};
 use study_wire::message::{
     Commit, DeviceState, Fault, FixedVec, Hello, PathBegin, PathChunk, Play, Record, Refusal,
     Reply, Request, Stop, TableBegin, TableChunk,

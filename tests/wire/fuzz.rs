@@ -9,7 +9,7 @@
 use crate::support::{begin, detents, mechanism, mechanism_requests};
 use std::num::NonZeroU16;
 use std::time::Duration;
-use study::device::firmware::{Firmware, Options};
+use study_device::firmware::{Firmware, Options};
 use study_wire::frame::{Decoder, Frame, MAX_BODY};
 use study_wire::message::{
     Commit, DeviceState, FixedVec, Heartbeat, Hello, MechanismBegin, MechanismChunk, PathBegin,

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use super::support::{Host, begin, detents, mechanism, mechanism_requests, ms};
-use study::device::firmware::Options;
+use study_device::firmware::Options;
 use study_wire::mechanism::Scalars;
 use study_wire::message::{
     Commit, DeviceState, Hello, Loaded, MechanismBegin, MechanismChunk, Refusal, Reply, Request,

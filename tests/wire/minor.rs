@@ -4,10 +4,10 @@
 
 use super::support::{Host, ms};
 use std::time::Duration;
-use study::device::firmware::{Firmware, Options};
-use study::device::host::{Host as StudyHost, HostSettings};
-use study::device::{Report, Stimulus};
 use study_base::limits::Limits;
+use study_device::firmware::{Firmware, Options};
+use study_device::host::{Host as StudyHost, HostSettings};
+use study_device::{Report, Stimulus};
 use study_haptics::model::file;
 use study_wire::frame::Decoder;
 use study_wire::message::{

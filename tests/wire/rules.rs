@@ -4,7 +4,7 @@
 
 use super::support::{Host, begin, detents, ms};
 use std::num::NonZeroU16;
-use study::device::firmware::Options;
+use study_device::firmware::Options;
 use study_wire::frame::Frame;
 use study_wire::message::{
     Commit, DeviceState, EventKind, Fault, Hello, Node, Play, Refusal, Reply, Request, Stop,

@@ -5,7 +5,7 @@
 
 use std::num::NonZeroU16;
 use std::time::Duration;
-use study::device::firmware::{Firmware, Options};
+use study_device::firmware::{Firmware, Options};
 use study_wire::frame::Decoder;
 use study_wire::mechanism::Scalars;
 use study_wire::message::{

@@ -145,9 +145,9 @@ impl Findings {
         (line, column)
     }
 
-    /// All faults as text for a terminal, with ANSI styles if `colour`.
-    pub fn render(&self, colour: bool) -> String {
-        let renderer = if colour {
+    /// All faults as text for a terminal, with ANSI styles if `color`.
+    pub fn render(&self, color: bool) -> String {
+        let renderer = if color {
             Renderer::styled()
         } else {
             Renderer::plain()
@@ -260,6 +260,6 @@ mod tests {
         let keys = ["repetitions", "participants", "order"];
         assert_eq!(did_you_mean("repetition", keys), Some("repetitions"));
         assert_eq!(did_you_mean("oder", keys), Some("order"));
-        assert_eq!(did_you_mean("colour", keys), None);
+        assert_eq!(did_you_mean("paint", keys), None);
     }
 }

@@ -6,6 +6,7 @@
 //! * [`limits`]: bounds that are finite and positive by construction.
 //! * [`diagnostic`]: faults of a file with line, caret and suggestion, and a TOML
 //!   reader that reports every fault rather than the first.
+//! * [`hex`]: bytes and SHA-256 digests as text.
 //! * [`rng`]: random streams that are named, independent and the same on every
 //!   machine.
 //!
@@ -14,6 +15,7 @@
 
 pub mod apa;
 pub mod diagnostic;
+pub mod hex;
 pub mod limits;
 mod named;
 pub mod rng;

@@ -28,6 +28,7 @@ mod banded;
 pub mod baseline;
 pub mod constrained;
 pub mod delivery;
+pub mod evidence;
 pub mod ewls;
 mod friction;
 pub mod grid;
@@ -51,10 +52,12 @@ pub use samples::{Samples, Theta};
 
 use crate::model::{Branch, Provenance, Realization, Trained};
 use crate::recording::{Recording, range};
+use evidence::{Evidence, Term};
 use mechanism::{Fitted, Progress};
 use method::{Ewls, Sort, Start, TwoSided, Width};
 use problem::START_UP_SAMPLES;
 use resample::{Resample, Resampled};
+use std::sync::OnceLock;
 use study_wire::predict::{Direction, Lookup};
 
 /// One or more recordings of a target, prepared for identification.
@@ -68,6 +71,8 @@ pub struct Training<'r> {
     // every table of a grid needs these two
     force_range_n: [f64; 2],
     top_speed_mm_s: f64,
+    /// Of mass and damping, computed when first asked for.
+    evidence: OnceLock<Option<[Evidence; 2]>>,
 }
 
 impl<'r> Training<'r> {
@@ -112,6 +117,7 @@ impl<'r> Training<'r> {
                 [all[0].min(one[0]), all[1].max(one[1])]
             }),
             top_speed_mm_s: (recordings.iter().map(|r| r.top_speed_mm_s())).fold(0.0, f64::max),
+            evidence: OnceLock::new(),
         })
     }
 
@@ -132,6 +138,32 @@ impl<'r> Training<'r> {
         Some(plus?.min(minus?))
     }
 
+    /// What the recordings say about mass and damping; `None` if they are too short.
+    pub fn evidence(&self) -> Option<&[Evidence; 2]> {
+        let of = || evidence::of(&self.recordings, self.range_mm);
+        self.evidence.get_or_init(of).as_ref()
+    }
+
+    /// The method without the terms that the recordings do not carry, if it asks for that, and
+    /// a warning for each.
+    fn carried(&self, mut method: Method) -> (Method, Vec<Warning>) {
+        let mut left_out = Vec::new();
+        if let Some(terms) = method.terms_mut().filter(|terms| terms.only_carried) {
+            terms.only_carried = false;
+            for evidence in self.evidence().into_iter().flatten() {
+                let kept = match evidence.term {
+                    Term::Mass => &mut terms.m,
+                    Term::Damping => &mut terms.b,
+                };
+                if *kept && !evidence.is_carried() {
+                    *kept = false;
+                    left_out.push(Warning::LeftOut(*evidence));
+                }
+            }
+        }
+        (method, left_out)
+    }
+
     /// Identifies a realization. Methods without dx ignore `dx_mm`, see
     /// [`Method::has_dx`].
     ///
@@ -145,6 +177,18 @@ impl<'r> Training<'r> {
         lookup: Lookup,
     ) -> Result<Identified, IdentifyError> {
         method.check()?;
+        let (method, left_out) = self.carried(method);
+        let mut identified = self.identify_as_asked(method, dx_mm, lookup)?;
+        identified.warnings.extend(left_out);
+        Ok(identified)
+    }
+
+    fn identify_as_asked(
+        &self,
+        method: Method,
+        dx_mm: f64,
+        lookup: Lookup,
+    ) -> Result<Identified, IdentifyError> {
         match method {
             Method::Ewls(options) => {
                 // check dx before the long computation

@@ -25,7 +25,7 @@ pub const FORMAT_2: &str = "study-model/2";
 /// A haptic model's parameters and their origin: the contents of a model file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Realization {
-    /// Its id.
+    /// Identifier of the realization.
     pub id: String,
     /// How it was identified.
     pub provenance: Provenance,

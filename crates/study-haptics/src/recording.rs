@@ -19,6 +19,7 @@ mod swapped;
 mod write;
 
 pub(crate) use column::{mean_and_variance, range};
+pub(crate) use differences::{acceleration, velocity};
 pub use doubts::Energy;
 pub use names::{NameError, Named, Names};
 pub use write::{Columns, write};
@@ -231,8 +232,8 @@ pub enum RecordingFault {
     LongLine,
     #[error("{0} is the same in every row: nothing was measured")]
     Constant(&'static str),
-    #[error("the stroke is {stroke_mm} mm: x_mm seems to be in metres, multiply it by 1000")]
-    Metres { stroke_mm: f64 },
+    #[error("the stroke is {stroke_mm} mm: x_mm seems to be in meters, multiply it by 1000")]
+    Meters { stroke_mm: f64 },
 }
 
 /// Reads a recording.
@@ -351,7 +352,7 @@ mod tests {
     }
 
     #[test]
-    fn a_knob_in_degrees_and_newton_metres_is_read_at_its_lever() {
+    fn a_knob_in_degrees_and_newton_meters_is_read_at_its_lever() {
         let given: Vec<Named> = ["t=time", "x=pos:deg", "f=torque:N·m"]
             .map(|text| text.parse().unwrap())
             .into();
@@ -421,7 +422,7 @@ mod tests {
     }
 
     #[test]
-    fn constant_columns_and_metres_are_refused() {
+    fn constant_columns_and_meters_are_refused() {
         assert_eq!(
             message("# h\nt_s,x_mm,f_n\n0,1,1\n1,1,2\n2,1,3\n"),
             "r.csv: line 2: x_mm is the same in every row: nothing was measured"
@@ -432,7 +433,7 @@ mod tests {
         );
         assert_eq!(
             message("t_s,x_mm,f_n\n0,0.001,1\n1,0.035,2\n2,0.001,3\n"),
-            "r.csv: line 1: the stroke is 0.034 mm: x_mm seems to be in metres, multiply it by 1000"
+            "r.csv: line 1: the stroke is 0.034 mm: x_mm seems to be in meters, multiply it by 1000"
         );
     }
 

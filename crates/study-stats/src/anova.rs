@@ -57,7 +57,7 @@ pub struct OneWay {
     pub effect: Effect,
     /// Sum of squares between subjects.
     pub ss_subject: f64,
-    /// Generalised η² = SSm/(SSm + SSs + SSe) (Olejnik & Algina 2003); `None` for 0/0.
+    /// Generalized η² = SSm/(SSm + SSs + SSe) (Olejnik & Algina 2003); `None` for 0/0.
     pub ges: Option<f64>,
     /// Partial η² = SSm/(SSm + SSe); `None` for 0/0.
     pub pes: Option<f64>,
@@ -66,7 +66,7 @@ pub struct OneWay {
 /// A two-way analysis: subjects × realizations × repetitions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TwoWay {
-    /// Realizations, repetitions and their interaction, each with its generalised η²:
+    /// Realizations, repetitions and their interaction, each with its generalized η²:
     /// its sum of squares over itself plus those of all subject terms.
     pub effects: [(Effect, Option<f64>); 3],
 }
@@ -152,7 +152,7 @@ fn kronecker(a: &[Vec<f64>], b: &[Vec<f64>]) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// Sum of squares of the effect and of its error, and the centred contrasts by subject.
+/// Sum of squares of the effect and of its error, and the centered contrasts by subject.
 fn effect_sums(rows: &[&[f64]], contrasts: &[Vec<f64>]) -> (f64, f64, Vec<Vec<f64>>) {
     let n = rows.len() as f64;
     let mut y: Vec<Vec<f64>> = rows
@@ -211,7 +211,7 @@ fn effect(rows: &[&[f64]], contrasts: &[Vec<f64>], with_mauchly: bool) -> Effect
     }
 }
 
-/// Covariance matrix of centred columns.
+/// Covariance matrix of centered columns.
 pub(super) fn covariance(y: &[Vec<f64>]) -> SymmetricMatrix {
     let q = y.first().map_or(0, Vec::len);
     let df = y.len() as f64 - 1.0;

@@ -3,7 +3,7 @@
 //! The exact bootstrap enumerates all C(2S−1, S) compositions of S draws from S subjects,
 //! each with its multinomial weight (Fisher & Hall 1991), without Monte Carlo error. The
 //! bootstrap describes how the correlation varies with the subjects; it does not
-//! generalise to other realizations.
+//! generalize to other realizations.
 
 use super::correlation::pearson;
 use super::describe::is_constant;
@@ -352,7 +352,7 @@ impl Turned {
         let k = score.x.len();
         let mut basis = vec![vec![1.0 / (k as f64).sqrt(); k], score.x.clone()];
         while basis.len() < k {
-            // The unit vector of which most is left, twice orthogonalised.
+            // The unit vector of which most is left, twice orthogonalized.
             let left = |j: &usize| 1.0 - basis.iter().map(|b| b[*j] * b[*j]).sum::<f64>();
             let most = (0..k).max_by(|a, b| left(a).total_cmp(&left(b)));
             let mut v = vec![0.0; k];
@@ -369,8 +369,8 @@ impl Turned {
         let size = size.fold(0.0f64, |most, v| most.max(v.abs()));
         let turned = |row: &&[f64]| {
             let mean = row.iter().sum::<f64>() / k as f64;
-            let centred: Vec<f64> = row.iter().map(|v| v - mean).collect();
-            basis[1..].iter().map(|b| dot(b, &centred)).collect()
+            let centered: Vec<f64> = row.iter().map(|v| v - mean).collect();
+            basis[1..].iter().map(|b| dot(b, &centered)).collect()
         };
         Self {
             rows: rows.iter().map(turned).collect(),
@@ -388,7 +388,7 @@ impl Turned {
 
 /// Correlation of column sums with a fixed x.
 struct CorrelationWith {
-    /// Centred, of norm 1.
+    /// Centered, of norm 1.
     x: Vec<f64>,
 }
 
@@ -398,11 +398,11 @@ impl CorrelationWith {
             return None;
         }
         let mean = x.iter().sum::<f64>() / x.len() as f64;
-        let centred: Vec<f64> = x.iter().map(|v| v - mean).collect();
-        let norm = centred.iter().map(|v| v * v).sum::<f64>().sqrt();
+        let centered: Vec<f64> = x.iter().map(|v| v - mean).collect();
+        let norm = centered.iter().map(|v| v * v).sum::<f64>().sqrt();
         pearson(x, x)?;
         Some(Self {
-            x: centred.iter().map(|v| v / norm).collect(),
+            x: centered.iter().map(|v| v / norm).collect(),
         })
     }
 

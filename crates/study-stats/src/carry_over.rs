@@ -2,7 +2,7 @@
 //!
 //! A regression on the previous rating with an intercept for each subject is biased
 //! below 0 (Nickell 1981), more so if subjects prefer some realizations, because the
-//! orders do not repeat a realization soon. Here the product of neighbouring residuals
+//! orders do not repeat a realization soon. Here the product of neighboring residuals
 //! is compared with its mean over all orders of the trials within their blocks. That
 //! comparison has neither bias: where ratings do not depend on the order, every order of
 //! a block was equally likely.
@@ -47,10 +47,10 @@ pub struct CarryOver {
 ///
 /// With r the ratings less the means of subject and of realization, a subject
 /// contributes D = Σ rₜrₜ₋₁ − E. E is the mean of the sum over all orders within blocks:
-/// (T² − Σr²)/n for the neighbours within a block of n trials with the sum T, and the
-/// product of the means for the neighbours of two blocks. The slope is ΣD/ΣQ, with Q what
+/// (T² − Σr²)/n for the neighbors within a block of n trials with the sum T, and the
+/// product of the means for the neighbors of two blocks. The slope is ΣD/ΣQ, with Q what
 /// a slope of 1 adds to D at first order: of the mean square of a block, (n − 1)(1 − 2/n)
-/// within it and 1 − 1/nn′ at its border with a block of n′, since neighbours are also
+/// within it and 1 − 1/nn′ at its border with a block of n′, since neighbors are also
 /// among the pairs that E averages. t is that of the mean of D, which is 0 without
 /// carry-over.
 ///

@@ -26,7 +26,7 @@ pub(crate) mod tests;
 
 use crate::matrix::{Cholesky, SymmetricMatrix};
 pub use counts::{CategoryCount, CategoryCounts, Predictor};
-use newton::{Evaluation, maximise};
+use newton::{Evaluation, maximize};
 pub use parallel::{ProportionalOdds, proportional_odds};
 
 /// Why an ordinal model has no estimate.
@@ -76,7 +76,7 @@ pub struct ClmFit {
 /// If the estimates do not exist (decided from the counts) or were not found.
 pub fn clm(table: &CategoryCounts) -> Result<ClmFit, ClmError> {
     table.estimable()?;
-    let found = maximise(start(table), |at| evaluate(table, at)).ok_or(ClmError::NoMaximum)?;
+    let found = maximize(start(table), |at| evaluate(table, at)).ok_or(ClmError::NoMaximum)?;
     fit_of(table, &found.at, found.value, &found.information)
 }
 

@@ -10,7 +10,7 @@
 //! which is concave in b. The integral is computed in two ways: by Laplace's method,
 //! f(b̂) − ½ ln H with H = −f″(b̂), the default of most software, and by adaptive
 //! Gauss–Hermite quadrature (Pinheiro & Bates 1995), which is numerically exact. Both are
-//! maximised over (θ, β, ln σ) by Newton's method with second derivatives of the
+//! maximized over (θ, β, ln σ) by Newton's method with second derivatives of the
 //! marginal likelihood, so that the standard errors are those of the observed
 //! information (R's `ordinal`, Christensen 2019, fits the same model by quasi-Newton).
 //!
@@ -27,7 +27,7 @@ mod quadrature;
 mod tests;
 
 use super::clm::counts::CategoryCounts;
-use super::clm::newton::{Evaluation, Maximum, maximise};
+use super::clm::newton::{Evaluation, Maximum, maximize};
 use super::clm::{ClmError, ClmFit, clm, fit_of, logistic};
 pub use crossed::{CrossedClmm, CrossedParameters, clmm_crossed};
 use std::sync::LazyLock;
@@ -88,7 +88,7 @@ pub fn clmm(table: &CategoryCounts) -> ClmmFits {
         .collect();
     let start = best(&starts, &mut by_laplace);
     let slope = slope_at_zero(table, &fixed);
-    let found = start.and_then(|at| maximise(at, &mut by_laplace));
+    let found = start.and_then(|at| maximize(at, &mut by_laplace));
     let laplace = estimates(table, &fixed, slope, found.as_ref());
     // Start at Laplace's maximum; if that fails, start again from the initial values.
     let near = match (found, &laplace) {
@@ -111,10 +111,10 @@ pub fn clmm(table: &CategoryCounts) -> ClmmFits {
 /// The maximum of the integral: first with few nodes, because the cost of a step is
 /// proportional to their number.
 fn integrate(table: &CategoryCounts, start: Vec<f64>, modes: &mut [f64]) -> Option<Maximum> {
-    let near = maximise(start.clone(), |at| {
+    let near = maximize(start.clone(), |at| {
         quadrature::evaluate(table, at, &FEW, modes)
     });
-    maximise(near.map_or(start, |near| near.at), |at| {
+    maximize(near.map_or(start, |near| near.at), |at| {
         quadrature::evaluate(table, at, &RULE, modes)
     })
 }

@@ -60,12 +60,12 @@ pub struct Shape {
 /// The shape of a sample, from its central moments mᵣ = Σ(x − x̄)ʳ/n. `None` for no
 /// numbers, or if all are equal.
 pub fn shape(x: &[f64]) -> Option<Shape> {
-    let centre = mean(x)?;
-    let moment = |r: i32| mean_of(x.iter().map(|x| (x - centre).powi(r)));
+    let center = mean(x)?;
+    let moment = |r: i32| mean_of(x.iter().map(|x| (x - center).powi(r)));
     let (m2, m3, m4) = (moment(2)?, moment(3)?, moment(4)?);
     let largest = x
         .iter()
-        .fold(0.0f64, |most, x| most.max((x - centre).abs()));
+        .fold(0.0f64, |most, x| most.max((x - center).abs()));
     (m2 > 0.0).then_some(())?;
     Some(Shape {
         skewness: finite(m3 / m2.powf(1.5))?,

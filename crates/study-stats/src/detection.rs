@@ -174,7 +174,7 @@ pub struct TwoAlternative {
     pub d_se: f64,
     /// d′ ± 1.96 standard errors.
     pub d_ci95: (f64, f64),
-    /// −(zH + zF)/√2: below 0 the first interval is favoured.
+    /// −(zH + zF)/√2: below 0 the first interval is favored.
     pub interval_bias: f64,
     /// Share of correct answers.
     pub share_correct: f64,
@@ -317,7 +317,7 @@ pub struct Abx {
     pub differencing: Sensitivity,
     /// By independent observations.
     pub independent: Sensitivity,
-    /// −(zH + zF)/2: below 0 the answer "A" is favoured.
+    /// −(zH + zF)/2: below 0 the answer "A" is favored.
     pub bias: f64,
 }
 

@@ -83,7 +83,7 @@ pub fn disagreement(cells: &[CellSummary]) -> Option<Disagreement> {
 
 /// Whether the slopes of subjects on a covariate of the realizations differ, in a complete
 /// table of subjects × realizations, against the rest of the interaction (Mandel 1961,
-/// with a known covariate). With dᵢⱼ the doubly centred table, x centred and
+/// with a known covariate). With dᵢⱼ the doubly centered table, x centered and
 /// cᵢ = Σⱼ dᵢⱼxⱼ/Σxⱼ²: SS = Σ cᵢ² Σxⱼ² on S − 1 degrees of freedom, the error has
 /// (S − 1)(k − 2).
 ///
@@ -96,10 +96,10 @@ pub fn slopes_differ<R: AsRef<[f64]>>(rows: &[R], x: &[f64]) -> Option<Disagreem
         return None;
     }
     let mean = |values: &mut dyn Iterator<Item = f64>, n: usize| values.sum::<f64>() / n as f64;
-    let centre = mean(&mut x.iter().copied(), k);
-    let x: Vec<f64> = x.iter().map(|x| x - centre).collect();
+    let center = mean(&mut x.iter().copied(), k);
+    let x: Vec<f64> = x.iter().map(|x| x - center).collect();
     let xx: f64 = x.iter().map(|x| x * x).sum();
-    if xx.is_nan() || xx <= 1e-24 * centre * centre {
+    if xx.is_nan() || xx <= 1e-24 * center * center {
         return None;
     }
     let columns: Vec<f64> = (0..k)

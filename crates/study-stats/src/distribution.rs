@@ -1,6 +1,6 @@
 //! Tails and quantiles of the normal, t, F and χ² distributions.
 //!
-//! Tail probabilities are the regularised incomplete beta and gamma functions of
+//! Tail probabilities are the regularized incomplete beta and gamma functions of
 //! `statrs`, always evaluated for the smaller tail, so that a p of 10⁻²⁰ keeps its
 //! digits; the normal tail is `libm::erfc`, because `statrs` has only 11 digits there.
 //! Quantiles are roots of the tail probabilities: the inverses of `statrs` are reported

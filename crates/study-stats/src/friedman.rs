@@ -42,8 +42,8 @@ pub fn friedman<R: AsRef<[f64]>>(rows: &[R]) -> Option<Friedman> {
     let sums: Vec<i64> = (0..k).map(|j| ranks.iter().map(|r| r[j]).sum()).collect();
     let (nf, kf) = (n as f64, k as f64);
     // Doubled ranks are whole numbers; the expected rank sum is n(k+1).
-    let centre = n as i64 * (k as i64 + 1);
-    let between: i64 = sums.iter().map(|s| (s - centre) * (s - centre)).sum();
+    let center = n as i64 * (k as i64 + 1);
+    let between: i64 = sums.iter().map(|s| (s - center) * (s - center)).sum();
     let within: i64 = ranks
         .iter()
         .flatten()

@@ -64,7 +64,7 @@ pub struct PowerLaw {
     pub r_squared: Option<f64>,
 }
 
-/// Geometric means after modulus equalisation (Lane, Catania & Stevens 1961), in log10:
+/// Geometric means after modulus equalization (Lane, Catania & Stevens 1961), in log10:
 /// a participant's mean of each level; minus the participant's mean over the levels,
 /// plus the grand mean. Estimates that are not above 0 are left out.
 pub fn magnitude(estimates: &[Estimate]) -> Magnitude {
@@ -93,12 +93,12 @@ pub fn magnitude(estimates: &[Estimate]) -> Magnitude {
         .collect();
     let own: Vec<Option<f64>> = cells.iter().map(|row| mean_of_known(row)).collect();
     let grand = mean_of_known(&own).unwrap_or(0.0);
-    let equalised = |level: usize| -> Vec<f64> {
+    let equalized = |level: usize| -> Vec<f64> {
         (cells.iter().zip(&own))
             .filter_map(|(row, own)| Some(row[level]? - (*own)? + grand))
             .collect()
     };
-    let columns: Vec<Vec<f64>> = (0..levels.len()).map(equalised).collect();
+    let columns: Vec<Vec<f64>> = (0..levels.len()).map(equalized).collect();
     let means: Vec<Option<f64>> = columns.iter().map(|c| describe::mean(c)).collect();
     let exponents: Vec<Option<f64>> = (cells.iter())
         .map(|row| law(&levels, row).map(|law| law.exponent))
@@ -166,7 +166,7 @@ mod tests {
             let (mean, expected) = (mean.unwrap(), 40f64.sqrt() * level.sqrt());
             assert!((mean.mean - expected).abs() < 1e-9);
             let (low, high) = mean.ci95.unwrap();
-            assert!((high - low).abs() < 1e-9, "equalised participants agree");
+            assert!((high - low).abs() < 1e-9, "equalized participants agree");
         }
         assert_eq!(magnitude(&[]).law, None);
     }

@@ -1,8 +1,13 @@
-//! Symmetric matrices and their Cholesky factors.
+//! Matrices: symmetric ones with their Cholesky factors and eigenvectors, and dense ones.
 //!
-//! The factor admits positive semidefinite matrices: a variable that the ones before
-//! it determine has a pivot of 0 and is left out. `nalgebra`'s factor, which
-//! [`crate::lmm`] uses beside its eigenvectors, refuses such matrices.
+//! The Cholesky factor admits positive semidefinite matrices: a variable that the ones
+//! before it determine has a pivot of 0 and is left out.
+
+mod dense;
+mod eigen;
+
+pub(crate) use dense::{Matrix, dot};
+pub(crate) use eigen::{SymmetricEigen, triangular};
 
 /// A symmetric matrix: the lower triangle by rows.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,6 +22,15 @@ impl SymmetricMatrix {
         Self {
             size,
             lower: vec![0.0; size * (size + 1) / 2],
+        }
+    }
+
+    /// The matrix with the elements `element(i, j)`, which is asked for i ≥ j only.
+    pub(crate) fn from_fn(size: usize, element: impl Fn(usize, usize) -> f64) -> Self {
+        let places = (0..size).flat_map(|i| (0..=i).map(move |j| (i, j)));
+        Self {
+            size,
+            lower: places.map(|(i, j)| element(i, j)).collect(),
         }
     }
 
@@ -72,6 +86,11 @@ impl SymmetricMatrix {
     fn row(&self, i: usize) -> &[f64] {
         &self.lower[place(i, 0)..=place(i, i)]
     }
+
+    /// The elements (i, 0) to (i, i).
+    pub(crate) fn row_mut(&mut self, i: usize) -> &mut [f64] {
+        &mut self.lower[place(i, 0)..=place(i, i)]
+    }
 }
 
 fn place(i: usize, j: usize) -> usize {
@@ -119,6 +138,11 @@ impl Cholesky {
         Self::semidefinite(a, |_| 1e-13).filter(|found| found.rank() == a.size)
     }
 
+    /// The factor; `None` unless all pivots are positive, however small.
+    pub(crate) fn positive(a: &SymmetricMatrix) -> Option<Self> {
+        Self::semidefinite(a, |_| 0.0).filter(|found| found.rank() == a.size)
+    }
+
     /// Number of variables that are not left out.
     pub(crate) fn rank(&self) -> usize {
         self.pivots.iter().filter(|p| **p > 0.0).count()
@@ -151,6 +175,35 @@ impl Cholesky {
         x
     }
 
+    /// Replaces b by x of Lx = b; of a definite matrix.
+    pub(crate) fn solve_lower(&self, b: &mut [f64]) {
+        self.solve_lower_from(0, b);
+    }
+
+    /// As [`Self::solve_lower`], where the elements of b before `first` are 0.
+    fn solve_lower_from(&self, first: usize, b: &mut [f64]) {
+        for i in first..b.len() {
+            let row = self.factor.row(i);
+            b[i] = (b[i] - dot(&row[first..i], &b[first..i])) / row[i];
+        }
+    }
+
+    /// A⁻¹ of a definite matrix.
+    pub(crate) fn inverse(&self) -> Matrix {
+        let size = self.pivots.len();
+        let column_of_inverse_factor = |j: usize| {
+            let mut unit = vec![0.0; size];
+            unit[j] = 1.0;
+            self.solve_lower_from(j, &mut unit);
+            unit
+        };
+        let columns: Vec<Vec<f64>> = (0..size).map(column_of_inverse_factor).collect();
+        Matrix::from_fn(size, size, |i, j| {
+            let first = i.max(j);
+            dot(&columns[i][first..], &columns[j][first..])
+        })
+    }
+
     /// x of Lᵀx = b of a definite matrix: with standard normal b its covariance is A⁻¹.
     pub(crate) fn solve_transposed(&self, b: &[f64]) -> Vec<f64> {
         let mut x = b.to_vec();
@@ -171,11 +224,6 @@ impl Cholesky {
         };
         (0..self.pivots.len()).map(element).collect()
     }
-}
-
-/// Σ aᵢbᵢ.
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
 #[cfg(test)]
@@ -201,6 +249,18 @@ mod tests {
         let sums = [0, 1, 2].map(|i| (0..3).map(|j| example().get(i, j)).sum());
         assert_eq!(factor.solve(&sums), [1.0, 1.0, 1.0]);
         assert!((factor.inverse_diagonal()[2] - 1.0 / 9.0).abs() < 1e-15);
+        // L⁻¹ has the rows (1, 0, 0), (−2, 1, 0), (0, −1/3, 1/3).
+        let inverse = [
+            [5.0, -2.0, 0.0],
+            [-2.0, 1.0 + 1.0 / 9.0, -1.0 / 9.0],
+            [0.0, -1.0 / 9.0, 1.0 / 9.0],
+        ];
+        let found = factor.inverse();
+        for (i, row) in inverse.iter().enumerate() {
+            for (j, known) in row.iter().enumerate() {
+                assert!((found[(i, j)] - known).abs() < 1e-15, "{i} {j}");
+            }
+        }
     }
 
     #[test]
@@ -210,7 +270,9 @@ mod tests {
         let factor = Cholesky::semidefinite(&a, |_| 1e-12).unwrap();
         assert_eq!((factor.rank(), factor.pivots[1]), (1, 0.0));
         assert_eq!(factor.solve(&[3.0, 6.0]), [3.0, 0.0]);
-        assert!(Cholesky::definite(&a).is_none());
+        assert!(Cholesky::definite(&a).is_none() && Cholesky::positive(&a).is_none());
+        let close = SymmetricMatrix::from_fn(2, |i, j| [[1.0, 2.0], [2.0, 4.0 + 1e-14]][i][j]);
+        assert!(Cholesky::definite(&close).is_none() && Cholesky::positive(&close).is_some());
         a.add(1, 1, f64::INFINITY);
         assert!(Cholesky::semidefinite(&a, |_| 1e-12).is_none());
     }

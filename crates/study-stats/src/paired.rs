@@ -125,7 +125,7 @@ pub fn paired(a: &[f64], b: &[f64]) -> Option<Paired> {
     let d: Vec<f64> = exact.iter().map(|d| rounded(*d)).collect();
     let test = one_sample(if is_constant(&d) { &d } else { &exact })?;
     // A mean of 0 but for rounding is that of the rounded differences.
-    let centre = if test.mean.abs() < 1e-9 {
+    let center = if test.mean.abs() < 1e-9 {
         mean(&d)?
     } else {
         test.mean
@@ -141,7 +141,7 @@ pub fn paired(a: &[f64], b: &[f64]) -> Option<Paired> {
         d_av: if is_constant(a) && is_constant(b) {
             None
         } else {
-            finite(centre / scale / average)
+            finite(center / scale / average)
         },
         w_plus: w.as_ref().map(|w| w.plus as f64 / 2.0),
         wilcoxon_n: w.as_ref().map_or(0, |w| w.ranks.len()),

@@ -9,7 +9,7 @@
 
 mod existence;
 
-use super::clm::newton::{Evaluation, maximise};
+use super::clm::newton::{Evaluation, maximize};
 use super::distribution::{normal_cdf, normal_density, normal_upper};
 use super::matrix::{Cholesky, SymmetricMatrix, dot};
 use thiserror::Error;
@@ -306,7 +306,7 @@ pub fn abilities(
         }
         sum.value.is_finite().then_some(sum)
     };
-    let found = maximise(vec![0.0; size], evaluate).ok_or(NoAbilities::NotFound)?;
+    let found = maximize(vec![0.0; size], evaluate).ok_or(NoAbilities::NotFound)?;
     // The likelihood still rises where an effect is practically infinite.
     if found.at.iter().any(|x| x.abs() > 20.0) {
         return Err(NoAbilities::NotFound);

@@ -2,7 +2,7 @@
 //!
 //! If an effect is not zero, its t is noncentral t: with Z ~ N(δ, 1) and u = √(χ²(ν)/ν)
 //! independent of it, P(|Z| > t(1 − α/2, ν)·u). The realizations are the units of a
-//! slope: with the covariate standardised over q realizations (Σx² = q) and the scatter
+//! slope: with the covariate standardized over q realizations (Σx² = q) and the scatter
 //! V of their observed means about the line, δ = slope·√(q/V) and ν = q − 2. For a
 //! mean difference over n subjects, δ = d√n and ν = n − 1.
 //!

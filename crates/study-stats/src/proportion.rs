@@ -74,9 +74,9 @@ pub fn wilson(hits: f64, n: f64) -> Option<(f64, f64)> {
 /// Wilson's interval of a share of n trials, with `z` standard errors.
 fn interval(share: f64, n: f64, z: f64) -> (f64, f64) {
     let z2 = z * z;
-    let centre = (share + z2 / (2.0 * n)) / (1.0 + z2 / n);
+    let center = (share + z2 / (2.0 * n)) / (1.0 + z2 / n);
     let half = z / (1.0 + z2 / n) * (share * (1.0 - share) / n + z2 / (4.0 * n * n)).sqrt();
-    ((centre - half).max(0.0), (centre + half).min(1.0))
+    ((center - half).max(0.0), (center + half).min(1.0))
 }
 
 #[cfg(test)]

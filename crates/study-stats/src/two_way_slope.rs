@@ -29,7 +29,7 @@ const MAX_LEVELS: usize = 300;
 /// have to be adjacent. The levels of `b` should be small numbers: a table as long as
 /// the largest is allocated.
 ///
-/// The first factor is removed by centring within its levels (Frisch & Waugh 1933;
+/// The first factor is removed by centering within its levels (Frisch & Waugh 1933;
 /// Lovell 1963). This leaves normal equations for the levels of the second factor and
 /// x, whose sums are collected over the levels of the first. Three rounds of iterative
 /// refinement, with residuals taken row by row, restore the digits that are lost to
@@ -57,7 +57,7 @@ pub fn two_way_slope(x: &[f64], y: &[f64], a: &[u32], b: &[u32]) -> Option<TwoWa
         levels,
     };
     let size: f64 = groups.rows.iter().map(|r| r.x * r.x).sum();
-    groups.centre();
+    groups.center();
     let (normal, mut right, yy) = groups.normal_equations();
     // The slope is the last unknown, so that its pivot is what the factors leave of x;
     // that is compared with the size of x below.
@@ -130,7 +130,7 @@ impl Groups {
     }
 
     /// Subtracts the mean of its group from every x and y.
-    fn centre(&mut self) {
+    fn center(&mut self) {
         for rows in self.rows.chunk_by_mut(|a, b| a.group == b.group) {
             let n = rows.len() as f64;
             let mx = rows.iter().map(|r| r.x).sum::<f64>() / n;

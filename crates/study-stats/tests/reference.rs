@@ -240,7 +240,7 @@ fn models_of_all_ratings_agree_with_emmeans() {
 #[test]
 fn the_crossed_slope_agrees_with_lmer_test() {
     for design in DESIGNS.map(Design::read) {
-        let table = LmmData::new(&design.cells, FixedEffects::Covariate { centre: 0.8 }).unwrap();
+        let table = LmmData::new(&design.cells, FixedEffects::Covariate { center: 0.8 }).unwrap();
         let random = RandomEffects {
             realization: true,
             cell: design.repeats(),
@@ -262,7 +262,7 @@ fn the_crossed_slope_agrees_with_lmer_test() {
 #[test]
 fn the_variance_of_slopes_agrees_with_lmer() {
     for design in DESIGNS.map(Design::read) {
-        let table = LmmData::new(&design.cells, FixedEffects::Covariate { centre: 0.8 }).unwrap();
+        let table = LmmData::new(&design.cells, FixedEffects::Covariate { center: 0.8 }).unwrap();
         let without = fit(&table, RandomEffects::crossed(&table), Criterion::Reml).unwrap();
         let found = slope_variance(&without).unwrap();
         let row = [found.variance, found.chi2];

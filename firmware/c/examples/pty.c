@@ -1,9 +1,9 @@
 /* A device in C on a pseudo-terminal, with a simulated handle and hand. It prints the path
  * of its port and runs until it is ended; nothing of it is measured.
  *
- *   cargo build --release -p study-device
+ *   cargo build --release -p study-firmware-c
  *   cc -std=c99 -I firmware/c/include firmware/c/examples/pty.c \
- *      target/release/libstudy_device.a -lm -lpthread -ldl -o device-in-c
+ *      target/release/libstudy_firmware_c.a -lm -lpthread -ldl -o device-in-c
  *   ./device-in-c
  */
 #define _XOPEN_SOURCE 600

@@ -2,7 +2,7 @@
 //!
 //! A device lives in memory of the caller, so that the library needs no allocator. Every
 //! function does nothing, or reports zero force, for a null pointer and for memory that
-//! [`study_device_init`] has not initialised.
+//! [`study_device_init`] has not initialized.
 
 #![cfg_attr(target_os = "none", no_std)]
 #![allow(unsafe_code, reason = "a C interface takes pointers")]

@@ -183,7 +183,7 @@ fn a_device_in_memory_of_c_answers_and_a_wrong_call_does_nothing() {
     // interface promises to check.
     unsafe {
         assert_eq!(study_device_state(core::ptr::null_mut()), -1);
-        assert_eq!(study_device_state(at), -1, "not initialised");
+        assert_eq!(study_device_state(at), -1, "not initialized");
         assert_eq!(study_device_servo(at, &motion, 0), 0.0);
         let init = |memory, size, settings: &StudySettings| {
             study_device_init(memory, size, settings, Some(collect), context)

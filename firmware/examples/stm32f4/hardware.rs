@@ -139,7 +139,7 @@ pub(crate) fn start_port(clock_hz: u32) {
     TIM3_SMCR.write(3);
     TIM3_ARR.write(0xFFFF);
     TIM3_CR1.write(1);
-    // TIM1, channel 1: centre-aligned PWM at 50 %, output on.
+    // TIM1, channel 1: center-aligned PWM at 50 %, output on.
     TIM1_PSC.write(0);
     TIM1_ARR.write(2 * PWM_HALF);
     TIM1_CCR1.write(PWM_HALF);

@@ -2,12 +2,12 @@
 //! somebody else's trials.
 
 use crate::cli::{Console, Failure};
-use crate::report::json;
-use crate::report::text::{Page, trials};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
-use study_core::analyze::psychophysics::{TableKind, TrialSettings, analyze_table};
+use study_analysis::analyze::psychophysics::{TableKind, TrialSettings, analyze_table};
+use study_report::json;
+use study_report::text::{Page, trials};
 use study_stats::psychometric::{Core, Spacing, Support};
 
 /// Options of a table of trials.
@@ -116,7 +116,7 @@ pub(super) fn run(
         Some(ladder) => Some(ladder.support(spacing).ok_or_else(|| {
             Failure::input(match spacing {
                 Spacing::Lin => "--ladder: give the lowest and the highest level and the step, such as 0..2:0.05",
-                Spacing::Log => "--ladder: over logarithms, give the lowest and the highest level, above 0, and the ratio of two neighbours, such as 0.02..0.6:1.1",
+                Spacing::Log => "--ladder: over logarithms, give the lowest and the highest level, above 0, and the ratio of two neighbors, such as 0.02..0.6:1.1",
             })
         })?),
     };
@@ -138,7 +138,7 @@ pub(super) fn run(
     }
     let page = Page {
         width: console.width,
-        colour: console.colour,
+        color: console.color,
     };
     console.out(trials(&name, task, rows, &values, page))
 }

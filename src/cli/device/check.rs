@@ -8,12 +8,12 @@ use crate::cli::device_selection::{
     COMMISSIONED, COMMISSIONED_FILE, Commissioned, DeviceAddress, Tested, WaitDisplay,
 };
 use crate::cli::{Console, Failure, Kind};
-use crate::device::check::{self, Commissioning, Verdict};
-use crate::device::host::{HostSettings, display_name};
-use crate::device::link::{nonce, priority};
-use crate::device::{Device, process};
 use std::path::{Path, PathBuf};
 use study_base::text::Untrusted;
+use study_device::check::{self, Commissioning, Verdict};
+use study_device::host::{HostSettings, display_name};
+use study_device::link::{nonce, priority};
+use study_device::{Device, process};
 use study_wire::message::{Fault, Identity};
 
 /// Arguments of `study device info`.

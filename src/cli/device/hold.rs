@@ -5,16 +5,17 @@
 
 use super::single_playback::{self, Pace};
 use crate::cli::device_selection::{DeviceAddress, WaitDisplay};
-use crate::cli::{Console, Failure, Kind, load};
-use crate::device::host::HostSettings;
-use crate::device::link::LinkedDevice;
-use crate::device::process::ProcessDevice;
-use crate::device::{Device, Stimulus};
+use crate::cli::{Console, Failure, Kind};
 use std::io::BufRead as _;
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
+use study_analysis::load;
 use study_base::limits::Limits;
+use study_device::host::HostSettings;
+use study_device::link::LinkedDevice;
+use study_device::process::ProcessDevice;
+use study_device::{Device, Stimulus};
 use study_haptics::model::{Branch, Realization, Trained};
 use study_wire::predict::{Direction, Lookup};
 

@@ -2,10 +2,10 @@
 
 use crate::cli::Failure;
 use crate::cli::device_selection::SerialPortArgs;
-use crate::device::check::Connection;
-use crate::device::link::{Link, LinkError, Opener as _};
 use std::time::{Duration, Instant};
 use study_base::text::Untrusted;
+use study_device::check::Connection;
+use study_device::link::{Link, LinkError, Opener as _};
 
 /// An open port with a clock.
 pub(in crate::cli) struct PortConnection {

@@ -4,11 +4,11 @@
 
 use crate::cli::device_selection::{Tested, commissioned};
 use crate::cli::{Console, Failure, Kind};
-use crate::device::Device;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use study_base::text::Untrusted;
-use study_core::protocol::DeviceKind;
+use study_device::Device;
+use study_plan::protocol::DeviceKind;
 
 /// `study-device-record/1`.
 const FORMAT: &str = "study-device-record/1";
@@ -106,7 +106,7 @@ pub(in crate::cli) fn last(results: &Path, serial: &str, kind: RecordKind) -> Op
     records.max_by_key(|record| record.at)
 }
 
-/// Why the last check does not speak for the device: it failed, is of another firmware or,
+/// Why the last check does not count: it failed, is of another firmware or,
 /// if the protocol says within how many hours, is missing or older. `None` if it does.
 pub(in crate::cli) fn doubt(
     last: Option<&Record>,
@@ -137,7 +137,7 @@ pub(in crate::cli) fn doubt(
 /// What the session records of the last check of a device of this kind.
 ///
 /// # Errors
-/// [`Failure`] if it does not speak for the device, and the user has not said to go on.
+/// [`Failure`] if the check does not count, and the user did not give `--unchecked`.
 pub(in crate::cli) fn checked(
     device: &dyn Device,
     results: &Path,

@@ -6,20 +6,20 @@
 
 use super::single_playback::{self, Pace};
 use crate::cli::device_selection::SerialPortArgs;
-use crate::cli::load::{self, Loaded};
 use crate::cli::{Console, Failure};
-use crate::device::host::HostSettings;
-use crate::device::{Device, Report, Stimulus};
 use crate::runner::playback_limits;
 use serde::Serialize;
 use std::path::Path;
 use std::time::Duration;
-use study_core::outcome::{Sample, Verdict};
-use study_core::protocol::DeviceKind;
+use study_analysis::load::{self, Loaded};
+use study_device::host::HostSettings;
+use study_device::{Device, Report, Stimulus};
 use study_haptics::identify::signal::{LowPass, difference};
 use study_haptics::identify::vaf::{self, Score};
 use study_haptics::model::Realization;
 use study_haptics::recording::{self, Columns};
+use study_plan::protocol::DeviceKind;
+use study_session::outcome::{Sample, Verdict};
 
 /// Duration of each playback.
 const PLAYBACK: Duration = Duration::from_secs(8);
@@ -210,8 +210,8 @@ fn compare(table: &Realization, samples: &[Sample]) -> Result<(Score, bool), Com
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::firmware::{Wrong, WrongLoads};
-    use crate::device::virtual_device::{Options, VirtualDevice};
+    use study_device::firmware::{Wrong, WrongLoads};
+    use study_device::virtual_device::{Options, VirtualDevice};
 
     fn compared(wrong: Option<&str>) -> Vec<Rendered> {
         let protocol = concat!(env!("CARGO_MANIFEST_DIR"), "/protocols/turn-signal");

@@ -6,16 +6,16 @@
 
 use super::single_playback::{self, Pace, PlaybackError};
 use crate::cli::Failure;
-use crate::device::{Device, DeviceError, Report, Stimulus, rendering_of};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::time::Duration;
 use study_base::limits::Limits;
 use study_base::text::{ModelId, Untrusted};
-use study_core::outcome::{Defect, Fidelity, Playback, Sample, Verdict};
-use study_core::protocol::RenderingRules;
-use study_core::rendering::{Played, judge};
+use study_device::{Device, DeviceError, Report, Stimulus, rendering_of};
 use study_haptics::model::{Branch, Provenance, Realization, Trained, Units};
+use study_plan::protocol::RenderingRules;
+use study_session::outcome::{Defect, Fidelity, Playback, Sample, Verdict};
+use study_session::rendering::{Played, judge};
 use study_wire::message::Fault;
 use study_wire::predict::{Direction, Lookup};
 use study_wire::servo::ServoSettings;
@@ -359,9 +359,9 @@ fn trip(device: &mut dyn Device, middle_mm: f64, pace: &mut Pace) -> Rendered {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::Identity;
-    use crate::device::firmware::{Wrong, WrongLoads};
-    use crate::device::virtual_device::{Options, VirtualDevice};
+    use study_device::Identity;
+    use study_device::firmware::{Wrong, WrongLoads};
+    use study_device::virtual_device::{Options, VirtualDevice};
 
     fn checked(wrong: Option<Wrong>) -> Vec<Rendered> {
         let mut options = Options::seeded(5);

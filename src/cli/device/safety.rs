@@ -8,16 +8,16 @@
 
 use super::hold;
 use crate::cli::{Console, Failure};
-use crate::device::check::quantile;
-use crate::device::firmware::{Firmware, Options};
-use crate::device::link::memory::Noise;
-use crate::device::link::priority;
-use crate::device::link::pty::{Control, Simulator};
-use crate::device::link::relay::Relay;
-use crate::device::serial::SerialLink;
 use std::io::Write as _;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
+use study_device::check::quantile;
+use study_device::firmware::{Firmware, Options};
+use study_device::link::memory::Noise;
+use study_device::link::priority;
+use study_device::link::pty::{Control, Simulator};
+use study_device::link::relay::Relay;
+use study_device::serial::SerialLink;
 use study_wire::message::DeviceState;
 
 /// Arguments of `study device safety`.

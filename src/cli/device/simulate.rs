@@ -1,14 +1,14 @@
 //! `study device simulate`: a device on a pseudo-terminal.
 
 use crate::cli::{Console, Failure};
-use crate::device::firmware::{Firmware, Flaw, Options, Wrong, WrongLoads};
-use crate::device::link::memory::Noise;
-use crate::device::link::priority;
-use crate::device::link::pty::{Control, Simulator};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
+use study_device::firmware::{Firmware, Flaw, Options, Wrong, WrongLoads};
+use study_device::link::memory::Noise;
+use study_device::link::priority;
+use study_device::link::pty::{Control, Simulator};
 
 /// Arguments of `study device simulate`.
 #[derive(Debug, clap::Args)]
@@ -157,7 +157,7 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
         wrong: args.wrong,
         ..Options::default()
     });
-    let failed = |e: crate::device::link::LinkError| Failure::device(e);
+    let failed = |e: study_device::link::LinkError| Failure::device(e);
     let mut simulator = Simulator::open(firmware, noise(&args.fault), args.seed, args.link.clone())
         .map_err(failed)?;
     let port = |simulator: &Simulator| format!("{}\n", simulator.path().unwrap_or_default());

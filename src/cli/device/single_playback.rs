@@ -1,9 +1,9 @@
 //! One playback of a table without a session.
 
-use crate::device::{Device, DeviceError, Report, Stimulus};
 use std::time::{Duration, Instant};
 use study_base::limits::Limits;
-use study_core::outcome::Playback;
+use study_device::{Device, DeviceError, Report, Stimulus};
+use study_session::outcome::Playback;
 
 /// Time for a load, a start or a stop.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(10);

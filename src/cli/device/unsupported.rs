@@ -1,7 +1,7 @@
 //! The simulated device on systems without pseudo-terminals.
 
 use crate::cli::Failure;
-use crate::device::link::LinkError;
+use study_device::link::LinkError;
 
 /// Arguments of a command that is not supported; all are ignored.
 #[derive(Debug, clap::Args)]

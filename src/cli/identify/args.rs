@@ -132,11 +132,11 @@ pub(in crate::cli) struct Args {
     #[arg(long, value_name = "MM", value_parser = positive)]
     pub(super) lever: Option<f64>,
 
-    /// Replace spikes of x and F, samples that differ from their neighbours as no motion does
+    /// Replace spikes of x and F, samples that differ from their neighbors as no motion does
     #[arg(long)]
     pub(super) robust: bool,
 
-    /// Huber weights in a passive table: errors above 1.345 robust standard deviations count by their size, not by its square
+    /// Limit the influence of outliers in a passive table (Huber weights, k = 1.345)
     #[arg(long)]
     pub(super) huber: bool,
 
@@ -192,7 +192,7 @@ pub(in crate::cli) struct Args {
     #[arg(long, value_name = "F,DYNAMICS", value_delimiter = ',', value_parser = ridge, num_args = 2)]
     pub(super) ridge: Vec<f64>,
 
-    /// Terms that are identified: f0 with any of m, b and, for ewls, constrained and two-sided, k [default: all]
+    /// Terms that are identified: f0 with any of m, b and, for ewls, constrained and two-sided, k [default: all, without m and b where the recordings do not carry them]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
     pub(super) terms: Vec<Term>,
 

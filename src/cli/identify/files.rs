@@ -3,13 +3,13 @@
 use super::super::trajectory::{refuse_to_overwrite, write_file};
 use super::args::{Args, MethodName, distinct};
 use super::{Failure, Kind, Results};
-use crate::report::identification::{self, Drawing, GridCell, Row, Shown};
-use crate::report::picture::png::Painter;
 use std::fs;
 use std::path::{Path, PathBuf};
 use study_base::text::{ModelId, Untrusted};
 use study_haptics::identify::grid::Cell;
 use study_haptics::model::file;
+use study_report::identification::{self, Drawing, GridCell, Row, Shown};
+use study_report::picture::png::Painter;
 
 /// Path and content.
 type OutputFile = (PathBuf, Vec<u8>);

@@ -106,6 +106,7 @@ impl Args {
             m: kept(Term::M),
             b: kept(Term::B),
             k: kept(Term::K),
+            only_carried: self.terms.is_empty(),
         }
     }
 

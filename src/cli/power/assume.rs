@@ -1,15 +1,16 @@
 //! What is assumed: flags, and a pilot's results.
 
-use super::super::{Console, Failure, study_folder};
+use super::super::{Console, Failure};
 use clap::Args;
 use std::path::{Path, PathBuf};
+use study_analysis::analyze::{Include, Rules, analyze};
+use study_analysis::load;
+use study_analysis::power::{Link, Overrides, Pilot, Plan, PlanError, Test, Vaf};
 use study_base::text::PartId;
-use study_core::analyze::{Include, Rules, analyze};
-use study_core::outcome::ratings::Ratings;
-use study_core::power::{Link, Overrides, Pilot, Plan, PlanError, Test, Vaf};
-use study_core::protocol::power::{PowerPlan, PowerScale, PowerTrack};
-use study_core::protocol::{Protocol, QuestionKind};
-use study_core::store::Derived;
+use study_plan::protocol::Protocol;
+use study_plan::protocol::power::{PowerPlan, PowerScale, PowerTrack};
+use study_session::outcome::ratings::Ratings;
+use study_session::store::{self, Derived};
 
 /// Flags that state assumptions; they come after `[power]` of the protocol.
 #[derive(Debug, Args)]
@@ -245,10 +246,8 @@ pub(super) fn plan(
 ) -> Result<Plan, Failure> {
     let seed = given.seed.unwrap_or(protocol.study.seed);
     let of_pilot = given.scale.as_ref() == Some(&PowerScale::FromPilot);
-    let ends = match protocol.primary().map(|q| &q.kind) {
-        Some(QuestionKind::Rating { from, to, .. }) if of_pilot => Some((*from, *to)),
-        _ => None,
-    };
+    let primary = protocol.primary().filter(|_| of_pilot);
+    let ends = primary.and_then(|q| q.kind.scale().levels());
     let pilot = match &given.from {
         Some(path) => Some(pilot(path, given, (seed, ends), console)?),
         None => None,
@@ -336,8 +335,8 @@ fn pilot(
         let ratings = Ratings::read_csv(&shown, input, None).map_err(Failure::input)?;
         (ratings, Rules::default())
     } else {
-        let study = study_folder::one_study(path)?;
-        let loaded = study_folder::frozen(&study)?;
+        let study = store::one_study(path)?;
+        let loaded = load::frozen(&study)?;
         let derived = Derived::of(&study.sessions()?, &loaded.protocol);
         let question = loaded.protocol.analysis.primary.clone();
         let share_of = loaded.protocol.analysis.share_of(&question);

@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use study_analysis::power::{Chunk, Plan};
 use study_base::text::counted;
-use study_core::power::{Chunk, Plan};
 
 /// The format of a part.
 const FORMAT: &str = "study-power-shard/1";

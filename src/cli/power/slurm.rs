@@ -6,7 +6,7 @@ use super::{Unit, replace, shards, shown};
 use std::fs;
 use std::path::Path;
 use std::time::Instant;
-use study_core::power::{Plan, run_chunk};
+use study_analysis::power::{Plan, run_chunk};
 
 /// Clusters often allow an array of about a thousand tasks.
 const MOST_TASKS: u64 = 1000;

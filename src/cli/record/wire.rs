@@ -6,11 +6,11 @@ use crate::cli::console::shell_command;
 use crate::cli::device::port::PortConnection;
 use crate::cli::trajectory::{read_trajectory, refuse_to_overwrite};
 use crate::cli::{Console, Failure};
-use crate::device::host::display_name;
-use crate::device::link::nonce;
-use crate::device::probe::{self, ProbePath};
 use study_base::limits::Limit;
 use study_base::text::Untrusted;
+use study_device::host::display_name;
+use study_device::link::nonce;
+use study_device::probe::{self, ProbePath};
 use study_haptics::trajectory;
 
 /// The command line of this recording. A port set in `device.toml` is read from there

@@ -2,7 +2,7 @@
 
 use crate::cli::Failure;
 use std::path::Path;
-use study_core::store::StoreError;
+use study_session::store::StoreError;
 
 /// The failure to report if the tables could not be written after a session.
 pub(super) fn unwritten(why: &StoreError, folder: &Path) -> Failure {

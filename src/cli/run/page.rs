@@ -5,7 +5,7 @@ use crate::screen::{Address, Screen, ScreenError};
 use crossterm::event::{self, Event, KeyCode};
 use std::io::IsTerminal as _;
 use std::time::Duration;
-use study_core::protocol::{Entry, Protocol};
+use study_plan::protocol::{Entry, Protocol};
 
 /// How often it is checked whether the page was opened.
 const CHECK: Duration = Duration::from_millis(100);

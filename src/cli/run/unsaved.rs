@@ -3,10 +3,10 @@
 use crate::cli::Failure;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-use study_core::outcome::{Event, Moment};
-use study_core::session::Unsaved;
-use study_core::store::disk::{Disk as _, RealDisk};
-use study_core::store::plain;
+use study_session::outcome::{Event, Moment};
+use study_session::session::Unsaved;
+use study_session::store::disk::{Disk as _, RealDisk};
+use study_session::store::plain;
 
 /// Why no place took the file.
 #[derive(Debug, thiserror::Error)]

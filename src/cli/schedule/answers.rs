@@ -7,8 +7,8 @@ use std::ops::RangeInclusive;
 use std::path::Path;
 use study_base::diagnostic::did_you_mean;
 use study_base::text::{PartId, Untrusted};
-use study_core::procedure::{Answer, Ladder, Proposal, Summary, Track};
-use study_core::protocol::{Protocol, Seat};
+use study_plan::procedure::{Answer, Ladder, Proposal, Summary, Track};
+use study_plan::protocol::{Protocol, Seat};
 use thiserror::Error;
 
 /// Name and version of the document.

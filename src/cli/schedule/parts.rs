@@ -5,8 +5,8 @@ use super::table::{Codes, headline, legend, orders, rows_shown, section};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use study_base::text::{ModelId, PartId, Untrusted, counted};
-use study_core::procedure::{Rule, Staircase};
-use study_core::protocol::{
+use study_plan::procedure::{Rule, Staircase};
+use study_plan::protocol::{
     Interval, IntervalOrder, Mushra, Pairs, Part, PartsOrder, Protocol, Stimuli, Task, TrackRules,
     Trial,
 };

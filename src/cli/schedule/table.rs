@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 use std::fmt::Write as _;
 use study_base::text::{ModelId, Untrusted};
-use study_core::protocol::{Design, Order, Protocol, Role, Trial};
-use study_core::schedule::balance::{Balance, Balances, Spread, balances};
+use study_plan::protocol::{Design, Order, Protocol, Role, Trial};
+use study_plan::schedule::balance::{Balance, Balances, Spread, balances};
 
 /// Ids up to this length are used in the tables.
 const SHORT: usize = 3;
@@ -357,9 +357,9 @@ fn promise(design: &Design, balances: Option<Balances>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use study_core::protocol::Seat;
-    use study_core::protocol::example::protocol;
-    use study_core::schedule::Planner;
+    use study_plan::protocol::Seat;
+    use study_plan::protocol::example::protocol;
+    use study_plan::schedule::Planner;
 
     fn rendered(p: &Protocol, rows: u32, width: usize) -> String {
         let planner = Planner::new(p, None).unwrap();

@@ -3,8 +3,8 @@
 //! Curves are drawn with braille characters, two dots per column and four per row. Each
 //! dot column covers the range of all values in its time, so that no peak is lost.
 
-use crate::report::plot::Axis;
 use std::fmt::Write as _;
+use study_report::plot::Axis;
 
 /// Width of the labels on the left, columns.
 pub(in crate::cli) const LABEL: usize = 9;
@@ -25,7 +25,7 @@ pub(in crate::cli) fn curve(
 ) -> String {
     let dots = 2 * columns;
     let [from, to] = range;
-    // neighbours share a value, so that the line has no holes
+    // neighbors share a value, so that the line has no holes
     let spans: Vec<[f64; 2]> = (0..dots)
         .map(|dot| {
             (0..=VALUES_PER_DOT)

@@ -28,7 +28,7 @@ const ENDING: [i32; 9] = [
 /// runtime library, which reports a stack overflow and then aborts.
 const FAILING: [i32; 7] = [SIGABRT, SIGBUS, SIGFPE, SIGILL, SIGTRAP, SIGSYS, SIGXCPU];
 
-/// What restores the screen: end of an update, mouse and paste off, colours reset, main
+/// What restores the screen: end of an update, mouse and paste off, colors reset, main
 /// screen, cursor shown.
 const RESTORED: &[u8] =
     b"\x1b[?2026l\x1b[?1006l\x1b[?1015l\x1b[?1003l\x1b[?1002l\x1b[?1000l\x1b[?2004l\x1b[0m\x1b[?1049l\x1b[?25h";

@@ -4,11 +4,11 @@
 use super::field::Field;
 use crate::tui::editor::{Editor, Handled};
 use crate::tui::keys::Key;
-use study_core::outcome::{Author, Choice};
-use study_core::protocol::Answer;
-use study_core::protocol::phrases::{Phrase, Words};
-use study_core::session::view::{Correctable, View};
-use study_core::session::{Input, Screen};
+use study_plan::protocol::Answer;
+use study_plan::protocol::phrases::{Phrase, Words};
+use study_session::outcome::{Author, Choice};
+use study_session::session::view::{Correctable, View};
+use study_session::session::{Input, Screen};
 
 /// The reason of a correction if none is typed.
 pub const SLIP: &str = "a slip of the key";
@@ -268,7 +268,7 @@ impl Correct {
                 DialogResult::Open(Handled::Yes)
             }
             Step::Answer(field) => match key {
-                Key::Enter => match field.answer(&item.question, words) {
+                Key::Enter => match field.answer(&item.question) {
                     Ok(Some(answer)) if answer == item.answer => {
                         missing("That is already the answer.")
                     }
@@ -277,7 +277,7 @@ impl Correct {
                         self.ask_why(Some(Answer::Text(String::new())))
                     }
                     Ok(None) => missing("Enter the new answer first, or press Esc."),
-                    Err(why) => missing(&why),
+                    Err(why) => missing(&why.words(words)),
                 },
                 Key::Decline => self.ask_why(None),
                 Key::BackTab => {

@@ -2,99 +2,78 @@
 
 use crate::tui::editor::{Editor, Handled};
 use crate::tui::keys::Key;
-use std::collections::BTreeSet;
-use study_base::text::{ascii_number, sentence};
-use study_core::protocol::phrases::{Phrase, Words};
-use study_core::protocol::{Answer, AnswerError, Question, QuestionKind};
+use study_base::text::ascii_number;
+use study_plan::protocol::answer::number;
+use study_plan::protocol::phrases::{Phrase, Words};
+use study_plan::protocol::{Answer, Control, Given, Pick, Question, Refusal};
 
-/// The answer to one question, as entered so far.
-///
-/// `answer`, `key`, `set_number` and `toggle` match field and kind together and ignore
-/// what does not fit: for a new kind the compiler does not list them.
+/// The answer to one question, as entered so far: one for each [`Control`].
 #[derive(Debug, Clone, PartialEq)]
 pub enum Field {
-    /// A rating.
-    Rating {
+    /// Boxes with whole numbers.
+    Boxes {
         /// The chosen number.
         chosen: Option<i64>,
         /// Digits typed so far.
         typed: String,
     },
-    /// A slider.
-    Slider {
+    /// A line with a marker.
+    Track {
         /// The value at the marker.
         value: Option<f64>,
         /// Digits typed so far.
         typed: String,
     },
-    /// A choice.
-    Choice {
+    /// A list of options.
+    List {
         /// Index of the option that the keys act on; it is not chosen thereby.
         cursor: Option<usize>,
-        /// Indices of the chosen options.
-        marked: BTreeSet<usize>,
+        /// Indices of the chosen options, in the order in which they were chosen.
+        marked: Vec<usize>,
     },
-    /// A number.
-    Number(Editor),
-    /// A text.
+    /// A typed number.
+    Digits(Editor),
+    /// A typed text.
     Text(Editor),
 }
 
 impl Field {
     /// An empty field for a question.
     pub fn new(question: &Question) -> Self {
-        match &question.kind {
-            QuestionKind::Rating { .. } => Self::Rating {
-                chosen: None,
-                typed: String::new(),
-            },
-            QuestionKind::Slider { .. } => Self::Slider {
-                value: None,
-                typed: String::new(),
-            },
-            QuestionKind::Choice { .. } => Self::Choice {
-                cursor: None,
-                marked: BTreeSet::new(),
-            },
-            QuestionKind::Number { .. } => Self::Number(Editor::line("")),
-            QuestionKind::Text => Self::Text(Editor::new("")),
-        }
+        Self::with(question, None)
     }
 
     /// A field that holds the answer that was given before.
     pub fn with(question: &Question, given: Option<&Answer>) -> Self {
-        let typed = String::new();
-        match (&question.kind, given) {
-            (QuestionKind::Rating { .. }, Some(Answer::Rating(n))) => Self::Rating {
-                chosen: Some(*n),
-                typed,
+        let control = question.kind.control();
+        let given = given.and_then(|answer| control.given(answer));
+        let (text, marked) = match given {
+            Some(Given::Typed(text)) => (text, Vec::new()),
+            Some(Given::Chosen(marked)) => (String::new(), marked),
+            None => Default::default(),
+        };
+        match control {
+            Control::Boxes { .. } => Self::Boxes {
+                chosen: text.parse().ok(),
+                typed: String::new(),
             },
-            (QuestionKind::Slider { .. }, Some(Answer::Number(n))) => Self::Slider {
-                value: Some(*n),
-                typed,
+            Control::Track { .. } => Self::Track {
+                value: text.parse().ok(),
+                typed: String::new(),
             },
-            (QuestionKind::Choice { options, .. }, Some(Answer::Choice(chosen))) => {
-                let at = |option| options.iter().position(|o| o == option);
-                let marked: BTreeSet<usize> = chosen.iter().filter_map(at).collect();
-                Self::Choice {
-                    cursor: marked.first().copied(),
-                    marked,
-                }
-            }
-            (QuestionKind::Number { .. }, Some(Answer::Number(n))) => {
-                Self::Number(Editor::line(&n.to_string()))
-            }
-            (QuestionKind::Text, Some(Answer::Text(text))) => Self::Text(Editor::new(text)),
-            _ => Self::new(question),
+            Control::List { .. } => Self::List {
+                cursor: marked.first().copied(),
+                marked,
+            },
+            Control::Digits { .. } => Self::Digits(Editor::line(&text)),
+            Control::Text => Self::Text(Editor::new(&text)),
         }
     }
 
     /// A field for the correction of `old`: a text field starts with it, others are empty.
     pub fn correcting(question: &Question, old: &Answer) -> Self {
-        match (&question.kind, old) {
-            (QuestionKind::Text, Answer::Text(text)) => Self::Text(Editor::new(text)),
-            _ => Self::new(question),
-        }
+        let is_text = question.kind.control() == Control::Text;
+        Self::with(question, Some(old).filter(|_| is_text))
     }
 
     /// Whether a character, including Space, is text in this field.
@@ -105,64 +84,49 @@ impl Field {
     /// Its text editor, if it has one.
     pub fn editor(&mut self) -> Option<&mut Editor> {
         match self {
-            Self::Number(editor) | Self::Text(editor) => Some(editor),
+            Self::Digits(editor) | Self::Text(editor) => Some(editor),
             _ => None,
         }
+    }
+
+    /// What is entered so far.
+    fn given(&self) -> Option<Given> {
+        Some(match self {
+            Self::Boxes { chosen, .. } => Given::Typed((*chosen)?.to_string()),
+            Self::Track { value, .. } => Given::Typed((*value)?.to_string()),
+            Self::List { marked, .. } => Given::Chosen(marked.clone()),
+            Self::Digits(editor) | Self::Text(editor) => Given::Typed(editor.text().to_owned()),
+        })
     }
 
     /// The answer entered so far; `None` if there is none.
     ///
     /// # Errors
-    /// What to do, if the entry is not a valid answer.
-    pub fn answer(&self, question: &Question, words: &Words) -> Result<Option<Answer>, String> {
-        let answer = match (self, &question.kind) {
-            (Self::Rating { chosen, .. }, _) => chosen.map(Answer::Rating),
-            (Self::Slider { value, .. }, _) => value.map(Answer::Number),
-            (Self::Choice { marked, .. }, QuestionKind::Choice { options, .. })
-                if !marked.is_empty() =>
-            {
-                let chosen = marked.iter().filter_map(|i| options.get(*i).cloned());
-                Some(Answer::Choice(chosen.collect()))
-            }
-            (Self::Number(editor), _) if !editor.is_blank() => {
-                let number = parse(editor.text()).ok_or(words.get(Phrase::NumberLike))?;
-                Some(Answer::Number(number))
-            }
-            (Self::Text(editor), _) if !editor.is_blank() => {
-                Some(Answer::Text(editor.text().to_owned()))
-            }
-            _ => None,
-        };
-        match &answer {
-            Some(answer) => question
-                .accepts(answer)
-                .map_err(|why| in_words(why, words))?,
-            None if question.required => return Err(ask_for(question, words)),
-            None => {}
-        }
-        Ok(answer)
+    /// [`Refusal`] if the entry is not a valid answer.
+    pub fn answer(&self, question: &Question) -> Result<Option<Answer>, Refusal> {
+        question.read(self.given().as_ref())
     }
 
     /// Handles a key.
     pub fn key(&mut self, question: &Question, key: Key, words: &Words) -> Handled {
-        let on_scale = matches!(self, Self::Rating { .. } | Self::Slider { .. });
+        let on_scale = matches!(self, Self::Boxes { .. } | Self::Track { .. });
         let key = match key {
             Key::Left if on_scale && words.scales_from_right() => Key::Right,
             Key::Right if on_scale && words.scales_from_right() => Key::Left,
             Key::Char(c) if !matches!(self, Self::Text(_)) => Key::Char(ascii_number(c)),
             key => key,
         };
-        match (self, &question.kind) {
-            (Self::Rating { chosen, typed }, QuestionKind::Rating { from, to, .. }) => {
-                rating(chosen, typed, (*from, *to), key, words)
+        match (self, question.kind.control()) {
+            (Self::Boxes { chosen, typed }, Control::Boxes { from, to, .. }) => {
+                rating(chosen, typed, (from, to), key, words)
             }
-            (Self::Slider { value, typed }, QuestionKind::Slider { from, to, step, .. }) => {
-                slider(value, typed, (*from, *to, *step), key, words)
+            (Self::Track { value, typed }, Control::Track { from, to, step, .. }) => {
+                slider(value, typed, (from, to, step), key, words)
             }
-            (Self::Choice { cursor, marked }, QuestionKind::Choice { options, multiple }) => {
-                choice(cursor, marked, (options.len(), *multiple), key, words)
+            (Self::List { cursor, marked }, Control::List { options, pick }) => {
+                list(cursor, marked, (options.len(), pick), key, words)
             }
-            (Self::Number(editor), _) => match key {
+            (Self::Digits(editor), _) => match key {
                 Key::Char(c) if !matches!(c, '0'..='9' | '.' | ',' | '-' | '+' | 'e' | 'E') => {
                     Handled::No
                 }
@@ -176,14 +140,14 @@ impl Field {
 
     /// Handles a click on a number of a scale.
     pub fn set_number(&mut self, question: &Question, number: f64) {
-        match (self, &question.kind) {
-            (Self::Rating { chosen, typed }, QuestionKind::Rating { from, to, .. }) => {
+        match (self, question.kind.control()) {
+            (Self::Boxes { chosen, typed }, Control::Boxes { from, to, .. }) => {
                 typed.clear();
-                *chosen = Some((number.round() as i64).clamp(*from, *to));
+                *chosen = Some((number.round() as i64).clamp(from, to));
             }
-            (Self::Slider { value, typed }, QuestionKind::Slider { from, to, step, .. }) => {
+            (Self::Track { value, typed }, Control::Track { from, to, step, .. }) => {
                 typed.clear();
-                *value = Some(on_grid(number, *from, *to, *step));
+                *value = Some(on_grid(number, from, to, step));
             }
             _ => {}
         }
@@ -191,52 +155,14 @@ impl Field {
 
     /// Handles a click on an option of a list.
     pub fn toggle(&mut self, question: &Question, at: usize) {
-        if let (Self::Choice { cursor, marked }, QuestionKind::Choice { options, multiple }) =
-            (self, &question.kind)
+        if let (Self::List { cursor, marked }, Control::List { options, pick }) =
+            (self, question.kind.control())
             && at < options.len()
         {
             *cursor = Some(at);
-            mark(marked, at, *multiple);
+            mark(marked, at, pick);
         }
     }
-}
-
-/// Parses a number, in the digits of any keyboard; a comma is accepted as decimal separator.
-pub fn parse(text: &str) -> Option<f64> {
-    let text: String = text.trim().chars().map(ascii_number).collect();
-    let number: f64 = text.replace(',', ".").parse().ok()?;
-    number.is_finite().then_some(number)
-}
-
-/// What is missing, as a request.
-fn ask_for(question: &Question, words: &Words) -> String {
-    let phrase = match &question.kind {
-        QuestionKind::Rating { from, to, .. } => {
-            return words.fill(Phrase::NumberFirst, &[("from", from), ("to", to)]);
-        }
-        QuestionKind::Slider { .. } => Phrase::SliderFirst,
-        QuestionKind::Choice { .. } => Phrase::OptionFirst,
-        QuestionKind::Number { .. } => Phrase::TypeNumberFirst,
-        QuestionKind::Text => Phrase::TypeAnswerFirst,
-    };
-    words.get(phrase).to_owned()
-}
-
-/// Why an answer is not accepted, as a request.
-fn in_words(why: AnswerError, words: &Words) -> String {
-    let both = |phrase, from: f64, to: f64| words.fill(phrase, &[("from", &from), ("to", &to)]);
-    let words = match why {
-        AnswerError::OffScale(from, to) => Some(both(Phrase::OffScale, from, to)),
-        AnswerError::OutOfRange { min, max } => match (min, max) {
-            (Some(min), Some(max)) => Some(both(Phrase::Range, min, max)),
-            (Some(min), None) => Some(words.fill(Phrase::RangeFrom, &[("from", &min)])),
-            (None, Some(max)) => Some(words.fill(Phrase::RangeTo, &[("to", &max)])),
-            (None, None) => None,
-        },
-        AnswerError::NotAbove(above) => Some(words.fill(Phrase::RangeAbove, &[("above", &above)])),
-        _ => None,
-    };
-    words.unwrap_or_else(|| sentence(&why.to_string()))
 }
 
 fn rating(
@@ -259,7 +185,7 @@ fn rating(
             }
         }
         typed.clear();
-        return Handled::Notice(words.fill(Phrase::OffScale, &[("from", &from), ("to", &to)]));
+        return Handled::Notice(Refusal::OffScale(from as f64, to as f64).words(words));
     }
     if key == Key::Backspace {
         typed.pop();
@@ -320,24 +246,24 @@ fn slider(
 ) -> Handled {
     if let Key::Char(c @ ('0'..='9' | '.' | ',' | '-')) = key {
         for start in [format!("{typed}{c}"), c.to_string()] {
-            let number = parse(&start).filter(|n| (from..=to).contains(n));
-            if number.is_some() || matches!(start.as_str(), "-" | "." | "," | "-." | "-,") {
-                if number.is_some() {
-                    *value = number;
+            let found = number(&start).filter(|n| (from..=to).contains(n));
+            if found.is_some() || matches!(start.as_str(), "-" | "." | "," | "-." | "-,") {
+                if found.is_some() {
+                    *value = found;
                 }
                 *typed = start;
                 return Handled::Yes;
             }
         }
         typed.clear();
-        return Handled::Notice(words.fill(Phrase::OffScale, &[("from", &from), ("to", &to)]));
+        return Handled::Notice(Refusal::OffScale(from, to).words(words));
     }
     if key == Key::Backspace {
         typed.pop();
-        *value = parse(typed).filter(|n| (from..=to).contains(n));
+        *value = number(typed).filter(|n| (from..=to).contains(n));
         return Handled::Yes;
     }
-    // The first key sets the marker to the middle, which favours neither end.
+    // The first key sets the marker to the middle, which favors neither end.
     let moved = |steps: f64| value.map_or((from + to) / 2.0, |v| v + steps * step);
     let next = match key {
         Key::Left => moved(-1.0),
@@ -370,10 +296,10 @@ fn on_grid(value: f64, from: f64, to: f64, step: f64) -> f64 {
     rounded.clamp(from, to)
 }
 
-fn choice(
+fn list(
     cursor: &mut Option<usize>,
-    marked: &mut BTreeSet<usize>,
-    (count, multiple): (usize, bool),
+    marked: &mut Vec<usize>,
+    (count, pick): (usize, Pick),
     key: Key,
     words: &Words,
 ) -> Handled {
@@ -389,16 +315,16 @@ fn choice(
             let Some(at) = *cursor else {
                 return Handled::Notice(words.get(Phrase::SelectFirst).to_owned());
             };
-            mark(marked, at, multiple);
+            mark(marked, at, pick);
             return Handled::Yes;
         }
         Key::Char(c @ '1'..='9') => {
             let at = c as usize - '1' as usize;
             if at >= count {
-                return Handled::Notice(words.fill(Phrase::ListHas, &[("total", &count)]));
+                return Handled::Notice(Refusal::NotListed(count).words(words));
             }
             *cursor = Some(at);
-            mark(marked, at, multiple);
+            mark(marked, at, pick);
             return Handled::Yes;
         }
         _ => return Handled::No,
@@ -407,20 +333,18 @@ fn choice(
         return Handled::No;
     }
     *cursor = Some(at);
-    if !multiple {
-        mark(marked, at, false);
+    if pick == Pick::One {
+        mark(marked, at, pick);
     }
     Handled::Yes
 }
 
-fn mark(marked: &mut BTreeSet<usize>, at: usize, multiple: bool) {
-    if multiple {
-        if !marked.remove(&at) {
-            marked.insert(at);
-        }
-    } else {
-        marked.clear();
-        marked.insert(at);
+/// Chooses an option, or takes it back where several can be chosen.
+fn mark(marked: &mut Vec<usize>, at: usize, pick: Pick) {
+    match marked.iter().position(|m| *m == at) {
+        Some(place) if pick != Pick::One => drop(marked.remove(place)),
+        _ if pick == Pick::One => *marked = vec![at],
+        _ => marked.push(at),
     }
 }
 

@@ -7,10 +7,10 @@ use crate::tui::editor::{Editor, Handled};
 use crate::tui::keys::{self, Key};
 use crossterm::event::Event;
 use study_base::text::QuestionId;
-use study_core::outcome::Choice;
-use study_core::protocol::phrases::{Phrase, Words};
-use study_core::protocol::{Answer, Question};
-use study_core::session::{Input, Roster, Screen, View};
+use study_plan::protocol::phrases::{Phrase, Words};
+use study_plan::protocol::{Answer, Question};
+use study_session::outcome::Choice;
+use study_session::session::{Input, Roster, Screen, View};
 
 impl UiState {
     /// The inputs that a key causes.
@@ -271,14 +271,14 @@ impl UiState {
                 Some(reason) if at == 0 => Ok(Some(Answer::Declined {
                     reason: reason.clone(),
                 })),
-                _ => field.answer(question, words),
+                _ => field.answer(question),
             };
             match answer {
                 Ok(Some(answer)) => answers.push((question.id.clone(), answer)),
                 Ok(None) => {}
                 Err(why) => {
                     form.focus = at;
-                    return self.notify(&why);
+                    return self.notify(&why.words(words));
                 }
             }
         }

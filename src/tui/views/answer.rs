@@ -4,14 +4,15 @@ use super::choice::List;
 use super::scale::{self, Boxes, Track};
 use crate::tui::theme::Theme;
 use crate::tui::ui_state::Target;
-use crate::tui::ui_state::field::{self, Field};
+use crate::tui::ui_state::field::Field;
 use crate::tui::widgets::{TextField, fits_big, left, middle, row, styled};
 use crate::tui::wrap;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 use ratatui::widgets::Widget;
-use study_core::protocol::phrases::Words;
-use study_core::protocol::{Question, QuestionKind};
+use study_plan::protocol::answer::number;
+use study_plan::protocol::phrases::{Phrase, Words};
+use study_plan::protocol::{Control, Pick, Question};
 
 /// The field of a question.
 #[derive(Debug)]
@@ -24,8 +25,8 @@ pub struct AnswerField<'a> {
     pub focused: bool,
     /// Height of the boxes of a rating, in rows.
     pub tall: u16,
-    /// Whether it is centred; else left-aligned.
-    pub centred: bool,
+    /// Whether it is centered; else left-aligned.
+    pub centered: bool,
     /// The sentences of the study, which know the direction of its scales.
     pub words: &'a Words,
     /// The styles.
@@ -34,13 +35,13 @@ pub struct AnswerField<'a> {
 
 impl<'a> AnswerField<'a> {
     fn boxes(&self, columns: u16) -> Option<Boxes<'a>> {
-        match (&self.question.kind, self.field) {
-            (QuestionKind::Rating { from, to, labels }, Field::Rating { chosen, .. })
-                if scale::fits(*from, *to, columns) =>
+        match (self.question.kind.control(), self.field) {
+            (Control::Boxes { from, to, labels }, Field::Boxes { chosen, .. })
+                if scale::fits(from, to, columns) =>
             {
                 Some(Boxes {
-                    from: *from,
-                    to: *to,
+                    from,
+                    to,
                     labels,
                     chosen: *chosen,
                     tall: self.tall,
@@ -53,24 +54,18 @@ impl<'a> AnswerField<'a> {
     }
 
     fn track(&self) -> Option<Track<'a>> {
-        let (from, to, value, labels) = match (&self.question.kind, self.field) {
-            (QuestionKind::Rating { from, to, labels }, Field::Rating { chosen, .. }) => {
+        let (from, to, value, labels) = match (self.question.kind.control(), self.field) {
+            (Control::Boxes { from, to, labels }, Field::Boxes { chosen, .. }) => {
                 let labels = labels.iter().map(|(n, label)| (*n as f64, label.as_str()));
                 let value = chosen.map(|n| n as f64);
-                (*from as f64, *to as f64, value, labels.collect())
+                (from as f64, to as f64, value, labels.collect())
             }
             (
-                QuestionKind::Slider {
+                Control::Track {
                     from, to, labels, ..
                 },
-                Field::Slider { value, .. },
-            ) => {
-                let labels = labels.iter().filter_map(|(n, label)| {
-                    let at = n.trim().parse().ok().filter(|n: &f64| n.is_finite())?;
-                    Some((at, label.as_str()))
-                });
-                (*from, *to, *value, labels.collect::<Vec<_>>())
-            }
+                Field::Track { value, .. },
+            ) => (from, to, *value, labels),
             _ => return None,
         };
         let shown = value.unwrap_or(from).to_string().replace('-', "−");
@@ -86,28 +81,48 @@ impl<'a> AnswerField<'a> {
     }
 
     fn list(&self) -> Option<List<'a>> {
-        match (&self.question.kind, self.field) {
-            (QuestionKind::Choice { options, multiple }, Field::Choice { cursor, marked }) => {
-                Some(List {
-                    options,
-                    multiple: *multiple,
-                    cursor: *cursor,
-                    marked,
-                    theme: self.theme,
-                })
-            }
+        match (self.question.kind.control(), self.field) {
+            (Control::List { options, pick }, Field::List { cursor, marked }) => Some(List {
+                options,
+                pick,
+                cursor: *cursor,
+                marked,
+                theme: self.theme,
+            }),
             _ => None,
         }
     }
 
     fn text(&self) -> Option<TextField<'a>> {
         match self.field {
-            Field::Text(editor) | Field::Number(editor) => Some(TextField {
+            Field::Text(editor) | Field::Digits(editor) => Some(TextField {
                 editor,
                 focused: self.focused,
                 theme: self.theme,
             }),
             _ => None,
+        }
+    }
+
+    /// Its keys and what they do.
+    pub fn hints(&self) -> Vec<(String, Phrase)> {
+        let keys = |keys: &[(&str, Phrase)]| -> Vec<(String, Phrase)> {
+            keys.iter()
+                .map(|(key, does)| ((*key).to_owned(), *does))
+                .collect()
+        };
+        match self.question.kind.control() {
+            Control::Boxes { from, to, .. } => {
+                let numbers = format!("{from}–{to}").replace('-', "−");
+                vec![(numbers, Phrase::Choose)]
+            }
+            Control::Track { .. } => keys(&[("← →", Phrase::Move), ("0–9", Phrase::Choose)]),
+            Control::List { pick, .. } => match pick {
+                Pick::One => keys(&[("↑ ↓", Phrase::Choose)]),
+                Pick::Many => keys(&[("↑ ↓", Phrase::Move), ("Space", Phrase::Mark)]),
+            },
+            Control::Text => keys(&[("Alt-Enter", Phrase::NewLine)]),
+            Control::Digits { .. } => Vec::new(),
         }
     }
 
@@ -144,12 +159,12 @@ impl<'a> AnswerField<'a> {
     fn inner(&self, area: Rect) -> Rect {
         let width = if let Some(list) = self.list() {
             list.columns().clamp(20, area.width.max(20))
-        } else if matches!(self.field, Field::Number(_)) {
+        } else if matches!(self.field, Field::Digits(_)) {
             36
         } else {
             area.width.min(72)
         };
-        if self.centred {
+        if self.centered {
             middle(area, width, area.height)
         } else {
             Rect {
@@ -185,7 +200,7 @@ impl<'a> AnswerField<'a> {
     /// The position of the terminal's cursor.
     pub fn cursor(&self, area: Rect) -> Option<Position> {
         let mut inner = self.inner(area);
-        if matches!(self.field, Field::Number(_)) {
+        if matches!(self.field, Field::Digits(_)) {
             inner.height = inner.height.min(1);
         }
         self.text()?.cursor(inner)
@@ -205,14 +220,14 @@ impl Widget for &AnswerField<'_> {
             track.render(area, buf);
         } else if let Some(list) = self.list() {
             list.render(self.inner(area), buf);
-        } else if let (Some(text), QuestionKind::Number { unit, .. }) =
-            (self.text(), &self.question.kind)
+        } else if let (Some(text), Control::Digits { unit, .. }) =
+            (self.text(), self.question.kind.control())
         {
             let inner = self.inner(area);
             text.render(row(inner, 0), buf);
-            let unit = unit.as_deref().unwrap_or_default();
+            let unit = unit.unwrap_or_default();
             // The number as it was read: a comma may have been meant otherwise.
-            let read = match field::parse(text.editor.text()) {
+            let read = match number(text.editor.text()) {
                 Some(number) => format!("= {number} {}", wrap::one_line(unit, 20)),
                 None => wrap::one_line(unit, 24),
             };

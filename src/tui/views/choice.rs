@@ -7,19 +7,19 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
-use std::collections::BTreeSet;
+use study_plan::protocol::Pick;
 
 /// A list of options, each with a check mark.
 #[derive(Debug)]
 pub struct List<'a> {
     /// The options.
     pub options: &'a [String],
-    /// Whether several options can be chosen.
-    pub multiple: bool,
+    /// How many options can be chosen.
+    pub pick: Pick,
     /// The option that the keys act on.
     pub cursor: Option<usize>,
-    /// The chosen options.
-    pub marked: &'a BTreeSet<usize>,
+    /// The chosen options, in the order in which they were chosen.
+    pub marked: &'a [usize],
     /// The styles.
     pub theme: Theme,
 }
@@ -89,11 +89,11 @@ impl Widget for &List<'_> {
         for (i, option) in lines.iter().enumerate() {
             let marked = self.marked.contains(&i);
             let here = self.cursor == Some(i);
-            let mark = match (self.multiple, marked) {
-                (true, true) => "[✓]",
-                (true, false) => "[ ]",
-                (false, true) => "(●)",
-                (false, false) => "( )",
+            let mark = match (self.pick, marked) {
+                (Pick::Many, true) => "[✓]",
+                (Pick::Many, false) => "[ ]",
+                (Pick::One, true) => "(●)",
+                (Pick::One, false) => "( )",
             };
             for (j, words) in option.iter().enumerate() {
                 let y = at;

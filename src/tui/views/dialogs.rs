@@ -10,9 +10,10 @@ use ratatui::layout::{Margin, Position, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 use study_base::text::capital;
-use study_core::outcome::Author;
-use study_core::protocol::Answer;
-use study_core::protocol::phrases::{Phrase, Words};
+use study_plan::protocol::Answer;
+use study_plan::protocol::phrases::{Phrase, Words};
+use study_session::outcome::Author;
+use study_session::page::unsaved_lines;
 
 /// A dialog above a page.
 #[derive(Debug)]
@@ -62,24 +63,6 @@ pub fn answer_words(answer: &Answer, columns: usize) -> String {
         Answer::Text(text) if text.trim().is_empty() => "–".to_owned(),
         other => wrap::one_line(&other.cell(), columns),
     }
-}
-
-/// The names of what is not saved as lines of safe text; the last one counts those for
-/// which there is no room.
-pub fn unsaved_lines(names: &[String], most: usize, columns: usize) -> Vec<String> {
-    let shown = if names.len() > most {
-        most.saturating_sub(1)
-    } else {
-        names.len()
-    };
-    let mut lines: Vec<String> = names[..shown]
-        .iter()
-        .map(|name| wrap::one_line(name, columns))
-        .collect();
-    if shown < names.len() {
-        lines.push(format!("… and {} more", names.len() - shown));
-    }
-    lines
 }
 
 impl DialogView<'_> {
@@ -139,7 +122,7 @@ impl DialogView<'_> {
             field,
             focused: true,
             tall: 3,
-            centred: true,
+            centered: true,
             words: self.words,
             theme: self.theme,
         };

@@ -1,26 +1,29 @@
 //! A page of questions: the first in full, optional text fields below it.
 //!
-//! A participant sees it large and centred; an experimenter who enters the answers
+//! A participant sees it large and centered; an experimenter who enters the answers
 //! sees a compact page with the earlier answers.
 
 use super::answer::AnswerField;
 use crate::tui::theme::Theme;
 use crate::tui::ui_state::{Form, Target};
-use crate::tui::widgets::{centre_all, left, left_all, middle, row, rows, styled};
-use crate::tui::wrap;
+use crate::tui::widgets::{center_all, left, left_all, middle, row, rows, styled};
+use crate::tui::{keys, wrap};
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
-use study_core::protocol::phrases::Phrase;
-use study_core::protocol::{Entry, Question, QuestionKind};
-use study_core::session::View;
+use study_plan::protocol::phrases::Phrase;
+use study_plan::protocol::{Entry, Question};
+use study_session::page::{Button, Does, Page};
+use study_session::session::View;
 
 /// The form on the screen.
 #[derive(Debug)]
 pub struct FormView<'a> {
     /// The view: mode of entry and earlier answers.
     pub view: &'a View,
+    /// What the page says.
+    pub page: &'a Page,
     /// The questions.
     pub questions: &'a [Question],
     /// Whether the experimenter is asked.
@@ -52,7 +55,7 @@ impl FormView<'_> {
             field: self.form.fields.get(at)?,
             focused: self.focused && self.form.focus == at,
             tall,
-            centred: !self.compact(),
+            centered: !self.compact(),
             words: &self.view.words,
             theme: self.theme,
         })
@@ -188,25 +191,10 @@ impl FormView<'_> {
     }
 
     /// The keys of this page and their actions.
-    pub fn hints(&self) -> Vec<(String, Phrase)> {
-        let mut keys = Vec::new();
+    pub fn hints(&self) -> Vec<(String, String)> {
         let at = self.form.focus;
-        match self.questions.get(at).map(|q| &q.kind) {
-            Some(QuestionKind::Rating { from, to, .. }) => {
-                keys.push((format!("{from}–{to}").replace('-', "−"), Phrase::Choose));
-            }
-            Some(QuestionKind::Slider { .. }) => {
-                keys.push(("← →".to_owned(), Phrase::Move));
-                keys.push(("0–9".to_owned(), Phrase::Choose));
-            }
-            Some(QuestionKind::Choice { multiple: true, .. }) => {
-                keys.push(("↑ ↓".to_owned(), Phrase::Move));
-                keys.push(("Space".to_owned(), Phrase::Mark));
-            }
-            Some(QuestionKind::Choice { .. }) => keys.push(("↑ ↓".to_owned(), Phrase::Choose)),
-            Some(QuestionKind::Text) => keys.push(("Alt-Enter".to_owned(), Phrase::NewLine)),
-            Some(QuestionKind::Number { .. }) | None => {}
-        }
+        let answer = self.answer(at, 3);
+        let mut keys = answer.map_or_else(Vec::new, |answer| answer.hints());
         if self.questions.len() > 1 {
             let other = if at == 0 {
                 Phrase::Comment
@@ -225,14 +213,16 @@ impl FormView<'_> {
             };
             keys.push(("Tab".to_owned(), other));
         }
-        if self.view.can_go_back && at == 0 {
-            keys.push(("Shift-Tab".to_owned(), Phrase::Back));
-        }
-        if self.view.can_replay {
-            keys.push(("F7".to_owned(), Phrase::FeelAgain));
-        }
-        keys.push(("Enter".to_owned(), Phrase::Save));
-        keys
+        let words = &self.view.words;
+        let mut hints: Vec<(String, String)> = keys
+            .into_iter()
+            .map(|(key, what)| (key, words.get(what).to_owned()))
+            .collect();
+        // A step back leads from a later field to the one before.
+        let offered = |b: &&Button| at == 0 || b.does != Does::Back;
+        let buttons = self.page.buttons.iter().rev().filter(offered);
+        hints.extend(buttons.map(|b| (keys::of(b.does).to_owned(), b.label.clone())));
+        hints
     }
 
     /// The experimenter's panel on the right: trial, device, earlier answers, remarks.
@@ -307,7 +297,7 @@ impl Widget for &FormView<'_> {
             };
             left_all(buf, indented, &placed.words, self.theme.strong());
         } else {
-            centre_all(buf, placed.prompt, &placed.words, self.theme.strong());
+            center_all(buf, placed.prompt, &placed.words, self.theme.strong());
         }
         for (at, title, area) in &placed.answers {
             let Some(answer) = self.answer(*at, placed.tall) else {

@@ -9,19 +9,21 @@ use super::prose::{ProseView, prose};
 use super::status::{Status, Top};
 use super::trouble::Trouble;
 use super::who::WhoView;
+use crate::tui::keys;
 use crate::tui::theme::Theme;
 use crate::tui::ui_state::dialog::{Confirm, Dialog};
 use crate::tui::ui_state::{Target, UiState};
-use crate::tui::widgets::{cap, centre, hint_gap, hints, hints_fit, middle, row, rows, styled};
+use crate::tui::widgets::{cap, center, hint_gap, hints, hints_fit, middle, row, rows, styled};
 use crate::tui::wrap;
 use crossterm::event::KeyCode;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 use ratatui::widgets::{Clear, Widget};
-use study_core::protocol::Entry;
-use study_core::protocol::phrases::Phrase;
-use study_core::session::view::DeviceState;
-use study_core::session::{Screen, View};
+use study_plan::protocol::Entry;
+use study_plan::protocol::phrases::Phrase;
+use study_session::page::{self, Kind};
+use study_session::session::view::DeviceState;
+use study_session::session::{Screen, View};
 
 /// Rows of a notice. A longer one is cut, so the most important words come first.
 const NOTICE_ROWS: usize = 3;
@@ -33,6 +35,8 @@ const COMMANDS: &str = "F2: remark  ·  F3: correct  ·  F4: bad trial  ·  F5: 
 pub struct Page<'a> {
     /// What the session shows.
     pub view: &'a View,
+    /// What it says.
+    pub content: page::Page,
     /// What has been entered.
     pub state: &'a UiState,
     /// Whether it shows that telemetry arrives.
@@ -54,6 +58,9 @@ pub struct TextRoom {
     pub columns: Option<usize>,
 }
 
+/// A key and what it does.
+type Hint = (String, String);
+
 impl<'a> Page<'a> {
     /// Whether an area is too small for any screen.
     pub fn too_small(area: Rect) -> bool {
@@ -65,7 +72,7 @@ impl<'a> Page<'a> {
         rows(area, 1, area.height.saturating_sub(5))
     }
 
-    fn form(&self) -> Option<FormView<'a>> {
+    fn form(&self) -> Option<FormView<'_>> {
         match &self.view.screen {
             Screen::Form {
                 questions,
@@ -73,6 +80,7 @@ impl<'a> Page<'a> {
                 ..
             } => Some(FormView {
                 view: self.view,
+                page: &self.content,
                 questions,
                 to_experimenter: *to_experimenter,
                 form: self.state.form()?,
@@ -110,19 +118,13 @@ impl<'a> Page<'a> {
 
     /// The keys that have an effect now; where the line is too narrow for all, the first
     /// ones are left to the help.
-    fn offered(&self, columns: u16) -> Vec<(String, Phrase)> {
+    fn offered(&self, columns: u16) -> Vec<Hint> {
         let mut keys = self.keys();
         keys.retain(|(key, _)| !(self.waits && key == "Enter"));
-        while keys.len() > 1 && !hints_fit(&self.in_words(&keys), columns) {
+        while keys.len() > 1 && !hints_fit(&borrowed(&keys), columns) {
             keys.remove(0);
         }
         keys
-    }
-
-    fn in_words<'k>(&'k self, keys: &'k [(String, Phrase)]) -> Vec<(&'k str, &'k str)> {
-        let words = &self.view.words;
-        let words = keys.iter().map(|(key, what)| (&**key, words.get(*what)));
-        words.collect()
     }
 
     /// The key whose hint is at a position.
@@ -131,18 +133,18 @@ impl<'a> Page<'a> {
         if Self::too_small(area) || self.state.dialog().is_some() || place.y != line.y {
             return None;
         }
-        let (keys, words) = (self.offered(area.width), &self.view.words);
-        let wide = |(key, what): &(String, Phrase)| {
-            let cells = wrap::width(key) + 2 + wrap::width(words.get(*what));
+        let keys = self.offered(area.width);
+        let wide = |(key, what): &Hint| {
+            let cells = wrap::width(key) + 2 + wrap::width(what);
             u16::try_from(cells).unwrap_or(u16::MAX)
         };
         // As `hints` and `caps` place them.
         let (edge, gap) = match self.has_caps() {
             true => (4, 3),
-            false => (0, hint_gap(&self.in_words(&keys), area.width)),
+            false => (0, hint_gap(&borrowed(&keys), area.width)),
         };
         let count = u16::try_from(keys.len()).unwrap_or(u16::MAX);
-        let wide = |key: &(String, Phrase)| wide(key).saturating_add(2 * edge);
+        let wide = |key: &Hint| wide(key).saturating_add(2 * edge);
         let all = keys.iter().map(wide).sum::<u16>() + gap * count.saturating_sub(1);
         let mut x = area.x + area.width.saturating_sub(all) / 2;
         for key in &keys {
@@ -191,7 +193,7 @@ impl<'a> Page<'a> {
             return TextRoom::default();
         }
         let body = Self::body(area);
-        let (most, page) = match prose(self.view) {
+        let (most, page) = match prose(&self.content) {
             Some(prose) => self.prose(&prose).room(body),
             None => (0, 0),
         };
@@ -220,69 +222,56 @@ impl<'a> Page<'a> {
             form.render(area, buf);
         } else if let Some(who) = self.who() {
             who.render(area, buf);
-        } else if let Some(trouble) = Trouble::new(self.view, self.theme) {
+        } else if let Some(trouble) = Trouble::of(&self.content, self.theme) {
             trouble.render(area, buf);
-        } else if let Some(playing) = Playing::of(self.view, self.theme) {
+        } else if let Some(playing) = Playing::of(&self.content, self.theme) {
             playing.render(area, buf);
-        } else if let Some(prose) = prose(self.view) {
+        } else if let Some(prose) = prose(&self.content) {
             self.prose(&prose).render(area, buf);
         }
     }
 
     /// The keys at the foot of the screen.
-    fn keys(&self) -> Vec<(String, Phrase)> {
-        let own = |keys: &[(&str, Phrase)]| {
-            let own = keys.iter().map(|(key, what)| ((*key).to_owned(), *what));
-            own.collect::<Vec<_>>()
-        };
+    fn keys(&self) -> Vec<Hint> {
+        let words = &self.view.words;
+        let hint = |key: &str, what: Phrase| (key.to_owned(), words.get(what).to_owned());
         if let Some(form) = self.form() {
             return form.hints();
         }
-        match &self.view.screen {
-            Screen::Who {
-                claiming: false, ..
-            } => own(&[("Tab", Phrase::OtherField), ("Enter", Phrase::Begin)]),
-            Screen::Playing { interval, .. } if self.view.can_advance => {
-                let on = match interval {
-                    None => Phrase::Rate,
-                    Some((at, of)) if at == of => Phrase::Answer,
-                    Some(_) => Phrase::Next,
-                };
-                own(&[("Enter", on), ("Esc", Phrase::Stop)])
+        let reading = self.state.reading();
+        match self.content.kind {
+            Kind::Who if self.who().is_some_and(|who| !who.claiming) => {
+                return vec![
+                    hint("Tab", Phrase::OtherField),
+                    hint("Enter", Phrase::Begin),
+                ];
             }
-            Screen::Playing { .. } | Screen::Loading { .. } => own(&[("Esc", Phrase::Stop)]),
-            Screen::DeviceTrouble {
-                can_go_on: true, ..
-            } => own(&[("Enter", Phrase::Continue), ("F10", Phrase::Quit)]),
-            Screen::DeviceTrouble { .. } => own(&[("F10", Phrase::Quit)]),
-            Screen::SaveTrouble { .. } => own(&[("Enter", Phrase::TryAgain)]),
-            _ => {
-                let reading = self.state.reading();
-                match prose(self.view) {
-                    Some(_) if reading.scrolled < reading.most => {
-                        own(&[("Enter", Phrase::ReadOn), ("↑ ↓", Phrase::Scroll)])
-                    }
-                    Some(prose) => own(&prose.keys),
-                    None => Vec::new(),
-                }
+            // Chosen by a letter.
+            Kind::Resume | Kind::Consent | Kind::Stopped => return Vec::new(),
+            _ if reading.scrolled < reading.most => {
+                return vec![hint("Enter", Phrase::ReadOn), hint("↑ ↓", Phrase::Scroll)];
             }
+            _ => {}
         }
+        let enabled = self.content.buttons.iter().filter(|b| b.enabled);
+        let mut all: Vec<Hint> = enabled
+            .map(|b| (keys::of(b.does).to_owned(), b.label.clone()))
+            .collect();
+        if matches!(
+            self.content.kind,
+            Kind::Playing | Kind::Loading | Kind::Mount
+        ) {
+            all.push(hint("Esc", Phrase::Stop));
+        }
+        all
     }
 
     /// Whether the page is the participant's: not the experimenter's own ones, nor with
     /// `--live`.
     fn own(&self) -> bool {
-        let of_experimenter = matches!(
-            self.view.screen,
-            Screen::Who { .. }
-                | Screen::ResumeChoice { .. }
-                | Screen::Mount { .. }
-                | Screen::Form {
-                    to_experimenter: true,
-                    ..
-                }
-        );
-        self.view.entry == Entry::Participant && !self.live && !of_experimenter
+        self.view.entry == Entry::Participant
+            && !self.live
+            && !self.content.is_of_experimenter(self.view)
     }
 
     /// The keys of a playing device as caps, large: the participant looks elsewhere.
@@ -311,8 +300,7 @@ impl<'a> Page<'a> {
 
     /// Whether the keys are drawn as caps.
     fn has_caps(&self) -> bool {
-        let plays = matches!(self.view.screen, Screen::Playing { .. });
-        plays && self.view.entry == Entry::Participant
+        self.content.kind == Kind::Playing && self.view.entry == Entry::Participant
     }
 
     fn small(&self, area: Rect, buf: &mut Buffer) {
@@ -347,8 +335,13 @@ impl<'a> Page<'a> {
             .collect();
         let height = u16::try_from(wrapped.len()).unwrap_or(3);
         let place = middle(area, area.width, height);
-        crate::tui::widgets::centre_all(buf, place, &wrapped, self.theme.text());
+        crate::tui::widgets::center_all(buf, place, &wrapped, self.theme.text());
     }
+}
+
+fn borrowed(hints: &[Hint]) -> Vec<(&str, &str)> {
+    let hints = hints.iter().map(|(key, what)| (&**key, &**what));
+    hints.collect()
 }
 
 impl Widget for &Page<'_> {
@@ -362,26 +355,27 @@ impl Widget for &Page<'_> {
             return;
         }
         let top = Top {
-            view: self.view,
+            page: &self.content,
+            progress: self.view.progress,
             theme: self.theme,
         };
         top.render(row(area, 0), buf);
         let body = Page::body(area);
         self.screen(body, buf);
         let keys = self.offered(area.width);
-        let keys = self.in_words(&keys);
+        let keys = borrowed(&keys);
         if self.state.dialog().is_none() {
             if self.has_caps() {
                 self.caps(rows(area, area.height - 4, 3), &keys, buf);
             } else {
                 let line = hints(self.theme, &keys, area.width);
-                centre(buf, row(area, area.height - 3), &line);
+                center(buf, row(area, area.height - 3), &line);
             }
             if self.view.entry == Entry::Experimenter
                 && self.view.line.device != DeviceState::Unknown
             {
                 let line = styled(COMMANDS, self.theme.quiet());
-                centre(buf, row(area, area.height - 2), &line);
+                center(buf, row(area, area.height - 2), &line);
             }
         }
         if let Some(dialog) = self.dialog() {
@@ -395,7 +389,7 @@ impl Widget for &Page<'_> {
                 let place = row(area, area.height - 4 - up);
                 Clear.render(place, buf);
                 let line = styled(words, self.theme.notice());
-                centre(buf, place, &line);
+                center(buf, place, &line);
             }
         }
         let status = Status {
@@ -403,7 +397,7 @@ impl Widget for &Page<'_> {
             text: self.state.is_text(),
             own: self.own(),
             live: self.live,
-            unsaved: matches!(self.view.screen, Screen::SaveTrouble { .. }),
+            unsaved: self.content.kind == Kind::SaveTrouble,
             words: &self.view.words,
             theme: self.theme,
         };

@@ -3,18 +3,14 @@
 use crate::tui::theme::Theme;
 use crate::tui::ui_state::Reading;
 use crate::tui::widgets::{
-    BIG_ROWS, big, centre, centre_all, clock, left_all, middle, right, row, rows, styled,
+    BIG_ROWS, big, center, center_all, left_all, middle, right, row, rows, styled,
 };
-use crate::tui::wrap;
+use crate::tui::{keys, wrap};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
-use study_base::text::counted;
-use study_core::protocol::phrases::Phrase;
-use study_core::protocol::{DeviceKind, Entry};
-use study_core::session::view::MessageKind;
-use study_core::session::{Screen, View};
+use study_session::page::{Button, Does, Kind, Page};
 
 /// Width of the widest text column, in cells.
 const COLUMN: u16 = 84;
@@ -36,256 +32,53 @@ pub struct Prose {
     pub below: String,
     /// Keys in a column: the key, its action, an explanation.
     pub choices: Vec<(&'static str, String, &'static str)>,
-    /// The keys at the foot of the page and their actions.
-    pub keys: Vec<(&'static str, Phrase)>,
 }
 
-/// The text of a screen; `None` for screens that show more than text.
-pub fn prose(view: &View) -> Option<Prose> {
-    let read_by_experimenter = view.entry == Entry::Experimenter;
-    let read_out = |text: &str| {
-        if read_by_experimenter {
-            text.to_owned()
-        } else {
-            String::new()
+/// The text of a page; `None` for pages that show more than text.
+pub fn prose(page: &Page) -> Option<Prose> {
+    let long = matches!(page.kind, Kind::Message | Kind::Break | Kind::End);
+    let body = match page.kind {
+        Kind::Who | Kind::Questions | Kind::Playing | Kind::DeviceTrouble | Kind::SaveTrouble => {
+            return None;
         }
+        Kind::Loading if page.interval.is_some() => return None,
+        Kind::Message | Kind::Break | Kind::End => wrap::flow(&page.text),
+        Kind::Reference => page.wait.as_ref().unwrap_or(&page.text).clone(),
+        Kind::Paused => page.clock.clone().unwrap_or_default(),
+        _ => page.text.clone(),
     };
-    let words = &view.words;
-    let by_hand = view.device == DeviceKind::Manual;
-    let stopped = Stopped::of(view);
-    let again = words.get(stopped.again);
-    let ready: &[_] = if view.can_advance {
-        &[("Enter", Phrase::Ready)]
-    } else {
-        &[]
+    let instruction = page.instruction.unwrap_or_default().to_owned();
+    let (above, title) = match (long, page.kind) {
+        (true, _) if instruction.is_empty() => (page.title.clone(), page.wait.clone()),
+        (_, Kind::Stopped) => (instruction, Some(format!("■  {}", page.title))),
+        (_, _) => (instruction, Some(page.title.clone())),
     };
-    Some(match &view.screen {
-        Screen::ResumeChoice { gap_h, done, total } => Prose {
-            title: "This session was not finished.".to_owned(),
-            body: match total {
-                Some(total) => format!(
-                    "{done} of {total} trials are done. The last one was {} ago.",
-                    ago(*gap_h)
-                ),
-                None => format!(
-                    "{} done. The last one was {} ago.",
-                    counted(*done as usize, "trial is", "trials are"),
-                    ago(*gap_h)
-                ),
-            },
-            choices: vec![
-                (
-                    "b",
-                    "restart the block".to_owned(),
-                    "the trials of the block are repeated",
-                ),
-                (
-                    "c",
-                    "continue where it stopped".to_owned(),
-                    "later trials are flagged",
-                ),
-                (
-                    "d",
-                    "drop out".to_owned(),
-                    "the participant does not return",
-                ),
-            ],
-            ..Prose::default()
-        },
-        Screen::Consent { document, version } => Prose {
-            above: read_out("Ask the participant"),
-            title: words.get(Phrase::AgreeQuestion).to_owned(),
-            body: if version.is_empty() {
-                document.clone()
-            } else {
-                words.fill(
-                    Phrase::Version,
-                    &[("document", document), ("version", version)],
-                )
-            },
-            choices: vec![
-                ("y", words.get(Phrase::Agree).to_owned(), ""),
-                ("n", words.get(Phrase::Refuse).to_owned(), ""),
-            ],
-            ..Prose::default()
-        },
-        Screen::Message { kind, text } => Prose {
-            above: match kind {
-                MessageKind::Welcome | MessageKind::Instructions => read_out("Read out"),
-                MessageKind::Practice => words.get(Phrase::Practice).to_owned(),
-                MessageKind::PracticeOver | MessageKind::Feedback => String::new(),
-                MessageKind::Part => read_out("Read out"),
-            },
-            body: wrap::flow(text),
-            long: true,
-            keys: vec![("Enter", Phrase::Continue)],
-            ..Prose::default()
-        },
-        Screen::Reference { prompt, wait_s } => Prose {
-            above: read_out("Tell the participant"),
-            title: prompt.clone(),
-            body: if *wait_s > 0.0 {
-                words.wait(*wait_s)
-            } else {
-                words.get(Phrase::AtLeisure).to_owned()
-            },
-            keys: ready.to_vec(),
-            ..Prose::default()
-        },
-        Screen::Loading { .. } => Prose {
-            title: words.get(Phrase::OneMoment).to_owned(),
-            body: words.get(Phrase::Preparing).to_owned(),
-            ..Prose::default()
-        },
-        Screen::Mount { code } => Prose {
-            above: "For the experimenter".to_owned(),
-            title: format!("Mount sample {code}."),
-            body: "Press Enter when the sample is mounted.".to_owned(),
-            keys: vec![("Enter", Phrase::Mounted), ("Esc", Phrase::Stop)],
-            ..Prose::default()
-        },
-        Screen::Stopping => Prose {
-            title: words.get(Phrase::Stopping).to_owned(),
-            ..Prose::default()
-        },
-        Screen::Stopped { can_rate } => Prose {
-            title: format!("■  {}", words.get(stopped.title)),
-            body: words.get(stopped.body).to_owned(),
-            choices: if *can_rate {
-                vec![
-                    ("Enter", again.to_owned(), ""),
-                    ("r", words.get(stopped.rate).to_owned(), ""),
-                ]
-            } else {
-                vec![("Enter", again.to_owned(), "")]
-            },
-            ..Prose::default()
-        },
-        Screen::Saving => Prose {
-            title: words.get(Phrase::Saving).to_owned(),
-            ..Prose::default()
-        },
-        Screen::Break {
-            text,
-            wait_s,
-            done,
-            total,
-        } => Prose {
-            big: if *wait_s > 0.0 {
-                clock(wait_s.ceil())
-            } else {
-                String::new()
-            },
-            below: total.map_or_else(String::new, |total| {
-                words.fill(Phrase::DoneOf, &[("n", done), ("total", &total)])
-            }),
-            above: words.get(Phrase::Break).to_owned(),
-            body: wrap::flow(text),
-            long: true,
-            title: if *wait_s > 0.0 {
-                words.wait(*wait_s)
-            } else {
-                String::new()
-            },
-            keys: ready.to_vec(),
-            ..Prose::default()
-        },
-        Screen::Paused { since_s } => Prose {
-            title: words.get(Phrase::Paused).to_owned(),
-            body: words.fill(
-                if by_hand || !view.force {
-                    Phrase::PausedFor
-                } else {
-                    Phrase::PausedNoForce
-                },
-                &[("time", &clock(*since_s))],
-            ),
-            keys: vec![("Enter", Phrase::Continue), ("F10", Phrase::Quit)],
-            ..Prose::default()
-        },
-        Screen::End { text } => Prose {
-            body: wrap::flow(text),
-            long: true,
-            keys: vec![("Enter", Phrase::Close)],
-            ..Prose::default()
-        },
-        Screen::Who { .. }
-        | Screen::Form { .. }
-        | Screen::Playing { .. }
-        | Screen::DeviceTrouble { .. }
-        | Screen::SaveTrouble { .. } => return None,
+    Some(Prose {
+        above,
+        title: title.unwrap_or_default(),
+        body,
+        long,
+        big: page.wait_clock.clone().filter(|_| long).unwrap_or_default(),
+        below: page
+            .done
+            .as_ref()
+            .map(|d| d.words.clone())
+            .unwrap_or_default(),
+        choices: choices(page),
     })
 }
 
-/// The sentences of a stopped trial, by what was presented.
-#[derive(Debug, Clone, Copy)]
-pub struct Stopped {
-    /// What is stopped.
-    pub title: Phrase,
-    /// What that means.
-    pub body: Phrase,
-    /// Present it again.
-    pub again: Phrase,
-    /// Rate it.
-    pub rate: Phrase,
-}
-
-impl Stopped {
-    /// Those of a view.
-    pub fn of(view: &View) -> Self {
-        let (title, body, again, rate) = match (view.device, view.force) {
-            (DeviceKind::Manual, _) => (
-                Phrase::StoppedSample,
-                Phrase::LetGo,
-                Phrase::FeelAgain,
-                Phrase::RateFelt,
-            ),
-            (_, true) => (
-                Phrase::StoppedDevice,
-                Phrase::NoForce,
-                Phrase::PlayAgain,
-                Phrase::RateFelt,
-            ),
-            (_, false) => (
-                Phrase::StoppedSample,
-                Phrase::NotLost,
-                Phrase::PlayAgain,
-                Phrase::RateIt,
-            ),
-        };
-        Self {
-            title,
-            body,
-            again,
-            rate,
-        }
+/// What is chosen by a letter, with the keys: the key, its action, an explanation.
+pub fn choices(page: &Page) -> Vec<(&'static str, String, &'static str)> {
+    if !matches!(page.kind, Kind::Resume | Kind::Consent | Kind::Stopped) {
+        return Vec::new();
     }
-}
-
-/// What the participant does while it plays: the sentence, and, where more is needed, how
-/// to go on.
-pub fn attending(view: &View) -> (Phrase, Phrase) {
-    match (view.device, view.force) {
-        (DeviceKind::Manual, _) => (Phrase::FeelSample, Phrase::Longer),
-        (_, true) => (Phrase::FeelDevice, Phrase::KeepExploring),
-        (_, false) => (Phrase::Attend, Phrase::Longer),
+    let choice = |b: &Button| (keys::of(b.does), b.label.clone(), b.note);
+    let mut choices: Vec<_> = page.buttons.iter().map(choice).collect();
+    if let Some(refuse) = &page.refuse {
+        choices.push((keys::of(Does::Refuse), refuse.open.clone(), ""));
     }
-}
-
-fn ago(gap_h: f64) -> String {
-    if !gap_h.is_finite() || gap_h < 0.0 {
-        "some time".to_owned()
-    } else {
-        let (count, unit) = match gap_h {
-            h if h < 1.0 / 60.0 => (h * 3600.0, "second"),
-            h if h < 1.0 => (h * 60.0, "minute"),
-            h if h < 48.0 => (h, "hour"),
-            h => (h / 24.0, "day"),
-        };
-        let count = count.floor().max(1.0);
-        let plural = if count > 1.0 { "s" } else { "" };
-        format!("{count} {unit}{plural}")
-    }
+    choices
 }
 
 /// The widget that draws a [`Prose`].
@@ -344,7 +137,7 @@ impl ProseView<'_> {
                 ..area
             };
             let line = styled(self.prose.above.as_str(), self.theme.quiet());
-            centre(buf, above, &line);
+            center(buf, above, &line);
         }
         if lines.len() <= 2 {
             let wide = Rect {
@@ -352,7 +145,7 @@ impl ProseView<'_> {
                 width: area.width,
                 ..place
             };
-            centre_all(buf, wide, &lines, self.theme.strong());
+            center_all(buf, wide, &lines, self.theme.strong());
         } else {
             left_all(buf, place, &lines[from..], style);
         }
@@ -369,7 +162,7 @@ impl ProseView<'_> {
         }
         for text in [&self.prose.title, &self.prose.below] {
             if !text.is_empty() {
-                centre(
+                center(
                     buf,
                     row(foot, 0),
                     &styled(text.as_str(), self.theme.quiet()),
@@ -409,12 +202,12 @@ impl Widget for &ProseView<'_> {
         let used = u16::from(has_above) * 2 + len(&title) + 2 + len(&body) + 1 + choice_rows;
         let mut y = area.height.saturating_sub(used) * 2 / 5;
         if has_above {
-            centre_all(buf, rows(area, y, 1), &above, self.theme.quiet());
+            center_all(buf, rows(area, y, 1), &above, self.theme.quiet());
             y += 2;
         }
-        centre_all(buf, rows(area, y, len(&title)), &title, self.theme.strong());
+        center_all(buf, rows(area, y, len(&title)), &title, self.theme.strong());
         y += len(&title) + 1;
-        centre_all(buf, rows(area, y, len(&body)), &body, self.theme.text());
+        center_all(buf, rows(area, y, len(&body)), &body, self.theme.text());
         y += len(&body) + 2;
         let widest = |(key, what, more): &(&str, String, &str)| {
             let more = if more.is_empty() {

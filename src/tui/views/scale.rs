@@ -1,7 +1,7 @@
 //! Scales: numbers in boxes, or a line with a marker.
 
 use crate::tui::theme::Theme;
-use crate::tui::widgets::{BIG_ROWS, big, cells, centre, frame, left, right, row, rows, styled};
+use crate::tui::widgets::{BIG_ROWS, big, cells, center, frame, left, right, row, rows, styled};
 use crate::tui::wrap;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Margin, Rect};
@@ -16,7 +16,7 @@ const NARROW: u16 = 5;
 /// Width of the widest box, in cells.
 const WIDE: u16 = 15;
 
-/// A labelled scale of integers.
+/// A labeled scale of integers.
 #[derive(Debug)]
 pub struct Boxes<'a> {
     /// Smallest number.
@@ -88,9 +88,9 @@ impl Boxes<'_> {
     fn captions(&self, area: Rect) -> Vec<Caption> {
         let places = self.places(area);
         let label = |(n, place): &(i64, Rect)| Some((*place, self.labels.get(n)?.as_str()));
-        let mut labelled: Vec<(Rect, &str)> = places.iter().filter_map(label).collect();
-        labelled.sort_by_key(|(place, _)| place.x);
-        captions(&labelled, covering(&places), 24)
+        let mut labeled: Vec<(Rect, &str)> = places.iter().filter_map(label).collect();
+        labeled.sort_by_key(|(place, _)| place.x);
+        captions(&labeled, covering(&places), 24)
     }
 
     /// Height of the labels in rows, for a width in columns.
@@ -125,19 +125,19 @@ enum Side {
 
 /// The labels of these places, from left to right: those at the ends of `all` keep to its
 /// edges, and each may extend halfway to the next one, `widest` columns at most.
-fn captions(labelled: &[(Rect, &str)], all: Rect, widest: u16) -> Vec<Caption> {
-    let labelled: Vec<&(Rect, &str)> = (labelled.iter())
+fn captions(labeled: &[(Rect, &str)], all: Rect, widest: u16) -> Vec<Caption> {
+    let labeled: Vec<&(Rect, &str)> = (labeled.iter())
         .filter(|(_, label)| !label.trim().is_empty())
         .collect();
-    let centre_of = |r: Rect| r.x + r.width / 2;
+    let center_of = |r: Rect| r.x + r.width / 2;
     let caption = |(i, (place, label)): (usize, &&(Rect, &str))| {
-        let centre = centre_of(*place);
-        let lower = match i.checked_sub(1).and_then(|j| labelled.get(j)) {
-            Some((before, _)) => u16::midpoint(centre_of(*before), centre) + 1,
+        let center = center_of(*place);
+        let lower = match i.checked_sub(1).and_then(|j| labeled.get(j)) {
+            Some((before, _)) => u16::midpoint(center_of(*before), center) + 1,
             None => all.x,
         };
-        let upper = match labelled.get(i + 1) {
-            Some((after, _)) => u16::midpoint(centre, centre_of(*after)),
+        let upper = match labeled.get(i + 1) {
+            Some((after, _)) => u16::midpoint(center, center_of(*after)),
             None => all.right(),
         };
         let (side, x, end) = if place.x == all.x {
@@ -146,10 +146,10 @@ fn captions(labelled: &[(Rect, &str)], all: Rect, widest: u16) -> Vec<Caption> {
             let x = lower.max(place.right().saturating_sub(widest));
             (Side::Right, x, place.right())
         } else {
-            let half = (centre - lower)
-                .min(upper.saturating_sub(centre))
+            let half = (center - lower)
+                .min(upper.saturating_sub(center))
                 .min(widest / 2);
-            (Side::Middle, centre - half, centre + half + 1)
+            (Side::Middle, center - half, center + half + 1)
         };
         let width = end.saturating_sub(x).max(1);
         Caption {
@@ -158,7 +158,7 @@ fn captions(labelled: &[(Rect, &str)], all: Rect, widest: u16) -> Vec<Caption> {
             lines: wrap::paragraph(label, usize::from(width), 4),
         }
     };
-    labelled.iter().enumerate().map(caption).collect()
+    labeled.iter().enumerate().map(caption).collect()
 }
 
 fn caption_rows(captions: &[Caption]) -> u16 {
@@ -180,7 +180,7 @@ fn draw_captions(captions: &[Caption], area: Rect, from: u16, theme: Theme, buf:
             match caption.side {
                 _ if below.is_empty() => {}
                 Side::Left => left(buf, place, &line),
-                Side::Middle => centre(buf, place, &line),
+                Side::Middle => center(buf, place, &line),
                 Side::Right => right(buf, place, &line),
             }
         }
@@ -213,7 +213,7 @@ impl Widget for &Boxes<'_> {
                 big(buf, inside, &number(n), text);
             } else {
                 let label = styled(number(n), text);
-                centre(buf, row(inside, inside.height / 2), &label);
+                center(buf, row(inside, inside.height / 2), &label);
             }
         }
         let below = self.tall.min(area.height);

@@ -1,16 +1,16 @@
 //! The experimenter's status line, the banner and the progress.
 
 use crate::tui::theme::Theme;
-use crate::tui::widgets::{cells, centre, clock, left, right, styled};
+use crate::tui::widgets::{cells, center, left, right, styled};
 use crate::tui::wrap;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Margin, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 use std::fmt::Display;
-use study_core::protocol::phrases::{Phrase, Words};
-use study_core::session::view::{Banner, DeviceState, Mirror, Progress, StatusLine, Telemetry};
-use study_core::session::{Screen, View};
+use study_plan::protocol::phrases::{Phrase, Words};
+use study_session::page::{Page, clock};
+use study_session::session::view::{DeviceState, Mirror, Progress, StatusLine, Telemetry};
 
 /// The status line, in the last row.
 #[derive(Debug)]
@@ -109,7 +109,7 @@ impl Widget for &Status<'_> {
             Some(Mirror::InStep) | None => "",
         };
         spans.push(Span::styled(behind, self.theme.trouble_frame()));
-        centre(buf, inside, &Line::from(spans));
+        center(buf, inside, &Line::from(spans));
 
         let help = vec![
             Span::styled(if self.text { "F1" } else { "?" }, self.theme.key()),
@@ -119,19 +119,13 @@ impl Widget for &Status<'_> {
     }
 }
 
-/// The words of a banner.
-pub fn of_banner(banner: Banner) -> Phrase {
-    match banner {
-        Banner::Pilot => Phrase::Pilot,
-        Banner::Simulated => Phrase::Simulated,
-    }
-}
-
 /// The first row: the banner of pilots and simulations, and the progress.
 #[derive(Debug)]
 pub struct Top<'a> {
-    /// The view.
-    pub view: &'a View,
+    /// The page.
+    pub page: &'a Page,
+    /// The progress of the view, which has the length of a block.
+    pub progress: Option<Progress>,
     /// The styles.
     pub theme: Theme,
 }
@@ -171,30 +165,16 @@ impl Top<'_> {
 impl Widget for &Top<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
         let mut taken_left = 3;
-        if let Some(banner) = self.view.banner {
-            let words = format!(" {} ", self.view.words.get(of_banner(banner)));
+        if let Some(banner) = &self.page.banner {
+            let words = format!(" {banner} ");
             taken_left += wrap::width(&words);
             let at = area.inner(Margin::new(1, 0));
             left(buf, at, &styled(words, self.theme.banner()));
         }
-        let mut words = Vec::new();
-        if let Screen::Form { page, pages, .. } = &self.view.screen
-            && *pages > 1
-        {
-            let page = [("n", page as &dyn Display), ("total", pages)];
-            words.push(self.view.words.fill(Phrase::PageOf, &page));
-        }
-        if let Some(progress) = self.view.progress {
-            let number = ("n", &progress.current as &dyn Display);
-            let phrase = match (progress.practice, progress.total) {
-                (true, _) => Phrase::PracticeOf,
-                (false, Some(_)) => Phrase::TrialOf,
-                (false, None) => Phrase::TrialNumber,
-            };
-            let total = progress.total.unwrap_or(progress.current);
-            let values = [number, ("total", &total as &dyn Display)];
-            words.push(self.view.words.fill(phrase, &values));
-        }
+        let parts = [&self.page.sheet, &self.page.progress]
+            .into_iter()
+            .flatten();
+        let words: Vec<&str> = parts.map(|part| part.words.as_str()).collect();
         if !words.is_empty() {
             let words = styled(words.join(" · "), self.theme.quiet());
             let at = Rect {
@@ -202,7 +182,7 @@ impl Widget for &Top<'_> {
                 ..area
             };
             right(buf, at, &words);
-            if let Some((progress, total)) = self.view.progress.and_then(|p| Some((p, p.total?))) {
+            if let Some((progress, total)) = self.progress.and_then(|p| Some((p, p.total?))) {
                 let taken = cells(&words) + 2;
                 let wide = u16::try_from(total).unwrap_or(u16::MAX).clamp(10, 30);
                 let room = at.width.saturating_sub(taken);

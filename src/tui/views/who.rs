@@ -2,11 +2,11 @@
 
 use crate::tui::theme::Theme;
 use crate::tui::ui_state::Who;
-use crate::tui::widgets::{TextField, centre, frame, left, left_all, middle, row, rows, styled};
+use crate::tui::widgets::{TextField, center, frame, left, left_all, middle, row, rows, styled};
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 use ratatui::widgets::Widget;
-use study_core::session::Roster;
+use study_session::session::Roster;
 
 /// The widget of the first screen.
 #[derive(Debug)]
@@ -94,7 +94,7 @@ impl Widget for &WhoView<'_> {
             "Who takes part?"
         };
         let title = styled(title, self.theme.strong());
-        centre(buf, row(place, 0), &title);
+        center(buf, row(place, 0), &title);
         let next = self.roster.and_then(|roster| roster.next_id());
         for (label, hint, field, at) in self.fields(area) {
             let border = match field.focused {

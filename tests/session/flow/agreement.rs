@@ -12,12 +12,12 @@ use proptest::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use study_base::text::{ParticipantId, QuestionId};
-use study_core::outcome::fold::{History, attempt_rows};
-use study_core::outcome::{
+use study_plan::protocol::{Answer, Protocol, Trial};
+use study_session::outcome::fold::{History, attempt_rows};
+use study_session::outcome::{
     Choice, Entry, Event, FormId, Moment, ParticipantRow, RatingRow, State, Status,
 };
-use study_core::protocol::{Answer, Protocol, Trial};
-use study_core::session::{Config, Effect, Ending, Input, Screen, Session, View};
+use study_session::session::{Config, Effect, Ending, Input, Screen, Session, View};
 
 #[derive(Debug, Clone)]
 enum Move {
@@ -82,7 +82,7 @@ fn make(rig: Rig, next: Move) -> Rig {
                     question: given.id().clone(),
                     answer,
                     reason: "misheard".to_owned(),
-                    by: study_core::outcome::Author::Participant,
+                    by: study_session::outcome::Author::Participant,
                 });
             }
         }

@@ -3,7 +3,7 @@
 
 use super::rig::Rig;
 use super::studies::{MODELS, plain};
-use study_core::session::{Input, Screen};
+use study_session::session::{Input, Screen};
 
 #[test]
 fn the_rig_would_find_a_model_id() {
@@ -30,7 +30,7 @@ fn a_device_that_names_its_table_is_not_quoted() {
         };
         assert!(what.contains('…'), "{what}");
         let kept = rig.events().any(
-            |e| matches!(e, study_core::outcome::Event::AttemptFailed { detail, .. } if detail == words),
+            |e| matches!(e, study_session::outcome::Event::AttemptFailed { detail, .. } if detail == words),
         );
         assert!(kept, "the journal has the words as they were");
     }

@@ -3,10 +3,10 @@
 use super::rig::{DeviceMood, Rig, name};
 use super::studies::{plain, rich};
 use study_base::text::ModelId;
-use study_core::outcome::{Defect, Event, Failure, Fidelity, Playback, Verdict};
-use study_core::protocol::DeviceKind;
-use study_core::session::view::{DeviceState, Telemetry};
-use study_core::session::{Effect, Input, Screen};
+use study_plan::protocol::DeviceKind;
+use study_session::outcome::{Defect, Event, Failure, Fidelity, Playback, Verdict};
+use study_session::session::view::{DeviceState, Telemetry};
+use study_session::session::{Effect, Input, Screen};
 
 /// A session whose device waits in the phase of this screen, in the first trial.
 fn in_phase(screen: &str) -> Rig {

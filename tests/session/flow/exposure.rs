@@ -2,9 +2,9 @@
 
 use super::rig::{Rig, name};
 use super::studies::{plain, qid, rich};
-use study_core::outcome::{Author, Event, FormId};
-use study_core::protocol::{Answer, Exposure, Protocol};
-use study_core::session::{Input, Screen};
+use study_plan::protocol::{Answer, Exposure, Protocol};
+use study_session::outcome::{Author, Event, FormId};
+use study_session::session::{Input, Screen};
 
 fn felt_for(min_s: f64, max_s: Option<f64>, replays: u32) -> Protocol {
     let mut protocol = plain();
@@ -71,7 +71,7 @@ fn a_realization_is_felt_again_before_it_is_rated_and_that_is_recorded() {
 #[test]
 fn a_step_back_shows_the_earlier_answers_and_records_a_change() {
     let mut protocol = rich();
-    protocol.session.entry = study_core::protocol::Entry::Participant;
+    protocol.session.entry = study_plan::protocol::Entry::Participant;
     protocol.design.practice.clear();
     let mut rig = Rig::new(protocol);
     rig.until("Reference").until("Form").answer_page();
@@ -103,7 +103,8 @@ fn a_step_back_shows_the_earlier_answers_and_records_a_change() {
     ));
     // what was answered cannot be taken away without a word
     rig.send(Input::Back).send(Input::Answer(Vec::new()));
-    assert_eq!(rig.view().notice.as_deref(), Some("an answer is needed"));
+    let refused = "Choose a number from 1 to 7 first.";
+    assert_eq!(rig.view().notice.as_deref(), Some(refused));
     rig.answer_page().answer_page();
     rig.send(Input::Back);
     assert_ne!(screen(&rig), "Form", "a closed trial stays closed");

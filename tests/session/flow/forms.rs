@@ -2,9 +2,9 @@
 
 use super::rig::{Rig, name};
 use super::studies::{plain, qid, rich};
-use study_core::outcome::{Author, Event, Failure, FormId};
-use study_core::protocol::Answer;
-use study_core::session::{Effect, Input, Screen};
+use study_plan::protocol::Answer;
+use study_session::outcome::{Author, Event, Failure, FormId};
+use study_session::session::{Effect, Input, Screen};
 
 fn screen(rig: &Rig) -> &'static str {
     name(&rig.view().screen)
@@ -39,14 +39,17 @@ fn a_bad_answer_records_nothing_and_says_what_is_accepted() {
     rig.until("Form");
     let before = rig.journal.len();
     for (answers, notice) in [
-        (vec![(qid("realism"), Answer::Rating(8))], "choose 1 to 7"),
+        (
+            vec![(qid("realism"), Answer::Rating(8))],
+            "The scale goes from 1 to 7.",
+        ),
         (
             vec![(qid("comment"), Answer::Text("dull".into()))],
-            "an answer is needed",
+            "Choose a number from 1 to 7 first.",
         ),
         (
             vec![(qid("other"), Answer::Rating(1))],
-            "an answer is needed",
+            "Choose a number from 1 to 7 first.",
         ),
         (
             vec![
@@ -57,7 +60,7 @@ fn a_bad_answer_records_nothing_and_says_what_is_accepted() {
         ),
         (
             vec![(qid("realism"), Answer::Declined { reason: " ".into() })],
-            "say why it is declined",
+            "Why is the question declined? The reason is stored.",
         ),
     ] {
         rig.send(Input::Answer(answers));

@@ -1,12 +1,12 @@
 //! Trials of several intervals: pairs and tracks.
 
-use super::rig::Rig;
+use super::rig::{DeviceMood, Rig};
 use study_base::text::QuestionId;
-use study_core::outcome::{Event, Failure, FormId};
-use study_core::procedure::Recorded;
-use study_core::protocol::file::parse;
-use study_core::protocol::{Answer, Interval, Protocol, QuestionKind, Seat, Stimuli};
-use study_core::session::{Effect, Ending, Input, Screen};
+use study_plan::procedure::Recorded;
+use study_plan::protocol::file::parse;
+use study_plan::protocol::{Answer, Interval, Protocol, QuestionKind, Seat, Stimuli, kinds};
+use study_session::outcome::{Event, Failure, FormId};
+use study_session::session::{Effect, Ending, Input, Screen};
 
 const HEAD: &str = r#"
 format = "study-protocol/2"
@@ -214,7 +214,7 @@ fn a_track_after_a_fault_a_bad_trial_a_correction_and_a_resume_is_the_one_withou
             question: earlier.id().clone(),
             answer: Answer::Choice(vec![other.to_owned()]),
             reason: "a slip".to_owned(),
-            by: study_core::outcome::Author::Participant,
+            by: study_session::outcome::Author::Participant,
         });
         assert_eq!(rig.count(|e| matches!(e, Event::Corrected { .. })), 1);
         // A trial that is marked as bad after its answer.
@@ -265,7 +265,7 @@ fn a_corrected_answer_counts_in_the_table_and_not_in_the_track() {
         question: last.id().clone(),
         answer: Answer::Choice(vec![other.to_owned()]),
         reason: "a slip".to_owned(),
-        by: study_core::outcome::Author::Participant,
+        by: study_session::outcome::Author::Participant,
     });
     assert_eq!(recorded(&rig, &protocol), before);
     assert_eq!(correct(&rig), !was);
@@ -315,7 +315,7 @@ fn restarting_a_block_takes_its_answers_from_the_track() {
     rig.send(Input::Quit);
     let mut rig = Rig::back(protocol.clone(), rig.journal.clone(), 100_000.0);
     rig.identify();
-    rig.send(Input::Resume(study_core::outcome::Choice::RestartBlock));
+    rig.send(Input::Resume(study_session::outcome::Choice::RestartBlock));
     assert_eq!(recorded(&rig, &protocol), told[..4]);
     finish(&mut rig);
     assert_eq!(recorded(&rig, &protocol).len(), 16);
@@ -331,23 +331,47 @@ fn every_interval_is_loaded_anew_and_starts_after_the_same_gap() {
         .iter()
         .filter(|e| matches!(e, Effect::Load { .. }));
     assert_eq!(loads.count(), 24);
-    let same = |t: &study_core::protocol::Trial| match &t.stimuli {
+    let same = |t: &study_plan::protocol::Trial| match &t.stimuli {
         Stimuli::Track { intervals, .. } => intervals[0] == intervals[1],
         _ => false,
     };
     let schedule = rig.schedule();
     let equal = schedule[..12].iter().filter(|t| same(t)).count();
     assert!((3..=9).contains(&equal), "{equal}");
-    let gaps: Vec<f64> = study_core::outcome::fold::interval_rows(rig.session.history(), &protocol)
-        .iter()
-        .filter_map(|row| row.gap_s)
-        .collect();
+    let gaps: Vec<f64> =
+        study_session::outcome::fold::interval_rows(rig.session.history(), &protocol)
+            .iter()
+            .filter_map(|row| row.gap_s)
+            .collect();
     assert_eq!(gaps.len(), 12);
     assert!(
         gaps.iter()
             .all(|gap| *gap >= 1.0 && (gap - gaps[0]).abs() < 1e-9),
         "{gaps:?}"
     );
+}
+
+/// How long a realization takes to load must not be noticed: a load that outlasts the gap
+/// makes it a whole multiple.
+#[test]
+fn a_slow_load_delays_the_next_interval_by_whole_gaps() {
+    let mut rig = Rig::new(pairs("gap_s = 1.0"));
+    until(&mut rig, 0, |s| matches!(s, Screen::Playing { .. }));
+    rig.device = DeviceMood::Silent;
+    let playback = rig.playback;
+    rig.wait(3.0)
+        .send(Input::Advance)
+        .send(Input::DeviceStopped(playback));
+    let starts = |rig: &Rig| {
+        let started = |e: &&Effect| matches!(e, Effect::Start);
+        rig.effects.iter().filter(started).count()
+    };
+    rig.wait(1.7).send(Input::DeviceLoaded);
+    assert_eq!(starts(&rig), 1, "1.7 s after the first interval");
+    rig.wait(0.2);
+    assert_eq!(starts(&rig), 1, "1.9 s");
+    rig.wait(0.2);
+    assert_eq!(starts(&rig), 2, "2.1 s");
 }
 
 #[test]
@@ -582,7 +606,7 @@ fn answers_are_shown_in_the_language_of_the_study_and_stored_in_one() {
     let Screen::Form { questions, .. } = rig.view().screen else {
         panic!()
     };
-    let QuestionKind::Choice { options, .. } = &questions[0].kind else {
+    let QuestionKind::Choice(kinds::Choice { options, .. }) = &questions[0].kind else {
         panic!()
     };
     assert_eq!(options, &["erstes", "zweites", "kein Unterschied"]);
@@ -600,7 +624,7 @@ fn answers_are_shown_in_the_language_of_the_study_and_stored_in_one() {
         question: id.clone(),
         answer: Answer::Choice(vec!["zweites".to_owned()]),
         reason: "a slip".to_owned(),
-        by: study_core::outcome::Author::Participant,
+        by: study_session::outcome::Author::Participant,
     });
     assert_eq!(stored(&rig), Answer::Choice(vec!["second".to_owned()]));
 }

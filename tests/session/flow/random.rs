@@ -3,9 +3,9 @@
 use super::rig::{DeviceMood, Rig, StoreMood};
 use super::studies::{qid, rich};
 use proptest::prelude::*;
-use study_core::outcome::{Author, Choice, FormId, Playback};
-use study_core::protocol::Answer;
-use study_core::session::{Effect, Input, Screen};
+use study_plan::protocol::Answer;
+use study_session::outcome::{Author, Choice, FormId, Playback};
+use study_session::session::{Effect, Input, Screen};
 
 /// What may happen next.
 #[derive(Debug, Clone)]

@@ -3,9 +3,9 @@
 use super::rig::{Rig, name};
 use super::studies::{plain, qid, rich};
 use std::collections::BTreeSet;
-use study_core::outcome::{Author, Choice, Entry, Event, Failure, FormId, State};
-use study_core::protocol::{Answer, Protocol};
-use study_core::session::{Ending, Input, Screen};
+use study_plan::protocol::{Answer, Protocol};
+use study_session::outcome::{Author, Choice, Entry, Event, Failure, FormId, State};
+use study_session::session::{Ending, Input, Screen};
 
 fn screen(rig: &Rig) -> &'static str {
     name(&rig.view().screen)

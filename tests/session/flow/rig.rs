@@ -5,10 +5,10 @@ use chrono::{DateTime, FixedOffset, TimeDelta};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 use study_base::text::{ParticipantId, QuestionId};
-use study_core::outcome::{Entry, Event, FormId, Moment, Playback};
-use study_core::protocol::fingerprint::Fingerprints;
-use study_core::protocol::*;
-use study_core::session::{Claim, Config, Effect, Ending, Input, Screen, Session, View};
+use study_plan::protocol::fingerprint::Fingerprints;
+use study_plan::protocol::*;
+use study_session::outcome::{Entry, Event, FormId, Moment, Playback};
+use study_session::session::{Claim, Config, Effect, Ending, Input, Screen, Session, View};
 
 /// What the device of the tests does when it is asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -324,7 +324,7 @@ impl Rig {
                     closed.remove(trial);
                 }
                 Event::Reopened {
-                    choice: Some(study_core::outcome::Choice::RestartBlock),
+                    choice: Some(study_session::outcome::Choice::RestartBlock),
                     queue,
                     ..
                 } => closed.retain(|trial, _| !queue.contains(trial)),
@@ -354,12 +354,12 @@ impl Rig {
         let Screen::Form { questions, .. } = self.view().screen else {
             return Vec::new();
         };
-        let answer = |q: &Question| match &q.kind {
-            QuestionKind::Rating { .. } => Answer::Rating(4),
-            QuestionKind::Slider { from, .. } => Answer::Number(*from),
-            QuestionKind::Number { .. } => Answer::Number(21.5),
-            QuestionKind::Choice { options, .. } => Answer::Choice(options[..1].to_vec()),
-            QuestionKind::Text => Answer::Text("words".to_owned()),
+        let answer = |q: &Question| match q.kind.control() {
+            Control::Boxes { .. } => Answer::Rating(4),
+            Control::Track { from, .. } => Answer::Number(from),
+            Control::Digits { .. } => Answer::Number(21.5),
+            Control::List { options, .. } => Answer::Choice(options[..1].to_vec()),
+            Control::Text => Answer::Text("words".to_owned()),
         };
         questions
             .iter()
@@ -381,7 +381,7 @@ impl Rig {
         match self.view().screen {
             Screen::Who { .. } => self.identify(),
             Screen::ResumeChoice { .. } => {
-                self.send(Input::Resume(study_core::outcome::Choice::Continue))
+                self.send(Input::Resume(study_session::outcome::Choice::Continue))
             }
             Screen::Consent { .. } => self.send(Input::Consent(true)),
             Screen::Form { .. } => self.answer_page(),

@@ -2,8 +2,8 @@
 
 use super::rig::{DeviceMood, Rig, StoreMood, name};
 use super::studies::{plain, rich};
-use study_core::outcome::{Event, Failure};
-use study_core::session::{Effect, Ending, Input, Screen};
+use study_session::outcome::{Event, Failure};
+use study_session::session::{Effect, Ending, Input, Screen};
 
 fn screen(rig: &Rig) -> &'static str {
     name(&rig.view().screen)

@@ -3,7 +3,7 @@
 use crate::designs::design;
 use std::collections::BTreeMap;
 use study_base::text::{ModelId, QuestionId};
-use study_core::protocol::*;
+use study_plan::protocol::*;
 
 /// Model ids, files and VAFs that no sentence contains by accident.
 pub(crate) const MODELS: [&str; 4] = ["XQZ-7", "KJW-3", "VVB-9", "ZZQ-2"];
@@ -23,16 +23,16 @@ pub(crate) fn qid(id: &str) -> QuestionId {
 }
 
 pub(crate) fn rating(id: &str) -> Question {
-    let kind = QuestionKind::Rating {
+    let kind = QuestionKind::Rating(kinds::Rating {
         from: 1,
         to: 7,
         labels: BTreeMap::new(),
-    };
+    });
     question(id, kind, true)
 }
 
 pub(crate) fn text(id: &str) -> Question {
-    question(id, QuestionKind::Text, false)
+    question(id, QuestionKind::Text(kinds::Text), false)
 }
 
 /// Three realizations, twice each, one question with a comment.
@@ -81,12 +81,12 @@ pub(crate) fn rich() -> Protocol {
     protocol.trial.reference_min_s = 2.0;
     protocol.trial.minimum_strokes = 3;
     protocol.questions.push(rating("crispness"));
-    let number = QuestionKind::Number {
+    let number = QuestionKind::Number(kinds::Number {
         unit: None,
         min: Some(0.0),
         max: None,
         above: None,
-    };
+    });
     protocol.setup = vec![question("temperature", number, true), text("rig")];
     protocol.intake = vec![rating("experience"), rating("fatigue")];
     protocol.outro = vec![text("strategy"), rating("effort")];

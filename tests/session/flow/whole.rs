@@ -2,10 +2,10 @@
 
 use super::rig::{Rig, start};
 use super::studies::{MODELS, plain, rating, rich};
-use study_core::outcome::{Author, Event, FormId, State};
-use study_core::protocol::{Breaks, Entry, Seat};
-use study_core::session::view::{Banner, DeviceState, MessageKind, Telemetry};
-use study_core::session::{Config, Effect, Ending, Input, Screen};
+use study_plan::protocol::{Breaks, Entry, Seat};
+use study_session::outcome::{Author, Event, FormId, State};
+use study_session::session::view::{Banner, DeviceState, MessageKind, Telemetry};
+use study_session::session::{Config, Effect, Ending, Input, Screen};
 
 #[test]
 fn a_plain_session_is_prompt_play_rate_six_times() {
@@ -209,7 +209,7 @@ fn a_bad_participant_id_stays_on_the_first_screen() {
 
 #[test]
 fn a_refused_claim_comes_back_with_its_reason() {
-    let (mut session, _) = study_core::session::Session::new(
+    let (mut session, _) = study_session::session::Session::new(
         std::sync::Arc::new(plain()),
         None,
         Config::default(),
@@ -372,7 +372,7 @@ fn the_simulated_rater_alone_learns_what_is_played() {
 fn without_an_order_the_claim_is_given_back() {
     let mut protocol = plain();
     for model in &mut protocol.models {
-        model.role = study_core::protocol::Role::Practice;
+        model.role = study_plan::protocol::Role::Practice;
     }
     let mut rig = Rig::new(protocol);
     rig.identify();

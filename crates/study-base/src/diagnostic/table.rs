@@ -340,6 +340,8 @@ impl<'d, 't> Value<'d, 't> {
             DeValue::String(_) => "text",
             DeValue::Integer(_) if self.whole().is_none() => "one beyond 64 bits",
             DeValue::Integer(_) => "a whole number",
+            // A number in place of a whole one says itself what is wrong with it.
+            DeValue::Float(number) if wanted.starts_with("a whole number") => number.as_str(),
             DeValue::Float(_) => "a number",
             DeValue::Boolean(_) => "true or false",
             DeValue::Datetime(_) => "a date",

@@ -77,6 +77,13 @@ impl Banded {
         self.lower[at] += value;
     }
 
+    /// Adds `scale` times a matrix of the same shape.
+    pub(super) fn add_scaled(&mut self, other: &Self, scale: f64) {
+        for (sum, one) in self.lower.iter_mut().zip(&other.lower) {
+            *sum += scale * one;
+        }
+    }
+
     /// The product A x.
     pub(super) fn times(&self, x: &[f64]) -> Vec<f64> {
         let mut product = vec![0.0; self.n];

@@ -27,7 +27,7 @@ use super::method::{Ewls, Sort, Start, Terms};
 use super::samples::{Samples, Theta, initial_covariance};
 
 /// One estimate of θ per sample, in the order of `samples` whatever the order of the
-/// recursion. λ has to be in (0, 1]; `backward` says that these samples travelled
+/// recursion. λ has to be in (0, 1]; `backward` says that these samples traveled
 /// towards lower x.
 pub fn estimate(samples: &Samples, options: &Ewls, backward: bool) -> Vec<Theta> {
     let order = match options.sort {

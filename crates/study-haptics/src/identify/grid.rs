@@ -148,9 +148,15 @@ fn run_steps_on(
             });
         }
     }
-    let identified = identify(processor, training, &plan.methods, &tables, lookup, step)?;
-    let methods: Vec<Method> = plan
-        .methods
+    let (carried, left_out): (Vec<Method>, Vec<Vec<Warning>>) =
+        (plan.methods.iter().map(|method| training.carried(*method))).unzip();
+    let mut identified = identify(processor, training, &carried, &tables, lookup, step)?;
+    for (tables, left_out) in identified.iter_mut().zip(left_out) {
+        for table in tables {
+            table.warnings.extend(left_out.clone());
+        }
+    }
+    let methods: Vec<Method> = carried
         .iter()
         .zip(&identified)
         .flat_map(|(method, tables)| vec![*method; tables.len()])

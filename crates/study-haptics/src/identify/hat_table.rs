@@ -20,7 +20,7 @@ const BELOW_TABLE: [f64; 2] = [0.002, 0.1];
 const BELOW_FRICTION: [f64; 2] = [0.0005, 0.01];
 /// Ratio of one δ of the scan to the one before.
 const STEP: f64 = std::f64::consts::SQRT_2;
-/// Golden sections of the neighbourhood of the best, to 1 % of it.
+/// Golden sections of the neighborhood of the best, to 1 % of it.
 const GOLDEN_STEPS: usize = 10;
 /// A direction state that changes over fewer encoder counts follows their noise.
 const LEAST_COUNTS: f64 = 20.0;
@@ -197,7 +197,7 @@ impl Training<'_> {
         while least(&tried) == Some(0) && series(below) >= at_least(floor) {
             let next = attempt(series(below))?;
             let falls = next.1 < (1.0 - share) * tried[0].1;
-            // one that is much worse ends the neighbourhood of the best
+            // one that is much worse ends the neighborhood of the best
             if falls || next.1 > TOLERANCE * tried[0].1 {
                 tried.insert(0, next);
             }
@@ -209,7 +209,7 @@ impl Training<'_> {
         let rms_n = |tried: &[(f64, f64, Identified)], i: usize| tried.get(i).map(|t| t.1);
         let best = least(&tried).ok_or(IdentifyError::Undetermined)?;
         let ends_mm = [tried[0].0, tried[tried.len() - 1].0];
-        // the golden section of the neighbourhood of the best, in log δ
+        // the golden section of the neighborhood of the best, in log δ
         let [mut low, mut high] =
             [best.saturating_sub(1), (best + 1).min(tried.len() - 1)].map(|i| tried[i].0.ln());
         let golden = 0.5 * (5.0_f64.sqrt() - 1.0);

@@ -79,7 +79,7 @@ pub struct Attempt {
 /// An identified mechanism.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fitted {
-    /// Its parameters.
+    /// Parameters of the mechanism.
     pub mechanism: Mechanism,
     /// Standard error of each scalar, in the order of
     /// [`Scalars::to_array`](study_wire::mechanism::Scalars::to_array); `None` at a bound or

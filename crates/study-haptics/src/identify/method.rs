@@ -68,6 +68,18 @@ impl Method {
         }
     }
 
+    /// The terms, of a method that has a choice of them.
+    pub(super) fn terms_mut(&mut self) -> Option<&mut Terms> {
+        match self {
+            Self::Ewls(Ewls { terms, .. })
+            | Self::TwoSided(TwoSided { terms, .. })
+            | Self::Hat(Hat { terms, .. })
+            | Self::Passive(Passive { terms, .. })
+            | Self::Friction(Friction { terms, .. }) => Some(terms),
+            Self::Mechanism(_) | Self::Static | Self::Segments(_) | Self::Spring => None,
+        }
+    }
+
     /// Checks the options.
     ///
     /// # Errors
@@ -154,7 +166,7 @@ impl Ewls {
             start: Start::Cold,
             sort: Sort::Ascending,
             bounded: false,
-            terms: Terms::default(),
+            terms: Terms::ALL,
         }
     }
 }
@@ -277,7 +289,7 @@ pub struct Passive {
     pub ridge_damping: f64,
     /// Which of m and b the table has.
     pub terms: Terms,
-    /// Whether large errors count by their size and not by its square (Huber 1964).
+    /// Whether outliers have limited influence: Huber's (1964) weights with k = 1.345.
     pub huber: bool,
 }
 
@@ -295,6 +307,12 @@ impl Default for Passive {
 }
 
 /// Which terms are identified beside the force by position; the others are 0.
+///
+/// ```
+/// use study_haptics::identify::method::Terms;
+/// // what the user asked for is identified, whatever the recordings carry
+/// assert!(Terms::default().only_carried && !Terms::ALL.only_carried);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Terms {
     /// The mass.
@@ -303,20 +321,30 @@ pub struct Terms {
     pub b: bool,
     /// The stiffness, in the methods that estimate one.
     pub k: bool,
+    /// Whether m and b are left out where the recordings do not carry them: see
+    /// [`evidence`](super::evidence).
+    pub only_carried: bool,
 }
 
 impl Default for Terms {
-    /// All.
+    /// All that the recordings carry.
     fn default() -> Self {
         Self {
-            m: true,
-            b: true,
-            k: true,
+            only_carried: true,
+            ..Self::ALL
         }
     }
 }
 
 impl Terms {
+    /// All, whatever the recordings carry.
+    pub const ALL: Self = Self {
+        m: true,
+        b: true,
+        k: true,
+        only_carried: false,
+    };
+
     /// Whether each entry of [`Theta`](super::Theta) is identified.
     pub(super) fn kept(self) -> [bool; 4] {
         [self.m, self.b, self.k, true]

@@ -1,5 +1,6 @@
 //! Errors of identification and warnings about its results.
 
+use super::evidence::Evidence;
 use super::resample::MAX_NODES;
 use super::samples::Theta;
 /// Number of samples after which an estimate rests on ten samples per parameter.
@@ -53,7 +54,7 @@ pub enum IdentifyError {
     Diverged { lambda: f64 },
 }
 
-/// Why nodes were interpolated between their neighbours.
+/// Why nodes were interpolated between their neighbors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Cause {
     /// There are no samples around them.
@@ -105,6 +106,9 @@ pub enum Warning {
         error: Option<f64>,
         excitation: &'static str,
     },
+    /// The recordings do not carry this term.
+    #[error("{0}; --terms overrides this")]
+    LeftOut(Evidence),
     #[error("the stiffness of the spring is negative: {k_n_per_mm:.4} N/mm")]
     NegativeSpring { k_n_per_mm: f64 },
 }

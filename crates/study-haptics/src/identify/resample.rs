@@ -58,7 +58,7 @@ pub fn nodes(low: f64, high: f64, dx_mm: f64) -> Vec<f64> {
 pub struct Resampled {
     /// One per node.
     pub theta: Vec<Theta>,
-    /// Number of nodes interpolated between their neighbours for want of samples.
+    /// Number of nodes interpolated between their neighbors for want of samples.
     pub filled: usize,
 }
 
@@ -152,7 +152,7 @@ fn means(
     })
 }
 
-/// Interpolates nodes without a value between their neighbours; `None` if no node has
+/// Interpolates nodes without a value between their neighbors; `None` if no node has
 /// a value.
 pub(super) fn filled(nodes: &[f64], own: &[Option<Theta>]) -> Option<Resampled> {
     let (positions, values): (Vec<f64>, Vec<Theta>) = nodes
@@ -228,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_bin_is_filled_from_its_neighbours_and_counted() {
+    fn an_empty_bin_is_filled_from_its_neighbors_and_counted() {
         let x = [1.0, 4.0];
         let values = [theta(10.0), theta(40.0)];
         let at = bin(&x, &values, &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0], 1.0);

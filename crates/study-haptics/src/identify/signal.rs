@@ -168,7 +168,7 @@ pub fn difference(x_mm: &[f64], step_s: f64) -> Vec<f64> {
         .collect()
 }
 
-/// The acceleration by second central differences, at the ends that of the neighbour,
+/// The acceleration by second central differences, at the ends that of the neighbor,
 /// m/s².
 pub fn second_difference(x_mm: &[f64], step_s: f64) -> Vec<f64> {
     if x_mm.len() < 3 {

@@ -23,7 +23,7 @@ const TRICUBE_SUPPORT: f64 = 3.0;
 pub(super) const MIN_WEIGHT: f64 = 8.0;
 
 /// θ at the nodes from the samples of one direction, with weights of width `l_mm`.
-/// Nodes with too few samples around them are interpolated between their neighbours;
+/// Nodes with too few samples around them are interpolated between their neighbors;
 /// `None` if all nodes have too few.
 pub fn at_nodes(
     samples: &Samples,
@@ -172,7 +172,7 @@ fn inverse(r: &[[f64; 4]; 4]) -> Option<[[f64; 4]; 4]> {
 }
 
 /// Sums with exponential weights at each node: one pass up and one down, each node's
-/// sums following from its neighbour's.
+/// sums following from its neighbor's.
 fn exponential(samples: &Samples, nodes: &[f64], l_mm: f64) -> Vec<Sums> {
     let mut around: Vec<Sums> = Vec::with_capacity(nodes.len());
     let mut sums = Sums::default();

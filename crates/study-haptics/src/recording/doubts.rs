@@ -4,12 +4,12 @@
 use super::differences::{acceleration, velocity};
 use super::{Recording, Warning, range};
 
-/// A sample is a spike if it differs from the median of its neighbourhood by more than this
+/// A sample is a spike if it differs from the median of its neighborhood by more than this
 /// share of the range that most samples cover …
 const SPIKE_SHARE: f64 = 0.2;
 /// … and by this many times what is usual.
 const SPIKE_RATIO: f64 = 50.0;
-/// Samples on either side of a sample in its neighbourhood.
+/// Samples on either side of a sample in its neighborhood.
 const REACH: usize = 3;
 /// So many samples in a row at the highest or lowest value are saturation; a smooth peak has
 /// fewer that are equal.
@@ -20,7 +20,7 @@ const COARSE: f64 = 0.2;
 /// Less energy per path than this share of the range of the force may be noise.
 const ENERGY_SHARE: f64 = 0.005;
 
-/// The samples of a column that differ from all their neighbours as no motion does.
+/// The samples of a column that differ from all their neighbors as no motion does.
 pub(super) fn spikes(values: &[f64]) -> Vec<usize> {
     if values.len() < 20 * REACH {
         return Vec::new();

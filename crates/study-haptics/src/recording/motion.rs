@@ -5,7 +5,7 @@ use super::rows::Rows;
 use super::swapped::swapped;
 use super::{JITTER, Recording, RecordingError, RecordingFault, Warning, range};
 
-/// A smaller stroke, in mm, must have been written in metres.
+/// A smaller stroke, in mm, must have been written in meters.
 const MIN_STROKE_MM: f64 = 0.1;
 /// Number of intervals from which the median one is estimated.
 const INTERVALS: usize = 4096;
@@ -28,7 +28,7 @@ pub(super) fn complete(name: String, rows: Rows) -> Result<Recording, RecordingE
     let [low, high] = range(&x_mm);
     let stroke_mm = high - low;
     if stroke_mm < MIN_STROKE_MM {
-        return refuse(RecordingFault::Metres { stroke_mm });
+        return refuse(RecordingFault::Meters { stroke_mm });
     }
     let mut warnings: Vec<Warning> = gaps(&t_s).into_iter().collect();
     warnings.extend(rows.separator.map(Warning::Separated));

@@ -8,8 +8,8 @@
 
 use super::RecordingFault;
 use super::names::{COLUMNS, Names};
-use sha2::{Digest as _, Sha256};
 use std::io::{BufRead, Read as _};
+use study_base::hex::Digest;
 use study_base::text::Untrusted;
 
 /// Least number of rows: second differences need three.
@@ -195,7 +195,7 @@ struct Lines<R> {
     input: R,
     line: Vec<u8>,
     number: u64,
-    hash: Sha256,
+    hash: Digest,
 }
 
 impl<R: BufRead> Lines<R> {
@@ -204,7 +204,7 @@ impl<R: BufRead> Lines<R> {
             input,
             line: Vec::new(),
             number: 0,
-            hash: Sha256::new(),
+            hash: Digest::default(),
         }
     }
 
@@ -235,7 +235,6 @@ impl<R: BufRead> Lines<R> {
     }
 
     fn sha256(self) -> String {
-        let digest = self.hash.finalize();
-        digest.iter().map(|byte| format!("{byte:02x}")).collect()
+        self.hash.finish()
     }
 }

@@ -10,7 +10,7 @@
 //!   function of the position, although the same detent force occurs at several
 //!   positions;
 //! * the force is one-sided, like a position counted from the end of the stroke, and
-//!   the position is centred on zero, like the force of a back-and-forth motion.
+//!   the position is centered on zero, like the force of a back-and-forth motion.
 
 use super::{Warning, mean_and_variance, range};
 
@@ -28,8 +28,8 @@ const MIN_UNEXPLAINED: f64 = 0.3;
 /// … and its least ratio to the share of the position's variance that the force does
 /// not explain.
 const MIN_RATIO: f64 = 4.0;
-/// Distance of the centre of a range from zero, in half ranges: a column above the first
-/// is one-sided, a column below the second is centred.
+/// Distance of the center of a range from zero, in half ranges: a column above the first
+/// is one-sided, a column below the second is centered.
 const ONE_SIDED: f64 = 0.9;
 const CENTRED: f64 = 0.4;
 
@@ -54,7 +54,7 @@ pub(super) fn swapped(t_s: &[f64], x_mm: &[f64], f_n: &[f64]) -> Option<Warning>
     })
 }
 
-/// Distance of the centre of the range from zero, in half ranges.
+/// Distance of the center of the range from zero, in half ranges.
 fn offset(values: &[f64]) -> f64 {
     let [low, high] = range(values);
     ((low + high) / (high - low)).abs()

@@ -96,7 +96,7 @@ pub struct Prbs {
 /// Periodic moves from level to level at constant speed, with a rest at each level.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Steps {
-    /// Deviations from the offset, mm; at least two, neighbours differ.
+    /// Deviations from the offset, mm; at least two, neighbors differ.
     pub levels_mm: Vec<f64>,
     /// Speed of the moves, mm/s.
     pub speed_mm_s: f64,

@@ -38,12 +38,12 @@ pub fn one_way<R: AsRef<[f64]>>(groups: &[R]) -> Option<OneWay> {
         terms.push((n, mean, weight));
     }
     let all: f64 = terms.iter().map(|t| t.2).sum();
-    let centre = terms.iter().map(|(_, mean, w)| w * mean).sum::<f64>() / all;
+    let center = terms.iter().map(|(_, mean, w)| w * mean).sum::<f64>() / all;
     let h: f64 = (terms.iter())
         .map(|(n, _, w)| (1.0 - w / all).powi(2) / (n - 1.0))
         .sum();
     let between: f64 = (terms.iter())
-        .map(|(_, mean, w)| w * (mean - centre).powi(2))
+        .map(|(_, mean, w)| w * (mean - center).powi(2))
         .sum();
     let (df1, df2) = (k - 1.0, (k * k - 1.0) / (3.0 * h));
     let f = finite(between / df1 / (1.0 + 2.0 * (k - 2.0) * h / (k * k - 1.0)))?;

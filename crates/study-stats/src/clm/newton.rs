@@ -49,7 +49,7 @@ const SMALLEST_GAIN: f64 = 1e-9;
 /// that makes the matrix positive definite, and is halved until the value does
 /// not decrease. `evaluate` is `None` if the parameters are not admissible. The last
 /// step, once the predicted gain ½gᵀδ is small, squares the remaining error.
-pub(crate) fn maximise(
+pub(crate) fn maximize(
     start: Vec<f64>,
     mut evaluate: impl FnMut(&[f64]) -> Option<Evaluation>,
 ) -> Option<Maximum> {

@@ -1,7 +1,7 @@
 //! Whether the odds are proportional: one coefficient for all thresholds, or one each.
 
 use super::counts::CategoryCounts;
-use super::newton::{Evaluation, maximise};
+use super::newton::{Evaluation, maximize};
 use super::{ClmFit, logistic, softplus};
 use crate::distribution::chi2_upper;
 
@@ -32,7 +32,7 @@ pub fn proportional_odds(table: &CategoryCounts, fit: &ClmFit) -> Option<Proport
     }
     let mut start = fit.thresholds.clone();
     start.resize(2 * t, fit.beta[0]);
-    let found = maximise(start, |at| evaluate(table, at))?;
+    let found = maximize(start, |at| evaluate(table, at))?;
     let chi2 = (2.0 * (found.value - fit.loglik)).max(0.0);
     let df = t as f64 - 1.0;
     Some(ProportionalOdds {

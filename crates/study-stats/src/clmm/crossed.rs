@@ -19,7 +19,7 @@
 
 use super::{INFINITE_SD, SMALLEST_SD};
 use crate::clm::counts::CategoryCounts;
-use crate::clm::newton::{Evaluation, Maximum, maximise};
+use crate::clm::newton::{Evaluation, Maximum, maximize};
 use crate::clm::{ClmError, ClmFit, clm, fit_of, logistic, softplus};
 use crate::distribution::{chi2_upper, t_two_sided};
 use crate::matrix::{Cholesky, SymmetricMatrix, dot};
@@ -187,7 +187,7 @@ impl<'a> Model<'a> {
         for start in starts {
             self.modes.fill(0.0);
             self.curvature = None;
-            let found = maximise(start, |at| self.evaluate(at));
+            let found = maximize(start, |at| self.evaluate(at));
             if let Some(found) = found.and_then(|found| self.finished(found)) {
                 let far = found
                     .at

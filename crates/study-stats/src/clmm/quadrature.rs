@@ -41,11 +41,11 @@ pub(super) fn evaluate(
     let (mut residual, mut mean_residual) = (Vec::new(), Vec::new());
     let (mut score, mut mean) = (vec![0.0; size], vec![0.0; size]);
     for (terms, start) in table.by_subject().zip(modes) {
-        let centre = mode(terms, &a, precision, *start)?;
-        *start = centre;
+        let center = mode(terms, &a, precision, *start)?;
+        *start = center;
         let mut h = precision;
         for t in terms {
-            let f = logistic(a[t.place] - centre);
+            let f = logistic(a[t.place] - center);
             h += t.m * f * (1.0 - f);
         }
         let width = SQRT_2 / h.sqrt();
@@ -53,7 +53,7 @@ pub(super) fn evaluate(
         let successes: f64 = terms.iter().map(|t| t.n).sum();
         below_all.clear();
         for (share, node) in ln_share.iter_mut().zip(rule) {
-            let b = centre + width * node.z;
+            let b = center + width * node.z;
             let at_node = odds.at(terms, b, &mut below_all);
             *share = node.ln_weight - 0.5 * b * b * precision + linear - successes * b - at_node;
         }
@@ -69,7 +69,7 @@ pub(super) fn evaluate(
             if share < NEGLIGIBLE {
                 continue;
             }
-            let b = centre + width * node.z;
+            let b = center + width * node.z;
             residual.clear();
             let below = &below_all[r * terms.len()..];
             for (i, (t, &f)) in terms.iter().zip(below).enumerate() {

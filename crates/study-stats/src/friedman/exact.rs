@@ -18,7 +18,7 @@ const FIRST_ESTIMATE: f64 = 1e4;
 /// Most comparisons of a state with an order of the last row, about ten milliseconds.
 const MAX_COMPARED: usize = 4_000_000;
 
-/// P(Σ(Rⱼ − centre)² ≥ observed) over all orders within rows, of doubled ranks;
+/// P(Σ(Rⱼ − center)² ≥ observed) over all orders within rows, of doubled ranks;
 /// `None` above these limits, which depend on the size and ties of the table, not on the
 /// observed statistic.
 pub(super) fn upper_tail(ranks: &[Vec<i64>], observed: i64) -> Option<f64> {
@@ -194,7 +194,7 @@ impl States {
     }
 
     /// P(statistic ≥ observed) after one more row. With s and r relative to their
-    /// centres, |s + r|² = |s|² + |r|² + 2s·r, and s·r is largest if both have the same
+    /// centers, |s + r|² = |s|² + |r|² + 2s·r, and s·r is largest if both have the same
     /// order and smallest if the orders are reversed.
     fn upper_tail<const K: usize>(&self, last: &[i64; K], observed: i64, n: usize) -> f64 {
         let middle = K as i64 + 1;
@@ -229,8 +229,8 @@ mod tests {
     /// The p and the observed statistic by enumerating every arrangement.
     fn by_enumeration(ranks: &[Vec<i64>]) -> (f64, i64) {
         let k = ranks[0].len();
-        let centre = (ranks.len() * (k + 1)) as i64;
-        let size = |sums: &[i64]| sums.iter().map(|s| (s - centre).pow(2)).sum::<i64>();
+        let center = (ranks.len() * (k + 1)) as i64;
+        let size = |sums: &[i64]| sums.iter().map(|s| (s - center).pow(2)).sum::<i64>();
         let column = |j: usize| ranks.iter().map(|r| r[j]).sum::<i64>();
         let observed = size(&(0..k).map(column).collect::<Vec<_>>());
         // All permutations of positions, with equal ranks distinguished.

@@ -63,11 +63,11 @@ pub fn balanced_slope(
         all += *sum;
     }
     let grand = all / qf;
-    let centre = x.iter().sum::<f64>() / qf;
+    let center = x.iter().sum::<f64>() / qf;
     let (mut sxx, mut sxy, mut of_columns) = (0.0, 0.0, 0.0);
     for (x, mean) in x.iter().zip(&columns) {
-        sxx += (x - centre).powi(2);
-        sxy += (x - centre) * (mean - grand);
+        sxx += (x - center).powi(2);
+        sxy += (x - center) * (mean - grand);
         of_columns += (mean - grand).powi(2);
     }
     let (mut of_rows, mut of_cells) = (0.0, 0.0);

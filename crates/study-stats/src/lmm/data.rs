@@ -5,7 +5,7 @@
 //! a factor, at most U of them.
 
 use super::LmmError;
-use nalgebra::{DMatrix, SymmetricEigen};
+use crate::matrix::triangular;
 use std::collections::BTreeMap;
 
 /// The ratings of one subject of one realization (at one value of the covariate).
@@ -28,23 +28,23 @@ pub struct CellSummary {
 /// The fixed effects of a model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum FixedEffects {
-    /// One mean.
+    /// A mean that all ratings share.
     Intercept,
     /// An intercept and a slope of the covariate.
     Covariate {
         /// The value of the covariate at which the intercepts, fixed and random, are
         /// defined.
-        centre: f64,
+        center: f64,
     },
     /// A mean for each realization.
     Realizations,
 }
 
-/// A cell within a pattern, standardised.
+/// A cell within a pattern, standardized.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Unit {
     pub(super) realization: usize,
-    /// The covariate as given, and standardised.
+    /// The covariate as given, and standardized.
     pub(super) raw: f64,
     pub(super) x: f64,
     pub(super) n: f64,
@@ -61,7 +61,7 @@ pub(super) struct Pattern {
     pub(super) rows: Vec<Vec<f64>>,
 }
 
-/// Cells, standardised and aggregated, with the fixed effects of a model. At most 200
+/// Cells, standardized and aggregated, with the fixed effects of a model. At most 200
 /// realizations, and Σ patterns × realizations² at most 5·10⁷.
 #[derive(Debug, Clone)]
 pub struct LmmData {
@@ -73,12 +73,12 @@ pub struct LmmData {
     /// Number of ratings.
     pub(super) n: f64,
     pub(super) cells: usize,
-    /// Within-cell sum of squares, standardised.
+    /// Within-cell sum of squares, standardized.
     pub(super) within: f64,
     /// What was subtracted from the ratings, and what they were divided by.
-    pub(super) y_centre: f64,
+    pub(super) y_center: f64,
     pub(super) y_scale: f64,
-    /// What the centred covariate was divided by.
+    /// What the centered covariate was divided by.
     pub(super) x_scale: f64,
     /// Variance of the covariate over the ratings, with n.
     pub(super) x_variance: f64,
@@ -110,13 +110,13 @@ impl LmmData {
         let about = |f: &dyn Fn(&CellSummary) -> f64| -> f64 {
             cells.iter().map(|c| c.n as f64 * f(c)).sum::<f64>() / n
         };
-        let y_centre = about(&|c| c.mean);
+        let y_center = about(&|c| c.mean);
         let within: f64 = cells.iter().map(|c| c.within).sum();
-        let total = about(&|c| (c.mean - y_centre).powi(2)) + within / n;
-        if !(y_centre.is_finite() && total.is_finite()) {
+        let total = about(&|c| (c.mean - y_center).powi(2)) + within / n;
+        if !(y_center.is_finite() && total.is_finite()) {
             return Err(LmmError::NoData);
         }
-        if total <= 1e-24 * y_centre * y_centre || total < 1e-200 {
+        if total <= 1e-24 * y_center * y_center || total < 1e-200 {
             return Err(LmmError::ConstantRatings);
         }
         let mut table = Self {
@@ -126,7 +126,7 @@ impl LmmData {
             n,
             cells: cells.len(),
             within: within / total,
-            y_centre,
+            y_center,
             y_scale: total.sqrt(),
             x_scale: 1.0,
             x_variance: 0.0,
@@ -141,7 +141,8 @@ impl LmmData {
         if table.patterns.len().saturating_mul(width * width) > MAX_WORK {
             return Err(LmmError::TooLarge);
         }
-        table.patterns.iter_mut().for_each(compress);
+        let patterns = table.patterns.iter_mut();
+        patterns.for_each(|pattern| triangular(&mut pattern.rows));
         table.with_fixed_effects(fixed)
     }
 
@@ -152,26 +153,26 @@ impl LmmData {
     pub fn with_fixed_effects(&self, fixed: FixedEffects) -> Result<Self, LmmError> {
         let mut table = self.clone();
         table.fixed = fixed;
-        let (mut centre, mut scale, mut variance) = (0.0, 1.0, 0.0);
-        if let FixedEffects::Covariate { centre: at } = fixed {
-            centre = at;
+        let (mut center, mut scale, mut variance) = (0.0, 1.0, 0.0);
+        if let FixedEffects::Covariate { center: at } = fixed {
+            center = at;
             let about = |f: &dyn Fn(f64) -> f64| -> f64 {
                 let patterns = self.patterns.iter();
                 patterns
-                    .flat_map(|p| p.units.iter().map(|u| p.subjects * u.n * f(u.raw - centre)))
+                    .flat_map(|p| p.units.iter().map(|u| p.subjects * u.n * f(u.raw - center)))
                     .sum::<f64>()
                     / self.n
             };
             let mean = about(&|x| x);
             variance = about(&|x| (x - mean).powi(2));
             scale = about(&|x| x * x).sqrt();
-            let varies = variance > 1e-24 * (centre * centre + scale * scale) && variance > 1e-200;
-            if !(varies && scale.is_finite() && centre.is_finite()) {
+            let varies = variance > 1e-24 * (center * center + scale * scale) && variance > 1e-200;
+            if !(varies && scale.is_finite() && center.is_finite()) {
                 return Err(LmmError::ConstantCovariate);
             }
         }
         for unit in table.patterns.iter_mut().flat_map(|p| &mut p.units) {
-            unit.x = (unit.raw - centre) / scale;
+            unit.x = (unit.raw - center) / scale;
         }
         (table.x_scale, table.x_variance) = (scale, variance);
         Ok(table)
@@ -215,7 +216,7 @@ impl LmmData {
             pattern.subjects += 1.0;
             let row: Vec<f64> = own
                 .iter()
-                .map(|c| (c.mean - self.y_centre) / self.y_scale)
+                .map(|c| (c.mean - self.y_center) / self.y_scale)
                 .collect();
             for (sum, y) in pattern.sum.iter_mut().zip(&row) {
                 *sum += y;
@@ -223,7 +224,7 @@ impl LmmData {
             pattern.rows.push(row);
             // Bounds the memory of a growing pattern.
             if pattern.rows.len() >= 1024 + 4 * pattern.units.len() {
-                compress(pattern);
+                triangular(&mut pattern.rows);
             }
         }
     }
@@ -298,34 +299,4 @@ impl LmmData {
     pub fn covariate_variance(&self) -> f64 {
         self.x_variance * self.n / (self.n - 1.0)
     }
-}
-
-/// Replaces the rows by the eigenvalue factor of Σyy' = QΛQ': the rows √λ·q'.
-fn compress(pattern: &mut Pattern) {
-    let width = pattern.units.len();
-    if pattern.rows.len() <= width {
-        return;
-    }
-    let mut products = DMatrix::<f64>::zeros(width, width);
-    for row in &pattern.rows {
-        for i in 0..width {
-            for j in 0..=i {
-                products[(i, j)] += row[i] * row[j];
-            }
-        }
-    }
-    products.fill_upper_triangle_with_lower_triangle();
-    let eigen = SymmetricEigen::new(products);
-    pattern.rows = (0..width)
-        .filter(|&k| eigen.eigenvalues[k] > 0.0)
-        .map(|k| {
-            let root = eigen.eigenvalues[k].sqrt();
-            eigen
-                .eigenvectors
-                .column(k)
-                .iter()
-                .map(|v| v * root)
-                .collect()
-        })
-        .collect();
 }

@@ -1,6 +1,6 @@
 //! Derivatives by central differences of fourth order.
 
-use nalgebra::{DMatrix, DVector};
+use crate::matrix::Matrix;
 
 /// The step for coordinates up to 1; for larger ones it is relative.
 const STEP: f64 = 0.01;
@@ -11,17 +11,20 @@ pub(super) fn step(at: f64) -> f64 {
 
 /// ∂f/∂xᵢ of a vector-valued f: (8(f₁ − f₋₁) − (f₂ − f₋₂))/12h.
 pub(super) fn first(
-    f: &dyn Fn(&[f64]) -> Option<DVector<f64>>,
+    f: &dyn Fn(&[f64]) -> Option<Vec<f64>>,
     at: &[f64],
     i: usize,
-) -> Option<DVector<f64>> {
+) -> Option<Vec<f64>> {
     let h = step(at[i]);
     let moved = |k: f64| {
         let mut x = at.to_vec();
         x[i] += k * h;
         f(&x)
     };
-    Some(((moved(1.0)? - moved(-1.0)?) * 8.0 - (moved(2.0)? - moved(-2.0)?)) / (12.0 * h))
+    let (near, far) = ([moved(1.0)?, moved(-1.0)?], [moved(2.0)?, moved(-2.0)?]);
+    let difference = |k: usize| 8.0 * (near[0][k] - near[1][k]) - (far[0][k] - far[1][k]);
+    let elements = 0..near[0].len();
+    Some(elements.map(|k| difference(k) / (12.0 * h)).collect())
 }
 
 /// Gradient over some coordinates.
@@ -29,10 +32,9 @@ pub(super) fn gradient(
     f: &dyn Fn(&[f64]) -> Option<f64>,
     at: &[f64],
     over: &[usize],
-) -> Option<DVector<f64>> {
-    let f = |x: &[f64]| Some(DVector::from_element(1, f(x)?));
-    let all: Option<Vec<f64>> = (over.iter()).map(|&i| Some(first(&f, at, i)?[0])).collect();
-    Some(DVector::from_vec(all?))
+) -> Option<Vec<f64>> {
+    let f = |x: &[f64]| Some(vec![f(x)?]);
+    over.iter().map(|&i| Some(first(&f, at, i)?[0])).collect()
 }
 
 /// Gradient and Hessian over some coordinates.
@@ -40,9 +42,9 @@ pub(super) fn second(
     f: &dyn Fn(&[f64]) -> Option<f64>,
     at: &[f64],
     over: &[usize],
-) -> Option<(DVector<f64>, DMatrix<f64>)> {
+) -> Option<(Vec<f64>, Matrix)> {
     let d = over.len();
-    let (mut gradient, mut hessian) = (DVector::zeros(d), DMatrix::zeros(d, d));
+    let (mut gradient, mut hessian) = (vec![0.0; d], Matrix::zeros(d, d));
     let middle = f(at)?;
     let moved = |moves: &[(usize, f64)]| {
         let mut x = at.to_vec();

@@ -11,7 +11,7 @@ use super::start::Coordinates;
 use super::{LmmError, RandomEffects};
 use std::f64::consts::PI;
 
-/// The likelihood that is maximised.
+/// The likelihood that is maximized.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Criterion {
     /// The likelihood: for likelihood-ratio tests of fixed effects.
@@ -47,7 +47,7 @@ pub struct LmmFit<'a> {
     /// Coordinates off the boundary.
     pub(super) free: Vec<usize>,
     pub(super) profile: Profile,
-    /// σ², standardised.
+    /// σ², standardized.
     pub(super) sigma2: f64,
     /// −2 log (restricted) likelihood.
     pub deviance: f64,
@@ -97,7 +97,7 @@ fn identified(table: &LmmData, random: RandomEffects) -> Result<(), LmmError> {
         return Err(LmmError::NoRepetition);
     }
     // The residual with every random effect taken as a fixed one: for large γ the
-    // penalised residual is that + c/γ, and two values of γ eliminate c.
+    // penalized residual is that + c/γ, and two values of γ eliminate c.
     let rss = |all: f64| {
         let ratios = Ratios {
             intercept: all,
@@ -193,11 +193,11 @@ impl LmmFit<'_> {
     pub(super) fn units(&self) -> Vec<(f64, f64)> {
         let t = self.table;
         match t.fixed {
-            FixedEffects::Intercept => vec![(t.y_scale, t.y_centre)],
+            FixedEffects::Intercept => vec![(t.y_scale, t.y_center)],
             FixedEffects::Covariate { .. } => {
-                vec![(t.y_scale, t.y_centre), (t.y_scale / t.x_scale, 0.0)]
+                vec![(t.y_scale, t.y_center), (t.y_scale / t.x_scale, 0.0)]
             }
-            FixedEffects::Realizations => vec![(t.y_scale, t.y_centre); t.realizations.len()],
+            FixedEffects::Realizations => vec![(t.y_scale, t.y_center); t.realizations.len()],
         }
     }
 

@@ -20,17 +20,17 @@ use super::fit::{Criterion, LmmFit};
 use super::satterthwaite::{ContrastF, ContrastT, contrast, quadratic};
 use crate::distribution::f_upper;
 use crate::finite;
-use nalgebra::{Cholesky, DMatrix, Matrix2};
+use crate::matrix::{Cholesky, Matrix, SymmetricMatrix, dot};
 
 /// The quantities of the model that no contrast changes, with σ² = 1: it cancels in F and
 /// its degrees of freedom.
 struct Adjustment {
-    phi: DMatrix<f64>,
+    phi: Matrix,
     /// Φ_A.
-    adjusted: DMatrix<f64>,
+    adjusted: Matrix,
     /// ΦPᵢΦ.
-    sandwich: [DMatrix<f64>; 2],
-    w: Matrix2<f64>,
+    sandwich: [Matrix; 2],
+    w: [[f64; 2]; 2],
 }
 
 /// The two variances cannot be told apart if the correlation of their estimates is within
@@ -45,7 +45,7 @@ impl Adjustment {
             && fit.criterion == Criterion::Reml;
         let p = Some(table.columns()).filter(|_| wanted)?;
         let gamma = fit.coordinates.ratios(&fit.at).intercept;
-        let zero = || DMatrix::<f64>::zeros(p, p);
+        let zero = || Matrix::zeros(p, p);
         let mut information = zero();
         let mut p_of = [zero(), zero()];
         let mut q_of = [zero(), zero(), zero()];
@@ -75,24 +75,30 @@ impl Adjustment {
                 }
             }
         }
-        let phi = Cholesky::new(information)?.inverse();
+        let phi = inverse(&information)?;
         let phi_p = [&phi * &p_of[0], &phi * &p_of[1]];
         let both = |i: usize, j: usize| i + j;
-        let expected = Matrix2::from_fn(|i, j| {
-            traces[both(i, j)] - 2.0 * (&phi * &q_of[both(i, j)]).trace()
-                + (&phi_p[i] * &phi_p[j]).trace()
-        });
-        let scale = expected[(0, 0)] * expected[(1, 1)];
-        let separate = expected.determinant() > SEPARATE * scale;
-        let w = expected.try_inverse().filter(|_| separate)? * 2.0;
+        let expected = |i: usize, j: usize| {
+            traces[both(i, j)] - 2.0 * phi.trace_of_product(&q_of[both(i, j)])
+                + phi_p[i].trace_of_product(&phi_p[j])
+        };
+        let [first, mixed, second] = [expected(0, 0), expected(0, 1), expected(1, 1)];
+        let determinant = first * second - mixed * mixed;
+        let separate = determinant > SEPARATE * first * second;
+        let scale = Some(2.0 / determinant).filter(|_| separate)?;
+        let w = [
+            [second * scale, -mixed * scale],
+            [-mixed * scale, first * scale],
+        ];
         let mut inner = zero();
         for i in 0..2 {
             for j in 0..2 {
-                inner += (&q_of[both(i, j)] - &p_of[i] * &phi_p[j]) * w[(i, j)];
+                let excess = q_of[both(i, j)].clone() - &(&p_of[i] * &phi_p[j]);
+                inner = inner + &(excess * w[i][j]);
             }
         }
         Some(Self {
-            adjusted: &phi + &phi * inner * &phi * 2.0,
+            adjusted: &phi * &inner * &phi * 2.0 + &phi,
             sandwich: phi_p.map(|phi_p| phi_p * &phi),
             phi,
             w,
@@ -102,11 +108,17 @@ impl Adjustment {
     /// The sum of Wᵢⱼ times `term` of i and j.
     fn weighted(&self, term: impl Fn(usize, usize) -> f64) -> f64 {
         let pairs = [(0, 0), (0, 1), (1, 0), (1, 1)];
-        pairs
-            .iter()
-            .map(|&(i, j)| self.w[(i, j)] * term(i, j))
-            .sum()
+        pairs.iter().map(|&(i, j)| self.w[i][j] * term(i, j)).sum()
     }
+}
+
+/// The Cholesky factor of a symmetric matrix; `None` unless it is positive definite.
+fn factor(a: &Matrix) -> Option<Cholesky> {
+    Cholesky::positive(&SymmetricMatrix::from_fn(a.rows(), |i, j| a[(i, j)]))
+}
+
+fn inverse(a: &Matrix) -> Option<Matrix> {
+    Some(factor(a)?.inverse())
 }
 
 /// Tests that all realizations have the same mean. `None` unless the model was fitted by
@@ -116,17 +128,18 @@ pub fn kenward_roger(fit: &LmmFit<'_>) -> Option<ContrastF> {
     let found = Adjustment::of(fit)?;
     let p = fit.table.columns();
     let q = p.checked_sub(1).filter(|q| *q > 0)?;
-    let l = DMatrix::from_fn(q, p, |i, j| {
+    let l = Matrix::from_fn(q, p, |i, j| {
         f64::from(i8::from(j == i + 1) - i8::from(j == 0))
     });
-    let theta = l.transpose() * Cholesky::new(&l * &found.phi * l.transpose())?.inverse() * &l;
+    let columns = l.transposed();
+    let theta = &columns * &inverse(&(&l * &found.phi * &columns))? * &l;
     let tpp = [0, 1].map(|i| &theta * &found.sandwich[i]);
     let a1 = found.weighted(|i, j| tpp[i].trace() * tpp[j].trace());
-    let a2 = found.weighted(|i, j| (&tpp[i] * &tpp[j]).trace());
+    let a2 = found.weighted(|i, j| tpp[i].trace_of_product(&tpp[j]));
     let (df2, lambda) = scaled(a1, a2, q as f64)?;
-    let values = &l * &fit.profile.beta;
-    let middle = Cholesky::new(&l * found.adjusted * l.transpose())?;
-    let wald = values.dot(&middle.solve(&values)) / fit.sigma2;
+    let values = l.times(&fit.profile.beta);
+    let middle = factor(&(&l * &found.adjusted * &columns))?;
+    let wald = dot(&values, &middle.solve(&values)) / fit.sigma2;
     let f = finite(lambda * wald / q as f64)?;
     Some(ContrastF {
         f,

@@ -10,7 +10,7 @@
 //! of them.
 
 use super::differences::{gradient, second};
-use nalgebra::{DVector, SymmetricEigen};
+use crate::matrix::{Matrix, SymmetricEigen, dot};
 
 /// The result of a search.
 #[derive(Debug, Clone)]
@@ -57,8 +57,8 @@ pub(super) fn minimize(
             .filter(|&i| !(bounded[i] && at[i] <= 0.0 && gradient[i] >= 0.0))
             .collect();
         let small = free.len();
-        let g = DVector::from_fn(small, |i, _| gradient[free[i]]);
-        let h = nalgebra::DMatrix::from_fn(small, small, |i, j| hessian[(free[i], free[j])]);
+        let g: Vec<f64> = free.iter().map(|&i| gradient[i]).collect();
+        let h = Matrix::from_fn(small, small, |i, j| hessian[(free[i], free[j])]);
         let Some((mut step, decrease)) = direction(&g, h) else {
             return Some(Minimum { at, value, free });
         };
@@ -85,7 +85,7 @@ pub(super) fn minimize(
             .map(|(&i, s)| s.abs() / at[i].abs().max(1.0))
             .fold(0.0, f64::max);
         if longest > REACH {
-            step *= REACH / longest;
+            step.iter_mut().for_each(|s| *s *= REACH / longest);
         }
         let mut moved = None;
         for halving in 0..MAX_HALVINGS {
@@ -121,25 +121,28 @@ fn inside(x: f64, bounded: bool) -> f64 {
 }
 
 /// The step and its predicted decrease; `None` without free coordinates.
-fn direction(g: &DVector<f64>, h: nalgebra::DMatrix<f64>) -> Option<(DVector<f64>, f64)> {
+fn direction(g: &[f64], h: Matrix) -> Option<(Vec<f64>, f64)> {
     if g.is_empty() {
         return None;
     }
     let eigen = SymmetricEigen::new(h);
-    let largest = eigen.eigenvalues.amax();
+    let largest = eigen.largest();
     let floor = (1e-9 * largest).max(1e-9);
-    let mut along = eigen.eigenvectors.tr_mul(g);
+    let mut step = vec![0.0; g.len()];
     let mut decrease = 0.0;
-    for (a, l) in along.iter_mut().zip(eigen.eigenvalues.iter()) {
-        if l.abs() < FLAT * largest && a.abs() < LEVEL {
-            *a = 0.0;
+    for (k, value) in eigen.values.iter().enumerate() {
+        let vector = eigen.vectors.row(k);
+        let slope = dot(vector, g);
+        if value.abs() < FLAT * largest && slope.abs() < LEVEL {
             continue;
         }
-        let size = l.abs().max(floor);
-        decrease += 0.5 * *a * *a / size;
-        *a /= -size;
+        let size = value.abs().max(floor);
+        decrease += 0.5 * slope * slope / size;
+        for (s, v) in step.iter_mut().zip(vector) {
+            *s -= v * slope / size;
+        }
     }
-    Some((&eigen.eigenvectors * along, decrease))
+    Some((step, decrease))
 }
 
 #[cfg(test)]

@@ -14,9 +14,9 @@
 
 use super::RandomEffects;
 use super::data::{FixedEffects, LmmData};
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use crate::matrix::{Cholesky, Matrix, SymmetricMatrix, dot};
 
-/// Variances relative to σ², on the standardised scales.
+/// Variances relative to σ², on the standardized scales.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Ratios {
     pub(super) intercept: f64,
@@ -33,15 +33,15 @@ pub(super) struct Profile {
     pub(super) log_det_z: f64,
     /// log|A|.
     pub(super) log_det_x: f64,
-    /// Penalised residual sum of squares.
+    /// Penalized residual sum of squares.
     pub(super) rss: f64,
-    pub(super) beta: DVector<f64>,
-    pub(super) factor: Cholesky<f64, Dyn>,
+    pub(super) beta: Vec<f64>,
+    pub(super) factor: Cholesky,
 }
 
 impl Profile {
     /// A⁻¹: the covariance of β over σ².
-    pub(super) fn inverse(&self) -> DMatrix<f64> {
+    pub(super) fn inverse(&self) -> Matrix {
         self.factor.inverse()
     }
 }
@@ -49,9 +49,8 @@ impl Profile {
 /// The sums [C, y]'M[C, y], with C the columns of the realizations (if random) and then
 /// those of X.
 struct Sums {
-    /// Lower triangle.
-    matrix: DMatrix<f64>,
-    y: DVector<f64>,
+    matrix: SymmetricMatrix,
+    y: Vec<f64>,
     yy: f64,
     log_det: f64,
 }
@@ -68,40 +67,38 @@ pub(super) fn profile(table: &LmmData, random: RandomEffects, ratios: &Ratios) -
     let mut sums = sums(table, random, ratios, levels)?;
     if levels > 0 && ratios.realization != 0.0 {
         let g = ratios.realization;
-        let mut inner = sums.matrix.view((0, 0), (levels, levels)).into_owned();
-        inner.fill_upper_triangle_with_lower_triangle();
-        inner *= g;
-        for i in 0..levels {
-            inner[(i, i)] += 1.0;
-        }
-        let factor = Cholesky::new(inner)?;
-        sums.log_det += log_det(&factor);
-        // The cross products of the realizations with X and, in the last column, y.
-        let mut cross = DMatrix::<f64>::zeros(levels, p + 1);
-        for m in 0..levels {
-            for j in 0..p {
-                cross[(m, j)] = sums.matrix[(levels + j, m)];
-            }
-            cross[(m, p)] = sums.y[m];
-        }
-        let mut solved = cross.clone();
-        factor.solve_mut(&mut solved);
-        let less = cross.transpose() * solved * g;
+        let inner = SymmetricMatrix::from_fn(levels, |i, j| {
+            g * sums.matrix.get(i, j) + f64::from(u8::from(i == j))
+        });
+        let factor = Cholesky::positive(&inner)?;
+        sums.log_det += factor.log_determinant();
+        // The cross products of the realizations with X and, last, with y, divided by L.
+        let cross = |j: usize| -> Vec<f64> {
+            let with_x = |m| sums.matrix.get(levels + j, m);
+            let mut cross = if j == p {
+                sums.y[..levels].to_vec()
+            } else {
+                (0..levels).map(with_x).collect()
+            };
+            factor.solve_lower(&mut cross);
+            cross
+        };
+        let solved: Vec<Vec<f64>> = (0..=p).map(cross).collect();
+        let less = |i: usize, j: usize| g * dot(&solved[i], &solved[j]);
         for i in 0..p {
             for j in 0..=i {
-                sums.matrix[(levels + i, levels + j)] -= less[(i, j)];
+                sums.matrix.add(levels + i, levels + j, -less(i, j));
             }
-            sums.y[levels + i] -= less[(i, p)];
+            sums.y[levels + i] -= less(i, p);
         }
-        sums.yy -= less[(p, p)];
+        sums.yy -= less(p, p);
     }
-    let mut a = sums.matrix.view((levels, levels), (p, p)).into_owned();
-    a.fill_upper_triangle_with_lower_triangle();
-    let b = sums.y.rows(levels, p).into_owned();
-    let factor = Cholesky::new(a)?;
-    let beta = factor.solve(&b);
-    let rss = sums.yy - beta.dot(&b) + table.within;
-    let log_det_x = log_det(&factor);
+    let a = SymmetricMatrix::from_fn(p, |i, j| sums.matrix.get(levels + i, levels + j));
+    let b = &sums.y[levels..];
+    let factor = Cholesky::positive(&a)?;
+    let beta = factor.solve(b);
+    let rss = sums.yy - dot(&beta, b) + table.within;
+    let log_det_x = factor.log_determinant();
     (rss.is_finite() && sums.log_det.is_finite() && log_det_x.is_finite()).then_some(Profile {
         log_det_z: sums.log_det,
         log_det_x,
@@ -111,21 +108,12 @@ pub(super) fn profile(table: &LmmData, random: RandomEffects, ratios: &Ratios) -
     })
 }
 
-fn log_det(factor: &Cholesky<f64, Dyn>) -> f64 {
-    2.0 * factor
-        .l_dirty()
-        .diagonal()
-        .iter()
-        .map(|d| d.ln())
-        .sum::<f64>()
-}
-
 /// `levels` is the number of columns of the realizations, 0 unless they are random.
 fn sums(table: &LmmData, random: RandomEffects, ratios: &Ratios, levels: usize) -> Option<Sums> {
     let width = levels + table.columns();
     let mut sums = Sums {
-        matrix: DMatrix::zeros(width, width),
-        y: DVector::zeros(width),
+        matrix: SymmetricMatrix::zero(width),
+        y: vec![0.0; width],
         yy: 0.0,
         log_det: 0.0,
     };
@@ -176,7 +164,7 @@ fn sums(table: &LmmData, random: RandomEffects, ratios: &Ratios, levels: usize) 
                 sums.y[i] += w * u * sum;
                 for &(j, v) in &entries[..=a] {
                     if v != 0.0 {
-                        sums.matrix[(i, j)] += k * w * u * v;
+                        sums.matrix.add(i, j, k * w * u * v);
                     }
                 }
             }
@@ -190,8 +178,9 @@ fn sums(table: &LmmData, random: RandomEffects, ratios: &Ratios, levels: usize) 
                 continue;
             }
             sums.y[i] -= left1 * sum1 + left2 * sum2;
-            for j in 0..=i {
-                sums.matrix[(i, j)] -= k * (left1 * one[j] + left2 * slope[j]);
+            let row = sums.matrix.row_mut(i).iter_mut();
+            for ((element, one), slope) in row.zip(&one).zip(&slope) {
+                *element -= k * (left1 * one + left2 * slope);
             }
         }
         for row in &pattern.rows {

@@ -13,7 +13,7 @@ use super::fit::{LmmFit, weight};
 use super::profile::profile;
 use crate::distribution::{f_upper, t_quantile, t_two_sided};
 use crate::finite;
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use crate::matrix::{Matrix, SymmetricEigen, dot};
 
 /// A t test of one contrast of the fixed effects.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,29 +46,26 @@ pub struct ContrastF {
     pub p: Option<f64>,
 }
 
-/// Covariance of the fixed effects, its derivatives, and H⁻¹, in standardised units.
+/// Covariance of the fixed effects, its derivatives, and H⁻¹, in standardized units.
 struct Uncertainty {
-    covariance: DMatrix<f64>,
+    covariance: Matrix,
     /// With respect to the free coordinates, then log σ².
-    derivatives: Vec<DMatrix<f64>>,
+    derivatives: Vec<Matrix>,
     /// H⁻¹ over the same coordinates.
-    inverse: DMatrix<f64>,
+    inverse: Matrix,
 }
 
 impl Uncertainty {
-    fn df(&self, l: &DVector<f64>) -> Option<f64> {
+    fn df(&self, l: &[f64]) -> Option<f64> {
         let f = quadratic(&self.covariance, l);
-        let g = DVector::from_iterator(
-            self.derivatives.len(),
-            self.derivatives.iter().map(|d| quadratic(d, l)),
-        );
-        let spread = g.dot(&(&self.inverse * &g));
+        let g: Vec<f64> = self.derivatives.iter().map(|d| quadratic(d, l)).collect();
+        let spread = dot(&g, &self.inverse.times(&g));
         finite(f * f / spread).filter(|df| spread > 0.0 && *df > 0.0)
     }
 }
 
 /// l'Al; a contrast has few elements that are not 0.
-pub(super) fn quadratic(a: &DMatrix<f64>, l: &DVector<f64>) -> f64 {
+pub(super) fn quadratic(a: &Matrix, l: &[f64]) -> f64 {
     let used: Vec<usize> = (0..l.len()).filter(|&i| l[i] != 0.0).collect();
     let row = |i: usize| l[i] * used.iter().map(|&j| a[(i, j)] * l[j]).sum::<f64>();
     used.iter().map(|&i| row(i)).sum()
@@ -104,15 +101,13 @@ impl LmmFit<'_> {
             .collect()
     }
 
-    /// The contrast, applied to standardised effects.
-    pub(super) fn scaled(&self, l: &[f64]) -> DVector<f64> {
-        DVector::from_iterator(
-            l.len(),
-            self.units().iter().zip(l).map(|((unit, _), l)| l * unit),
-        )
+    /// The contrast, applied to standardized effects.
+    pub(super) fn scaled(&self, l: &[f64]) -> Vec<f64> {
+        let units = self.units();
+        units.iter().zip(l).map(|((unit, _), l)| l * unit).collect()
     }
 
-    fn t_with(&self, l: &[f64], covariance: &DMatrix<f64>, u: Option<&Uncertainty>) -> ContrastT {
+    fn t_with(&self, l: &[f64], covariance: &Matrix, u: Option<&Uncertainty>) -> ContrastT {
         let scaled = self.scaled(l);
         let se = quadratic(covariance, &scaled).max(0.0).sqrt();
         contrast(self.estimate(l), se, u.and_then(|u| u.df(&scaled)))
@@ -126,18 +121,14 @@ impl LmmFit<'_> {
         let q = p.checked_sub(1).filter(|q| of_realizations && *q > 0)?;
         let l = sequential(&self.table.ratings_by_realization());
         let covariance = self.profile.inverse() * self.sigma2;
-        let eigen = SymmetricEigen::new(&l * covariance * l.transpose());
-        let rotated = eigen.eigenvectors.transpose() * l;
-        let values = &rotated * &self.profile.beta;
-        let f = values
-            .iter()
-            .zip(eigen.eigenvalues.iter())
-            .map(|(v, d)| v * v / d)
-            .sum::<f64>()
-            / q as f64;
+        let eigen = SymmetricEigen::new(&l * &covariance * &l.transposed());
+        let rotated = &eigen.vectors * &l;
+        let values = rotated.times(&self.profile.beta);
+        let squares = values.iter().zip(&eigen.values).map(|(v, d)| v * v / d);
+        let f = squares.sum::<f64>() / q as f64;
         let f = finite(f)?;
         let df2 = self.uncertainty().and_then(|u| {
-            let dfs: Option<Vec<f64>> = (0..q).map(|m| u.df(&rotated.row(m).transpose())).collect();
+            let dfs: Option<Vec<f64>> = (0..q).map(|m| u.df(rotated.row(m))).collect();
             pooled(&dfs?)
         });
         Some(ContrastF {
@@ -169,15 +160,13 @@ impl LmmFit<'_> {
         let (_, curvature) = second(&value, &at, &all)?;
         let parts = |x: &[f64]| {
             let found = profile_at(x)?;
-            let inverse = found.inverse();
-            Some(DVector::from_iterator(
-                p * p + 1,
-                inverse.iter().copied().chain([found.rss]),
-            ))
+            Some([found.inverse().elements(), &[found.rss]].concat())
         };
         let d = at.len();
-        let mut hessian = DMatrix::zeros(d + 1, d + 1);
-        hessian.view_mut((0, 0), (d, d)).copy_from(&curvature);
+        let mut hessian = Matrix::zeros(d + 1, d + 1);
+        for (i, j) in (0..d).flat_map(|i| (0..d).map(move |j| (i, j))) {
+            hessian[(i, j)] = curvature[(i, j)];
+        }
         hessian[(d, d)] = weight(table, self.criterion);
         let covariance = self.profile.inverse() * self.sigma2;
         let mut derivatives = Vec::with_capacity(d + 1);
@@ -186,17 +175,16 @@ impl LmmFit<'_> {
             let cross = -by[p * p] / self.sigma2;
             hessian[(i, d)] = cross;
             hessian[(d, i)] = cross;
-            let own = DMatrix::from_iterator(p, p, by.iter().copied().take(p * p));
-            derivatives.push(own * self.sigma2);
+            derivatives.push(Matrix::from_fn(p, p, |r, c| by[r * p + c] * self.sigma2));
         }
         derivatives.push(covariance.clone());
         let eigen = SymmetricEigen::new(hessian);
-        let floor = 1e-8 * eigen.eigenvalues.amax();
-        let mut inverse = DMatrix::zeros(d + 1, d + 1);
-        for (k, value) in eigen.eigenvalues.iter().enumerate() {
+        let floor = 1e-8 * eigen.largest();
+        let mut inverse = Matrix::zeros(d + 1, d + 1);
+        for (k, value) in eigen.values.iter().enumerate() {
             if *value > floor {
-                let q = eigen.eigenvectors.column(k);
-                inverse += q * q.transpose() / *value;
+                let q = eigen.vectors.row(k);
+                inverse = inverse + &Matrix::from_fn(d + 1, d + 1, |i, j| q[i] * q[j] / value);
             }
         }
         Some(Uncertainty {
@@ -210,10 +198,10 @@ impl LmmFit<'_> {
 /// The contrasts of a sequential decomposition (lmerTest's for one factor): each level
 /// but the first against the ratings of the first and of all later ones. F does not
 /// depend on the basis; its degrees of freedom do if the numbers of ratings are unequal.
-fn sequential(ratings: &[f64]) -> DMatrix<f64> {
+fn sequential(ratings: &[f64]) -> Matrix {
     let p = ratings.len();
     let others = |i: usize| ratings[0] + ratings[i + 2..].iter().sum::<f64>();
-    DMatrix::from_fn(p - 1, p, |i, j| match j {
+    Matrix::from_fn(p - 1, p, |i, j| match j {
         j if j == i + 1 => 1.0,
         j if j == 0 || j > i + 1 => -ratings[j] / others(i),
         _ => 0.0,

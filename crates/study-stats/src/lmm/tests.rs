@@ -37,7 +37,7 @@ const CROSSED: RandomEffects = RandomEffects {
 };
 
 fn table(cells: &[CellSummary]) -> LmmData {
-    LmmData::new(cells, FixedEffects::Covariate { centre: 0.9 }).unwrap()
+    LmmData::new(cells, FixedEffects::Covariate { center: 0.9 }).unwrap()
 }
 
 fn close(a: f64, b: f64, relative: f64) {
@@ -210,7 +210,7 @@ fn shift_scale_names_and_order_do_not_matter() {
             })
             .collect();
         moved.reverse();
-        let moved = LmmData::new(&moved, FixedEffects::Covariate { centre: 6.0 }).unwrap();
+        let moved = LmmData::new(&moved, FixedEffects::Covariate { center: 6.0 }).unwrap();
         let b = fit(&moved, random, Criterion::Reml).unwrap();
         let (v, w) = (a.variances, b.variances);
         close(16.0 * v.error, w.error, 1e-6);
@@ -238,7 +238,7 @@ fn subjects_of_one_pattern_are_aggregated_without_loss() {
         .map(|own| {
             let row: Vec<f64> = own
                 .iter()
-                .map(|c| (c.mean - shared.y_centre) / shared.y_scale)
+                .map(|c| (c.mean - shared.y_center) / shared.y_scale)
                 .collect();
             data::Pattern {
                 subjects: 1.0,
@@ -264,7 +264,7 @@ fn undefined_models_have_a_reason() {
         LmmError::NoRepetition
     );
     let new = |cells: &[CellSummary]| {
-        LmmData::new(cells, FixedEffects::Covariate { centre: 0.0 }).unwrap_err()
+        LmmData::new(cells, FixedEffects::Covariate { center: 0.0 }).unwrap_err()
     };
     assert_eq!(new(&[]), LmmError::NoData);
     assert_eq!(new(&cells[..6]), LmmError::OneSubject);
@@ -298,7 +298,7 @@ fn undefined_models_have_a_reason() {
         .filter(|c| c.realization < 2)
         .copied()
         .collect();
-    let two = LmmData::new(&two, FixedEffects::Covariate { centre: 0.3 }).unwrap();
+    let two = LmmData::new(&two, FixedEffects::Covariate { center: 0.3 }).unwrap();
     let crossed = RandomEffects {
         cell: false,
         ..CROSSED
@@ -336,7 +336,7 @@ fn random_small_tables_give_numbers_or_reasons() {
         for fixed in [
             FixedEffects::Intercept,
             FixedEffects::Realizations,
-            FixedEffects::Covariate { centre: 1.0 },
+            FixedEffects::Covariate { center: 1.0 },
         ] {
             let Ok(table) = LmmData::new(&cells, fixed) else {
                 continue;

@@ -13,7 +13,7 @@ use crate::random::RandomSource;
 /// Decides at one level for one x.
 #[derive(Debug, Clone)]
 pub struct Decision {
-    /// Centred, with a sum of squares of 1.
+    /// Centered, with a sum of squares of 1.
     x: Vec<f64>,
     /// How many extreme orders are too many.
     limit: u64,

@@ -1,7 +1,7 @@
 //! Does a covariate of the realizations predict the rating? Power in closed form.
 //!
 //! n subjects rate q realizations R times each, all crossed; the covariate x is
-//! standardised over the realizations with denominator q (Σx² = q):
+//! standardized over the realizations with denominator q (Σx² = q):
 //!
 //! y = mean + uᵢ + (slope + sᵢ)xⱼ + mⱼ + (um)ᵢⱼ + eᵢⱼᵣ.
 //!

@@ -258,7 +258,7 @@ pub fn map(
     starts.sort_by(|a, b| b.1.total_cmp(&a.1));
     let sizes = [0.05, 0.3, 0.02, 0.05, 0.02];
     let found = (starts.iter().take(2))
-        .map(|(at, _)| simplex::maximise(kernel, at, &sizes[..size]))
+        .map(|(at, _)| simplex::maximize(kernel, at, &sizes[..size]))
         .max_by(|a, b| a.1.total_cmp(&b.1))
         .filter(|found| found.1.is_finite())
         .ok_or(NoThreshold::Invalid)?;

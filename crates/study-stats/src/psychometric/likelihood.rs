@@ -1,7 +1,7 @@
 //! Maximum likelihood.
 
 use super::{Core, Curve, Experiment, Level, pooled};
-use crate::clm::newton::{Evaluation, Maximum, maximise};
+use crate::clm::newton::{Evaluation, Maximum, maximize};
 use crate::matrix::Cholesky;
 use crate::random::RandomSource;
 use thiserror::Error;
@@ -157,7 +157,7 @@ pub fn deviance_p(
             ..Problem::of(curve, &levels)
         };
         let start = problem.coordinates(&curve);
-        let found = maximise(start.to_vec(), |at| problem.evaluate(at));
+        let found = maximize(start.to_vec(), |at| problem.evaluate(at));
         let rising = found.map_or(f64::NEG_INFINITY, |m| m.value);
         let best = rising.max(problem.constant()).max(problem.step());
         let deviance = 2.0 * (problem.saturated() - best);
@@ -293,7 +293,7 @@ impl Problem {
         }
         starts.sort_by(|a, b| b.1.total_cmp(&a.1));
         let found = (starts.iter().take(3))
-            .filter_map(|(at, _)| maximise(at.to_vec(), |at| self.evaluate(at)));
+            .filter_map(|(at, _)| maximize(at.to_vec(), |at| self.evaluate(at)));
         found.max_by(|a, b| a.value.total_cmp(&b.value))
     }
 

@@ -1,7 +1,7 @@
 //! The simplex search of Nelder & Mead (1965), restarted until it gains nothing.
 
 /// The maximum of `f` near `start`, with a first simplex of these `sizes`. `f` may be −∞.
-pub(super) fn maximise(f: impl Fn(&[f64]) -> f64, start: &[f64], sizes: &[f64]) -> (Vec<f64>, f64) {
+pub(super) fn maximize(f: impl Fn(&[f64]) -> f64, start: &[f64], sizes: &[f64]) -> (Vec<f64>, f64) {
     let mut best = (start.to_vec(), f(start));
     for restart in 0..8 {
         let scale = 0.5f64.powi(restart);

@@ -197,6 +197,14 @@ fn the_bootstrap_finds_a_wrong_curve() {
     assert!(deviance_p(&fit, &wrong, 999, &mut SplitMix64::new(7)) < 0.01);
 }
 
+/// A curve passes through any two levels: no data set deviates, all are "at least as large".
+#[test]
+fn data_that_deviate_as_much_count_in_the_bootstrap() {
+    let two = levels(&[(1.0, 12.0, 20.0), (2.0, 16.0, 20.0)]);
+    let fit = maximum_likelihood(Core::Norm, &two, 0.5, 0.0).unwrap();
+    assert_eq!(deviance_p(&fit, &two, 99, &mut SplitMix64::new(7)), 1.0);
+}
+
 #[test]
 fn thresholds_are_summed_up_on_logarithms() {
     let found = group(&[1.0, 2.0, 4.0]).unwrap();

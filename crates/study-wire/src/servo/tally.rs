@@ -115,11 +115,11 @@ mod tests {
     use super::*;
 
     /// Full strokes of four seconds of 15 mm ± `amplitude` at 1 Hz over 0 … 30 mm.
-    fn strokes(centre_mm: f64, amplitude_mm: f64) -> u32 {
+    fn strokes(center_mm: f64, amplitude_mm: f64) -> u32 {
         let mut tally = Tally::new();
         for i in 0..16_000 {
             let phase = core::f64::consts::TAU * f64::from(i) / 4000.0;
-            let x_mm = centre_mm + amplitude_mm * libm::sin(phase);
+            let x_mm = center_mm + amplitude_mm * libm::sin(phase);
             tally.add_motion(0.0, x_mm, [0.0, 30.0]);
         }
         tally.strokes

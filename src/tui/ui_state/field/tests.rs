@@ -1,6 +1,7 @@
 use super::*;
 use std::collections::BTreeMap;
 use study_base::text::QuestionId;
+use study_plan::protocol::{QuestionKind, kinds};
 
 fn question(kind: QuestionKind) -> Question {
     Question {
@@ -12,11 +13,11 @@ fn question(kind: QuestionKind) -> Question {
 }
 
 fn scale(from: i64, to: i64) -> Question {
-    question(QuestionKind::Rating {
+    question(QuestionKind::Rating(kinds::Rating {
         from,
         to,
         labels: BTreeMap::new(),
-    })
+    }))
 }
 
 fn after(question: &Question, keys: &[Key]) -> Option<f64> {
@@ -24,7 +25,7 @@ fn after(question: &Question, keys: &[Key]) -> Option<f64> {
     for key in keys {
         field.key(question, *key, &Words::default());
     }
-    let answer = field.answer(question, &Words::default()).ok().flatten();
+    let answer = field.answer(question).ok().flatten();
     answer.and_then(|a| a.number())
 }
 
@@ -69,12 +70,12 @@ fn backspace_takes_the_last_digit_back_and_then_the_choice() {
     assert_eq!(after(&percent, &keys("57<8")), Some(58.0));
     assert_eq!(after(&percent, &keys("57<<")), None);
     assert_eq!(after(&scale(1, 7), &keys("5<")), None);
-    let slider = question(QuestionKind::Slider {
+    let slider = question(QuestionKind::Slider(kinds::Slider {
         from: 0.0,
         to: 100.0,
         step: 1.0,
         labels: BTreeMap::new(),
-    });
+    }));
     assert_eq!(after(&slider, &keys("57<")), Some(5.0));
     assert_eq!(after(&slider, &keys("5<")), None);
 }
@@ -100,12 +101,12 @@ fn extreme_scales_do_not_overflow() {
 
 #[test]
 fn a_slider_has_no_mark_until_it_is_moved() {
-    let slider = question(QuestionKind::Slider {
+    let slider = question(QuestionKind::Slider(kinds::Slider {
         from: 0.0,
         to: 1.0,
         step: 0.1,
         labels: BTreeMap::new(),
-    });
+    }));
     assert_eq!(after(&slider, &[]), None);
     assert_eq!(after(&slider, &[Key::Right]), Some(0.5));
     assert_eq!(
@@ -129,37 +130,34 @@ fn one_or_several_of_a_list() {
         ),
         (true, digits("323"), vec!["b"]),
     ] {
-        let question = question(QuestionKind::Choice {
+        let question = question(QuestionKind::Choice(kinds::Choice {
             options: options.clone(),
             multiple,
-        });
+        }));
         let mut field = Field::new(&question);
         for key in keys {
             field.key(&question, key, &Words::default());
         }
         let want = want.into_iter().map(str::to_owned).collect();
-        assert_eq!(
-            field.answer(&question, &Words::default()),
-            Ok(Some(Answer::Choice(want)))
-        );
+        assert_eq!(field.answer(&question), Ok(Some(Answer::Choice(want))));
     }
 }
 
 #[test]
 fn a_number_may_have_a_comma_and_must_be_in_range() {
-    let number = question(QuestionKind::Number {
+    let number = question(QuestionKind::Number(kinds::Number {
         unit: None,
         min: Some(0.0),
         max: Some(120.0),
         above: None,
-    });
+    }));
     assert_eq!(after(&number, &digits("12,5")), Some(12.5));
     let mut field = Field::new(&number);
     for key in digits("121") {
         field.key(&number, key, &Words::default());
     }
     assert_eq!(
-        field.answer(&number, &Words::default()),
+        field.answer(&number).map_err(|why| why.to_string()),
         Err("Type a number from 0 to 120.".to_owned())
     );
     // Letters are no part of a number: "nan" and "inf" cannot be typed.
@@ -171,9 +169,9 @@ fn a_number_may_have_a_comma_and_must_be_in_range() {
 
 #[test]
 fn an_empty_optional_text_is_no_answer() {
-    let mut text = question(QuestionKind::Text);
+    let mut text = question(QuestionKind::Text(kinds::Text));
     text.required = false;
     let mut field = Field::new(&text);
     field.key(&text, Key::Char(' '), &Words::default());
-    assert_eq!(field.answer(&text, &Words::default()), Ok(None));
+    assert_eq!(field.answer(&text), Ok(None));
 }

@@ -1,7 +1,7 @@
 //! The runs of samples to sum over for the tables of several dx, and the parameters
 //! at the nodes from these sums.
 //!
-//! All three resampling methods are sums over runs of neighbouring samples. The bin
+//! All three resampling methods are sums over runs of neighboring samples. The bin
 //! edges of all tables together divide the samples into disjoint runs, and every node
 //! combines a few of them, so that another table costs nothing per sample. The values
 //! are those of [`resample`] up to the order of addition.
@@ -170,13 +170,13 @@ fn add(sum: &mut Theta, factor: f64, theta: &Theta) {
 /// Groups at equal encoder counts, only those next to nodes.
 fn points(x_mm: &[f64], tables: &[Nodes]) -> (Vec<Range<usize>>, Vec<Composition>) {
     let (positions, groups) = resample::equal_counts(x_mm);
-    let neighbours = |node: &f64| {
+    let neighbors = |node: &f64| {
         let right = positions.partition_point(|position| position <= node);
         [right.saturating_sub(1), right.min(positions.len() - 1)]
     };
     let mut used = vec![false; groups.len()];
     for node in tables.iter().flat_map(|t| &t.x_mm) {
-        for group in neighbours(node) {
+        for group in neighbors(node) {
             used[group] = true;
         }
     }
@@ -188,7 +188,7 @@ fn points(x_mm: &[f64], tables: &[Nodes]) -> (Vec<Range<usize>>, Vec<Composition
         bounds.push(range);
     }
     let composition = |t: &Nodes| {
-        let mut own: Vec<usize> = t.x_mm.iter().flat_map(neighbours).collect();
+        let mut own: Vec<usize> = t.x_mm.iter().flat_map(neighbors).collect();
         own.sort_unstable();
         own.dedup();
         Composition::Point {

@@ -3,7 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "a test that fails says where")]
 
 use super::objective::Compared;
-use super::{Filter, PARAMETERS, levenberg, predict};
+use super::{Filter, Fitted, PARAMETERS, levenberg, predict};
+use crate::identify::Warning;
 use crate::identify::signal::LowPass;
 use crate::model::{Mechanism, Profile};
 use crate::recording::Recording;
@@ -107,4 +108,31 @@ fn standard_errors_are_the_spread_of_repeated_recordings_under_correlated_noise(
     }
     let geometric = product.powf(1.0 / PARAMETERS.len() as f64);
     assert!((0.8..1.25).contains(&geometric), "{geometric}");
+}
+
+/// A standard error above half the value is told, except of a force, which may well be 0.
+#[test]
+fn what_the_recordings_do_not_determine_is_told() {
+    let warned = |unsure: usize| {
+        let mut standard_errors = truth().scalars.to_array().map(|x| Some(0.1 * x.abs()));
+        standard_errors[unsure] = None;
+        let fitted = Fitted {
+            mechanism: truth(),
+            standard_errors,
+            filter: Filter::Recorded(CORNER_HZ),
+            attempts: Vec::new(),
+            iterations: 1,
+        };
+        let name = |warning| match warning {
+            Warning::NotDetermined { parameter, .. } => parameter,
+            other => panic!("{other:?}"),
+        };
+        fitted.warnings().into_iter().map(name).collect::<Vec<_>>()
+    };
+    for (i, (name, ..)) in PARAMETERS.iter().enumerate() {
+        match *name {
+            "offset force" => assert!(warned(i).is_empty()),
+            name => assert_eq!(warned(i), [name]),
+        }
+    }
 }

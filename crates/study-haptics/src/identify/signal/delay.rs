@@ -47,11 +47,11 @@ pub fn in_samples(reference: &[f64], other: &[f64], most: usize) -> Option<f64> 
     if most == 0 || n < 4 * most + 8 {
         return None;
     }
-    let centred = |values: &[f64]| -> Vec<f64> {
+    let centered = |values: &[f64]| -> Vec<f64> {
         let mean = values[..n].iter().sum::<f64>() / n as f64;
         values[..n].iter().map(|v| v - mean).collect()
     };
-    let (reference, other) = (centred(reference), centred(other));
+    let (reference, other) = (centered(reference), centered(other));
     let middle = &reference[most..n - most];
     let correlation = |lag: usize| -> f64 {
         // lag 0 is `most` samples early

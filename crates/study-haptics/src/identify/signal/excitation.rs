@@ -1,7 +1,7 @@
 //! Whether the excitation of a recording suffices to identify m, b, k and F0.
 //!
 //! For each window of x and each direction: the condition number of the matrix with
-//! the columns [a v x 1], with x relative to the centre of the window and every column
+//! the columns [a v x 1], with x relative to the center of the window and every column
 //! scaled to length 1. If two columns are nearly collinear (in a single sine a follows
 //! from x), their parameters are not identifiable and fail on another trajectory,
 //! whatever the VAF on this one. A swept sine has a condition number of about 5, a
@@ -22,7 +22,7 @@ const MAX_CONDITION: f64 = 1e8;
 /// The condition number of one window and direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Window {
-    /// Centre of the window, mm.
+    /// Center of the window, mm.
     pub x_mm: f64,
     /// Whether v > 0, else v < 0.
     pub positive: bool,
@@ -59,8 +59,8 @@ impl Excitation {
             let Some(window) = sums.get_mut(index as usize) else {
                 continue;
             };
-            let centre = (first + index + 0.5) * window_mm;
-            window[usize::from(v < 0.0)].add([recording.a_m_s2[i], v, x - centre, 1.0]);
+            let center = (first + index + 0.5) * window_mm;
+            window[usize::from(v < 0.0)].add([recording.a_m_s2[i], v, x - center, 1.0]);
         }
         let windows = sums
             .iter()

@@ -209,7 +209,7 @@ fn every_fault_has_its_line() {
 
 #[test]
 fn a_newer_format_is_refused_without_further_faults() {
-    let newer = "study-model/3\"\ncolour = \"red";
+    let newer = "study-model/3\"\ncolor = \"red";
     assert_eq!(
         faults("study-model/1", newer),
         ["1: this is not a study-model/1 file"]

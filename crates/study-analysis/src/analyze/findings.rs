@@ -1,0 +1,486 @@
+//! Findings: the answer to each question of the study.
+//!
+//! A finding has a verdict, the test that decided, what it rests on, an estimate and
+//! its caveats. The terminal page, the report, JSON, CSV and the paragraphs print
+//! findings and decide nothing. docs/report.md states which test decides: the choice
+//! depends on the design and never on a rating.
+
+mod differ;
+mod others;
+mod pairs;
+mod sites;
+mod vaf;
+
+use super::Rules;
+use super::cells::Cells;
+use super::design::Design;
+use super::identifiers::group_id;
+use super::record::{Field as _, Interval, Stat, Why, statistics};
+use super::results::Evidence;
+use super::values::Values;
+use super::verdicts;
+use super::warning::Warning;
+use study_stats::level;
+
+pub use pairs::Pair;
+pub(super) use vaf::{AboutVaf, vaf as of_vaf};
+
+/// A question of the study.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Question {
+    /// Does VAF predict the rating?
+    Vaf,
+    /// Does the VAF of what was delivered predict the rating?
+    Delivered,
+    /// Does the memory of the identification (the forgetting factor) matter?
+    Memory,
+    /// Does the best-rated realization differ from the second best?
+    Best,
+    /// Do the realizations differ?
+    Differ,
+    /// Which pairs of realizations differ?
+    Pairs,
+    /// Do participants differ in how they rate the realizations?
+    Disagreement,
+    /// Do ratings drift over the session?
+    Order,
+    /// Does a rating depend on the one before it?
+    CarryOver,
+    /// Does the best-rated realization differ from this reference?
+    Reference(String),
+    /// Is it equivalent to this reference, within the stated margin?
+    Equivalence(String),
+    /// Does this hidden duplicate differ from its original?
+    Repeat(String),
+    /// Do the differences between realizations depend on the site?
+    SiteRealizations,
+    /// Does the effect of VAF depend on the site?
+    SiteVaf,
+    /// Do the sites differ in their mean rating?
+    SiteLevel,
+}
+
+impl Question {
+    /// The identifier in `--json` and of its statistics, `finding/ID/*`.
+    pub fn id(&self) -> String {
+        match self {
+            Self::Vaf => "vaf".to_owned(),
+            Self::Delivered => "delivered".to_owned(),
+            Self::Memory => "memory".to_owned(),
+            Self::Best => "best".to_owned(),
+            Self::Differ => "differ".to_owned(),
+            Self::Pairs => "pairs".to_owned(),
+            Self::Disagreement => "disagreement".to_owned(),
+            Self::Order => "order".to_owned(),
+            Self::CarryOver => "carry-over".to_owned(),
+            Self::Reference(name) => group_id("reference", &[name]),
+            Self::Equivalence(name) => group_id("equivalence", &[name]),
+            Self::Repeat(name) => group_id("repeat", &[name]),
+            Self::SiteRealizations => "site-realizations".to_owned(),
+            Self::SiteVaf => "site-vaf".to_owned(),
+            Self::SiteLevel => "site-level".to_owned(),
+        }
+    }
+}
+
+/// The answer to a question.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Verdict {
+    /// The deciding test is significant.
+    Yes,
+    /// It is not: nothing is shown.
+    NotShown,
+    /// There is no such test, because of this.
+    Undefined(String),
+}
+
+impl Verdict {
+    /// The word in `--json`.
+    pub fn as_str(&self) -> &'static str {
+        match self {
+            Self::Yes => "yes",
+            Self::NotShown => "not shown",
+            Self::Undefined(_) => "undefined",
+        }
+    }
+}
+
+/// The direction of an effect that is shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Direction {
+    /// The rating rises.
+    Up,
+    /// The rating falls.
+    Down,
+    /// The rating is a curved function.
+    Curved,
+}
+
+impl Direction {
+    /// The word in `--json`.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Up => "up",
+            Self::Down => "down",
+            Self::Curved => "curved",
+        }
+    }
+
+    pub(super) fn of(estimate: f64) -> Self {
+        if estimate > 0.0 { Self::Up } else { Self::Down }
+    }
+}
+
+/// A test that can decide a question.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TestKind {
+    /// Repeated-measures analysis of variance of two realizations: a paired t test.
+    Anova,
+    /// The same with the Greenhouse–Geisser correction.
+    AnovaGreenhouseGeisser,
+    /// The same with the Huynh–Feldt correction.
+    AnovaHuynhFeldt,
+    /// F of the mixed model of all cell means, Satterthwaite's degrees of freedom.
+    MixedModel,
+    /// Friedman's test with its exact distribution.
+    FriedmanExact,
+    /// Friedman's test with Iman and Davenport's F.
+    Friedman,
+    /// Paired t test.
+    PairedT,
+    /// Contrast of the mixed model of all cell means, Kenward and Roger's degrees of freedom.
+    MixedContrast,
+    /// Permutation test over all orders of the realizations.
+    PermutationExact,
+    /// Permutation test over random orders of the realizations.
+    PermutationMonteCarlo,
+    /// F of the interaction of participants and realizations, against the variance within
+    /// cells.
+    Interaction,
+    /// F of the differences between the participants' slopes on VAF, against the rest of
+    /// the interaction.
+    SlopesDiffer,
+    /// t test of a regression slope.
+    SlopeT,
+    /// Two one-sided t tests.
+    Equivalence,
+    /// t test of a mean over participants.
+    OneSampleT,
+    /// An estimate over its standard error.
+    Wald,
+    /// The same, with a standard error over participants as clusters.
+    WaldClustered,
+    /// F of the interaction of site and realization, with the Greenhouse–Geisser correction.
+    BetweenWithin,
+    /// F of the differences between sites in one number of each participant.
+    BetweenSites,
+    /// Welch's analysis of variance between groups of participants.
+    Welch,
+}
+
+impl TestKind {
+    /// The word in `--json`.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Anova => "anova",
+            Self::AnovaGreenhouseGeisser => "anova-greenhouse-geisser",
+            Self::AnovaHuynhFeldt => "anova-huynh-feldt",
+            Self::MixedModel => "mixed-model",
+            Self::FriedmanExact => "friedman-exact",
+            Self::Friedman => "friedman",
+            Self::PairedT => "paired-t",
+            Self::MixedContrast => "mixed-contrast",
+            Self::PermutationExact => "permutation-exact",
+            Self::PermutationMonteCarlo => "permutation-monte-carlo",
+            Self::Interaction => "interaction",
+            Self::SlopesDiffer => "slopes-differ",
+            Self::SlopeT => "slope-t",
+            Self::Equivalence => "equivalence",
+            Self::OneSampleT => "one-sample-t",
+            Self::Wald => "wald",
+            Self::WaldClustered => "wald-clustered",
+            Self::BetweenWithin => "between-within",
+            Self::BetweenSites => "between-sites",
+            Self::Welch => "welch",
+        }
+    }
+}
+
+/// A test statistic.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Statistic {
+    /// `F`, `t`, `z`, `χ²` or `r`.
+    pub symbol: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// Its degrees of freedom, corrected where the test corrects them; may be empty.
+    pub df: Vec<f64>,
+}
+
+/// The test that decides a question.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Test {
+    /// Which test.
+    pub kind: TestKind,
+    /// Its statistic.
+    pub statistic: Option<Statistic>,
+    /// Its p, corrected for the number of comparisons.
+    pub p: f64,
+    /// The level against which p is held.
+    pub level: f64,
+    /// The number of tests for which p or the level is corrected; 1 if it is not.
+    pub comparisons: usize,
+}
+
+impl Test {
+    /// The test of a question that has only one.
+    pub(super) fn single(kind: TestKind, p: f64, level: f64) -> Self {
+        Self {
+            kind,
+            statistic: None,
+            p,
+            level,
+            comparisons: 1,
+        }
+    }
+
+    pub(super) fn with(
+        mut self,
+        symbol: &'static str,
+        value: Option<f64>,
+        df: &[Option<f64>],
+    ) -> Self {
+        let df: Option<Vec<f64>> = df.iter().copied().collect();
+        self.statistic = value.map(|value| Statistic {
+            symbol,
+            value,
+            df: df.unwrap_or_default(),
+        });
+        self
+    }
+
+    /// Whether it is significant.
+    pub fn is_significant(&self) -> bool {
+        level::rejects(self.p, self.level)
+    }
+
+    pub(super) fn verdict(&self) -> Verdict {
+        if self.is_significant() {
+            Verdict::Yes
+        } else {
+            Verdict::NotShown
+        }
+    }
+}
+
+/// An estimate or an effect size.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// What is estimated: `r`, `difference`, `slope`, `dz`, `generalized eta squared` …
+    pub name: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// Its 95 % interval.
+    pub ci95: Option<(f64, f64)>,
+}
+
+impl Estimate {
+    pub(super) fn of(name: &'static str, value: f64) -> Option<Self> {
+        Some(Self {
+            name,
+            value,
+            ci95: None,
+        })
+    }
+}
+
+/// The answer to a question, with what it rests on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Finding<Q = Question> {
+    /// The question.
+    pub question: Q,
+    /// The answer.
+    pub verdict: Verdict,
+    /// The direction of the effect, where it is shown and has one.
+    pub direction: Option<Direction>,
+    /// The realizations that it is about, such as the best and the second. Untrusted.
+    pub names: Vec<String>,
+    /// The test that decided.
+    pub test: Option<Test>,
+    /// The participants on whom it rests.
+    pub participants: usize,
+    /// The realizations on which it rests.
+    pub realizations: usize,
+    /// The main estimate.
+    pub estimate: Option<Estimate>,
+    /// A standardized effect size.
+    pub effect: Option<Estimate>,
+    /// What limits it.
+    pub caveats: Vec<Warning>,
+}
+
+impl<Q> Finding<Q> {
+    /// A finding without a test.
+    pub(super) fn undefined(question: Q, why: impl Into<String>, design: Design) -> Self {
+        Self {
+            question,
+            verdict: Verdict::Undefined(why.into()),
+            direction: None,
+            names: Vec::new(),
+            test: None,
+            participants: design.participants,
+            realizations: design.realizations,
+            estimate: None,
+            effect: None,
+            caveats: Vec::new(),
+        }
+    }
+
+    /// The finding that a test decides.
+    pub(super) fn decided(question: Q, test: Test, design: Design) -> Self {
+        Self {
+            verdict: test.verdict(),
+            test: Some(test),
+            ..Self::undefined(question, "", design)
+        }
+    }
+
+    pub(super) fn caveat(&mut self, code: &'static str, text: impl Into<String>) {
+        self.caveats.push(Warning {
+            code,
+            text: text.into(),
+        });
+    }
+
+    /// Whether it is a yes.
+    pub fn is_yes(&self) -> bool {
+        self.verdict == Verdict::Yes
+    }
+
+    /// Why there is no verdict.
+    pub fn reason(&self) -> Option<&str> {
+        match &self.verdict {
+            Verdict::Undefined(why) => Some(why),
+            Verdict::Yes | Verdict::NotShown => None,
+        }
+    }
+}
+
+/// What findings are made from.
+struct Facts<'a> {
+    cells: &'a Cells<'a>,
+    design: Design,
+    rules: &'a Rules,
+    evidence: &'a Evidence,
+    pairs: Vec<Pair>,
+    /// Adjusted mean and name of the tested realizations, best first.
+    ranked: Vec<(f64, &'a str)>,
+}
+
+/// All findings, in the order of a report, and the comparisons of pairs.
+pub(super) fn findings(
+    cells: &Cells<'_>,
+    design: Design,
+    rules: &Rules,
+    evidence: &Evidence,
+) -> (Vec<Finding>, Vec<Pair>) {
+    let facts = Facts {
+        cells,
+        design,
+        rules,
+        evidence,
+        pairs: evidence
+            .pairs
+            .as_ref()
+            .map_or_else(Vec::new, |tests| pairs::all(cells, design, rules, tests)),
+        ranked: verdicts::ranked(
+            cells.tested().into_iter().map(|m| cells.model_name(m)),
+            &evidence.cells,
+            rules.better,
+        ),
+    };
+    let mut found = others::against_references(&facts);
+    let about_vaf = AboutVaf {
+        adjusted: &evidence.corr_adjusted,
+        beside: Some((&evidence.corr, &evidence.equivalence)),
+    };
+    found.extend(vaf::vaf(cells, design, rules, &about_vaf));
+    found.extend(vaf::delivered(&facts));
+    found.extend(others::memory(&facts));
+    found.extend(pairs::best(&facts));
+    found.extend(differ::differ(&facts));
+    found.extend(pairs::which(&facts));
+    found.extend(others::disagreement(&facts));
+    found.extend(others::order(&facts));
+    found.extend(others::carry_over(&facts));
+    others::disagreement_as_caveat(&mut found);
+    found.extend(others::repeats(&facts));
+    found.extend(sites::sites(&facts));
+    (found, facts.pairs)
+}
+
+/// The numbers of all findings, as `finding/ID/*`.
+pub(super) fn put(findings: &[Finding], values: &mut Values) {
+    for finding in findings {
+        let id = format!("finding/{}", finding.question.id());
+        numbers(finding).put(&id, values);
+    }
+}
+
+statistics! {
+    /// The answer to a question of the report.
+    pub struct FindingNumbers {
+        /// 1 (yes) or 0 (not shown)
+        verdict: Stat,
+        /// corrected for the number of comparisons and held against `level`
+        p: Stat,
+        /// the level of significance of the test
+        level: Stat,
+        /// of the test that decides ([report.md](report.md))
+        statistic: Stat,
+        /// first degrees of freedom
+        df1: Stat,
+        /// second degrees of freedom
+        df2: Stat,
+        /// main estimate
+        estimate: Stat,
+        /// its interval
+        ci95: Interval,
+        /// standardized effect size
+        effect: Stat,
+        /// participants on whom it rests
+        n_participants: Stat,
+        /// realizations on which it rests
+        n_realizations: Stat,
+    }
+}
+
+fn numbers(f: &Finding) -> FindingNumbers {
+    let why = Why::from(
+        f.reason()
+            .unwrap_or("the question has no such number")
+            .to_owned(),
+    );
+    let or = |x: Option<f64>| Stat::or(x, why.clone());
+    let verdict = match f.verdict {
+        Verdict::Yes => Some(1.0),
+        Verdict::NotShown => Some(0.0),
+        Verdict::Undefined(_) => None,
+    };
+    let test = f.test.as_ref();
+    let statistic = test.and_then(|t| t.statistic.as_ref());
+    let df = |i: usize| or(statistic.and_then(|s| s.df.get(i).copied()));
+    FindingNumbers {
+        verdict: or(verdict),
+        p: or(test.map(|t| t.p)),
+        level: or(test.map(|t| t.level)),
+        statistic: or(statistic.map(|s| s.value)),
+        df1: df(0),
+        df2: df(1),
+        estimate: or(f.estimate.map(|e| e.value)),
+        ci95: Interval::or(f.estimate.and_then(|e| e.ci95), why.clone()),
+        effect: or(f.effect.map(|e| e.value)),
+        n_participants: Stat::count(f.participants),
+        n_realizations: Stat::count(f.realizations),
+    }
+}

@@ -1,0 +1,157 @@
+//! Do the realizations differ?
+
+use super::{Estimate, Facts, Finding, Question, Test, TestKind};
+use crate::analyze::effects::MAX_COLUMNS;
+use crate::analyze::results::{Differences, Number as _};
+use study_base::apa;
+use study_base::text::counted;
+use study_stats::level::rejects;
+
+/// The tests that can decide, chosen by the design.
+fn chosen(facts: &Facts<'_>) -> TestKind {
+    let d = facts.design;
+    match (d.complete, d.realizations) {
+        _ if !d.uses_complete() => TestKind::MixedModel,
+        (_, 2) => TestKind::Anova,
+        (2, _) => TestKind::FriedmanExact,
+        (_, k) if k > MAX_COLUMNS => TestKind::Friedman,
+        (s, k) if s <= k => TestKind::AnovaHuynhFeldt,
+        _ => TestKind::AnovaGreenhouseGeisser,
+    }
+}
+
+pub(super) fn differ(facts: &Facts<'_>) -> Option<Finding> {
+    let d = facts.design;
+    if d.realizations == 0 {
+        return None;
+    }
+    let undefined = |why: &str| Some(Finding::undefined(Question::Differ, why, d));
+    if d.realizations == 1 {
+        return undefined("there is only one realization");
+    }
+    if d.participants < 2 {
+        return undefined("there is only one participant");
+    }
+    let kind = chosen(facts);
+    let found = test(facts, kind).or_else(|| match kind {
+        // No variance of error, or too many orders for the exact distribution.
+        TestKind::FriedmanExact => test(facts, TestKind::Friedman),
+        _ => test(facts, TestKind::FriedmanExact).filter(|_| d.uses_complete()),
+    });
+    let Differences {
+        friedman, rmanova, ..
+    } = &facts.evidence.differences;
+    let model = &facts.evidence.cells.model;
+    let Some(test) = found else {
+        let p = match kind {
+            TestKind::MixedModel => &model.p,
+            TestKind::Friedman | TestKind::FriedmanExact => &friedman.p,
+            _ => &rmanova.p,
+        };
+        return undefined(p.reason().unwrap_or("there is no test"));
+    };
+    let used = test.kind;
+    let mut found = Finding::decided(Question::Differ, test, d);
+    found.participants = d.analyzed();
+    let effect = match used {
+        TestKind::FriedmanExact | TestKind::Friedman => {
+            Some(("Kendall's W", friedman.kendall_w.number()))
+        }
+        TestKind::MixedModel => None,
+        _ => Some(("generalized eta squared", rmanova.ges.number())),
+    };
+    found.effect = effect.and_then(|(name, value)| Estimate::of(name, value?));
+    if used == TestKind::MixedModel {
+        let complete = match d.complete {
+            0 => "none".to_owned(),
+            n => n.to_string(),
+        };
+        found.caveat(
+            "mixed-model",
+            format!(
+                "{complete} of {} rated every realization; the mixed model uses the ratings of all, \
+                 and assumes that ratings are missing at random and that all pairs of realizations \
+                 correlate alike",
+                counted(d.participants, "participant", "participants")
+            ),
+        );
+        if model.connected.number() == Some(0.0) {
+            found.caveat(
+                "not-connected",
+                "no participants link all realizations: some are compared only between different \
+                 participants",
+            );
+        }
+    } else if d.complete < d.participants {
+        found.caveat(
+            "complete-only",
+            format!(
+                "{} of {} rated every realization; the others are left out of the comparison",
+                d.complete,
+                counted(d.participants, "participant", "participants")
+            ),
+        );
+    }
+    if used != kind {
+        found.caveat(
+            "no-error",
+            "the ratings leave no variance of error, so that F is undefined; Friedman's test decides",
+        );
+    }
+    if let Some(least) = smallest_friedman(d.complete, d.realizations)
+        .filter(|p| used == TestKind::FriedmanExact && !rejects(*p, facts.rules.alpha))
+    {
+        found.caveat(
+            "too-few",
+            format!(
+                "with two participants and {} realizations Friedman's test cannot give a p below {}",
+                d.realizations,
+                apa::bare_p(least)
+            ),
+        );
+    }
+    Some(found)
+}
+
+/// The smallest exact p of Friedman's test for two participants: both rank alike, 1/k!.
+fn smallest_friedman(participants: usize, k: usize) -> Option<f64> {
+    (participants == 2).then(|| 1.0 / (2..=k).map(|i| i as f64).product::<f64>())
+}
+
+fn test(facts: &Facts<'_>, kind: TestKind) -> Option<Test> {
+    let Differences {
+        friedman, rmanova, ..
+    } = &facts.evidence.differences;
+    let alpha = facts.rules.alpha;
+    let of_anova = |p: Option<f64>, epsilon: f64| {
+        let f = rmanova.f.number()?;
+        let df = [&rmanova.df1, &rmanova.df2].map(|df| df.number().map(|df| df * epsilon));
+        Some(Test::single(kind, p?, alpha).with("F", Some(f), &df))
+    };
+    let of_friedman = |p: Option<f64>| {
+        let test = Test::single(kind, p?, alpha);
+        Some(test.with("χ²", friedman.chi2.number(), &[friedman.df.number()]))
+    };
+    match kind {
+        TestKind::Anova => of_anova(rmanova.p.number(), 1.0),
+        TestKind::AnovaGreenhouseGeisser => {
+            of_anova(rmanova.p_gg.number(), rmanova.eps_gg.number()?)
+        }
+        TestKind::AnovaHuynhFeldt => of_anova(
+            rmanova.p_hf.number(),
+            rmanova.eps_hf_unclipped.number()?.min(1.0),
+        ),
+        TestKind::MixedModel => {
+            let model = &facts.evidence.cells.model;
+            let df = [model.df1.number(), model.df2.number()];
+            let test = Test::single(kind, model.p.number()?, alpha);
+            Some(test.with("F", model.f.number(), &df))
+        }
+        TestKind::FriedmanExact => of_friedman(friedman.exact_p.number()),
+        TestKind::Friedman => {
+            let p = friedman.iman_davenport_p.number();
+            of_friedman(p.or_else(|| friedman.p.number()))
+        }
+        _ => None,
+    }
+}

@@ -1,0 +1,186 @@
+//! Does VAF predict the rating?
+
+use super::{Design, Direction, Estimate, Facts, Finding, Question, Test, TestKind, Verdict};
+use crate::analyze::Rules;
+use crate::analyze::cells::Cells;
+use crate::analyze::rendering::NO_RECORDING;
+use crate::analyze::results::{Correlation, EquivalenceOfVaf, Interval, Number as _, Pearson};
+use study_base::apa;
+use study_stats::level::rejects;
+
+/// What the finding about VAF rests on.
+pub(in crate::analyze) struct AboutVaf<'a> {
+    /// Decides: the correlation with the adjusted means, which are the means over
+    /// participants if no cell is missing.
+    pub(in crate::analyze) adjusted: &'a Correlation,
+    /// For caveats: the correlation with the means as they are, and equivalence.
+    pub(in crate::analyze) beside: Option<(&'a Correlation, &'a EquivalenceOfVaf)>,
+}
+
+/// The finding about VAF; `None` if no realization has one.
+pub(in crate::analyze) fn vaf(
+    cells: &Cells<'_>,
+    design: Design,
+    rules: &Rules,
+    about: &AboutVaf<'_>,
+) -> Option<Finding> {
+    let with_vaf = cells
+        .tested()
+        .into_iter()
+        .filter(|&m| cells.vaf[m].is_some());
+    let n = with_vaf.count();
+    if n == 0 {
+        return None;
+    }
+    let pearson = &about.adjusted.pearson;
+    let mut found = correlation(Question::Vaf, pearson, n, design, rules.alpha);
+    if let Some((_, equivalence)) = about.beside {
+        equivalent(equivalence, rules.alpha, &mut found);
+    }
+    too_few(pearson, rules.alpha, &mut found);
+    interval_and_p(rules.alpha, &mut found);
+    if let Some((raw, _)) = about.beside.filter(|_| !design.is_complete()) {
+        raw_and_adjusted(&raw.pearson, pearson, rules.alpha, &mut found);
+    }
+    Some(found)
+}
+
+/// The finding about a correlation over `n` realizations.
+fn correlation(
+    question: Question,
+    pearson: &Pearson,
+    n: usize,
+    design: Design,
+    alpha: f64,
+) -> Finding {
+    let r = pearson.r.number();
+    let found = match r.zip(permutation(pearson, alpha)) {
+        Some((r, test)) => Finding {
+            direction: Some(Direction::of(r)).filter(|_| test.is_significant()),
+            ..Finding::decided(question, test, design)
+        },
+        None => {
+            let why = pearson.r.reason();
+            let why = why.unwrap_or("the permutation test is undefined");
+            Finding::undefined(question, why, design)
+        }
+    };
+    Finding {
+        realizations: n,
+        estimate: r.map(|value| Estimate {
+            name: "r",
+            value,
+            ci95: pearson.ci95.as_ref().and_then(Interval::ends),
+        }),
+        ..found
+    }
+}
+
+/// Does the delivered VAF predict the rating? Asked where playbacks were judged.
+pub(super) fn delivered(facts: &Facts<'_>) -> Option<Finding> {
+    let delivered = &facts.evidence.rendering.as_ref()?.correlation;
+    let n = delivered.n();
+    if n == 0 {
+        return Some(Finding {
+            realizations: n,
+            ..Finding::undefined(Question::Delivered, NO_RECORDING, facts.design)
+        });
+    }
+    let (pearson, alpha) = (&delivered.pearson, facts.rules.alpha);
+    let mut found = correlation(Question::Delivered, pearson, n, facts.design, alpha);
+    too_few(pearson, alpha, &mut found);
+    Some(found)
+}
+
+/// The permutation test of a correlation over realizations.
+pub(in crate::analyze) fn permutation(pearson: &Pearson, alpha: f64) -> Option<Test> {
+    let r = pearson.r.number()?;
+    let (p, exact) = pearson.permuted.as_ref()?.two_sided()?;
+    let kind = if exact {
+        TestKind::PermutationExact
+    } else {
+        TestKind::PermutationMonteCarlo
+    };
+    Some(Test::single(kind, p, alpha).with("r", Some(r), &[]))
+}
+
+/// Says so if no order of the realizations gives a small p.
+fn too_few(pearson: &Pearson, alpha: f64, found: &mut Finding) {
+    let least = pearson.permuted.as_ref();
+    let least = least.and_then(|p| p.smallest_p_two_sided.number());
+    if let Some(least) = least.filter(|p| !rejects(*p, alpha)) {
+        found.caveat(
+            "too-few",
+            format!(
+                "with these {} realizations no p below {} is possible",
+                found.realizations,
+                apa::bare_p(least)
+            ),
+        );
+    }
+}
+
+/// Says so if nothing is shown and the effect of VAF is shown to be small.
+fn equivalent(equivalence: &EquivalenceOfVaf, alpha: f64, found: &mut Finding) {
+    if found.verdict != Verdict::NotShown {
+        return;
+    }
+    let effect = equivalence.vaf.as_ref();
+    let effect = effect.and_then(|e| e.p.number().zip(e.margin.number()));
+    if let Some((p, margin)) = effect.filter(|(p, _)| rejects(*p, alpha)) {
+        found.caveat(
+            "equivalent",
+            format!(
+                "from the lowest to the highest VAF the rating changes by less than {margin} points \
+                 (two one-sided t tests, p {})",
+                apa::p_beside(p, alpha)
+            ),
+        );
+    }
+    let r = equivalence.r.as_ref();
+    let r = r.and_then(|e| e.p.number().zip(e.margin.number()));
+    if let Some((p, margin)) = r.filter(|(p, _)| rejects(*p, alpha)) {
+        found.caveat(
+            "equivalent-r",
+            format!(
+                "the correlation is within ± {} (two one-sided tests by Fisher's z, p {})",
+                apa::share(margin, 2),
+                apa::p_beside(p, alpha)
+            ),
+        );
+    }
+}
+
+fn interval_and_p(alpha: f64, found: &mut Finding) {
+    let interval = found.estimate.and_then(|e| e.ci95);
+    if let (Some((low, high)), Some(test)) = (interval, &found.test)
+        && (low * high > 0.0) != test.is_significant()
+        && (alpha - 0.05).abs() < 1e-12
+    {
+        found.caveat(
+            "interval-and-p",
+            "the confidence interval and p disagree: the interval (Fisher's z) assumes normally \
+             distributed VAF and means, the permutation test does not; rely on p",
+        );
+    }
+}
+
+/// Says so if the means as they are lead to another conclusion.
+fn raw_and_adjusted(raw: &Pearson, adjusted: &Pearson, alpha: f64, found: &mut Finding) {
+    let raw_p = raw.permuted.as_ref().and_then(|p| Some(p.two_sided()?.0));
+    if let (Some(raw), Some(raw_p), Some(r), Some(test)) =
+        (raw.r.number(), raw_p, adjusted.r.number(), &found.test)
+        && (raw * r < 0.0 || rejects(raw_p, alpha) != test.is_significant())
+    {
+        found.caveat(
+            "raw-and-adjusted",
+            format!(
+                "participants did not all rate the same realizations; the means as they are \
+                 correlate at r = {} (p {}), the adjusted means, on which this rests, at r = {}",
+                apa::r(raw),
+                apa::p(raw_p),
+                apa::r(r)
+            ),
+        );
+    }
+}

@@ -1,0 +1,330 @@
+//! The tracks and pairs of a study.
+
+use super::again::{again, by_condition};
+use super::discriminations::of_tracks;
+use super::excluded;
+use super::findings::{
+    PartFacts, of_groups_and_sessions, of_preferences, of_realizations, of_sensitivities,
+    of_thresholds,
+};
+use super::of_scales::{of_magnitudes, of_mushra};
+use super::part_data::{
+    Found, Intervals, Measured, PartAnalysis, PartData, StudyData, asked, chosen, groups,
+    sessions_of,
+};
+use super::preferences::{Choice, Preference, in_both_orders, preferences};
+use super::questionnaires::of_questionnaires;
+use crate::analyze::Rules;
+use crate::analyze::exclude;
+use crate::analyze::identifiers::group_id;
+use crate::analyze::results::{Correlation, Field as _};
+use crate::analyze::select::{Include, Whose, state_counts};
+use crate::analyze::values::Values;
+use crate::analyze::warning::Warning;
+use std::collections::{BTreeMap, BTreeSet};
+use study_base::text::{ModelId, PartId, ParticipantId};
+use study_plan::protocol::parts::{Pairs, Part, Presentations, Task, TrackRules};
+use study_plan::protocol::{Answer, Role};
+use study_session::outcome::ratings::Origin;
+use study_session::outcome::{RatingRow, Status};
+use study_stats::describe::{is_constant, mean};
+
+/// The analyses of all parts that are not ratings, of questionnaires, and of what ratings say of
+/// groups and sessions. Which participants count is decided as
+/// for ratings. Practice and trials without an answer do not count, nor do those that an
+/// exclusion rule excludes. Answers are the corrected ones, at the levels that were
+/// presented.
+pub fn parts(study: &StudyData<'_>, include: Include) -> Vec<PartAnalysis> {
+    let protocol = study.protocol;
+    let origin = |row: &RatingRow| Origin::of(row.simulated, row.pilot);
+    let origins: Vec<Origin> = study.rows.iter().map(origin).collect();
+    let whose = Whose::of(&origins, include);
+    let unfinished = protocol.analysis.unfinished;
+    let left_out: BTreeSet<&ParticipantId> = (study.participants.iter())
+        .filter(|p| !state_counts(p.state, unfinished))
+        .map(|p| &p.participant)
+        .collect();
+    let counts = |r: &&RatingRow| {
+        let counts = whose.counts(origin(r)) && !left_out.contains(&r.participant);
+        counts && !r.practice && r.status == Status::Ok
+    };
+    let rows: Vec<&RatingRow> = study.rows.iter().filter(counts).collect();
+    let intervals = Intervals::of(study.intervals);
+    let rules = Rules::of(protocol, "", include);
+    let one = |part: &Part| {
+        let of_part = |r: &&&RatingRow| r.part.as_ref() == Some(&part.id);
+        let all: Vec<&RatingRow> = rows.iter().filter(of_part).copied().collect();
+        let judged = excluded::trials((protocol, part), &all, &intervals);
+        let (excluded_by, exclusions) = exclude::apply(&rules.exclude, &judged);
+        let kept = (all.iter().zip(&excluded_by)).filter(|(_, rule)| rule.is_none());
+        let rows: Vec<&RatingRow> = kept.map(|(row, _)| *row).collect();
+        let found = |rows: &[&RatingRow]| of_part_task(study, part, rows, &intervals, &rules);
+        let mut own = found(&rows)?;
+        if rows.len() < all.len() {
+            let before = found(&all)?;
+            without_exclusions(&before.values, &mut own.values);
+        }
+        let who: BTreeSet<_> = rows.iter().map(|r| &r.participant).collect();
+        let facts = PartFacts {
+            values: &own.values,
+            alpha: rules.alpha,
+            participants: who.len(),
+        };
+        let names: Vec<&str> = own.names.iter().map(String::as_str).collect();
+        let (mut findings, pairs) = match &part.task {
+            Task::Pairs(_) => of_preferences(&facts, &own.names),
+            Task::Magnitude(_) => of_realizations(&facts, &names),
+            _ => of_thresholds(&facts, &names),
+        };
+        let told = |name: &&&str| {
+            own.values
+                .get(&group_id("sdt_group", &[name, "n"]))
+                .is_some()
+        };
+        let told: Vec<&str> = names.iter().filter(told).copied().collect();
+        findings.extend(of_sensitivities(&facts, &told));
+        findings.extend(of_groups_and_sessions(&facts));
+        let uncompared = match part.task {
+            Task::Pairs(_) => Some(
+                "groups are compared by what they prefer, and sessions are not compared: abilities are those of \
+                 all participants and sessions together",
+            ),
+            Task::Magnitude(_) => Some(
+                "groups are compared by condition only, and sessions are not compared: each participant has \
+                 numbers of their own",
+            ),
+            Task::Mushra(_) => Some(
+                "groups and sessions are not compared in this part: its means are those of all participants \
+                 together",
+            ),
+            Task::Rating(_) | Task::Discrimination { .. } => None,
+        };
+        let several = protocol.groups.is_some() || sessions_of(protocol, part).len() > 1;
+        if let Some(text) = uncompared.filter(|_| several) {
+            own.warnings.push(Warning {
+                code: "groups-not-compared",
+                text: text.to_owned(),
+            });
+        }
+        Some(PartAnalysis {
+            part: part.id.clone(),
+            task: own.task,
+            trials: own.trials,
+            participants: who.len(),
+            pilot: rows.iter().any(|r| r.pilot),
+            simulated: rows.iter().any(|r| r.simulated),
+            values: own.values,
+            findings,
+            pairs,
+            warnings: own.warnings,
+            exclusions,
+            alpha: rules.alpha,
+            used: (rows.iter())
+                .map(|r| (r.participant.clone(), r.session, r.trial))
+                .collect(),
+            data: own.data,
+        })
+    };
+    let parts = protocol.parts.iter().filter_map(one);
+    let questionnaires = of_questionnaires(study, include);
+    parts.chain(questionnaires).collect()
+}
+
+/// The statistics of these trials of a part; `None` of ratings.
+fn of_part_task(
+    study: &StudyData<'_>,
+    part: &Part,
+    rows: &[&RatingRow],
+    intervals: &Intervals<'_>,
+    rules: &Rules,
+) -> Option<Found> {
+    match &part.task {
+        Task::Rating(own) => of_ratings(study, part, own, rows),
+        Task::Magnitude(own) => Some(of_magnitudes(study.protocol, part, own, (rows, rules))),
+        Task::Mushra(own) => Some(of_mushra(study.protocol, part, &own.presentations, rows)),
+        Task::Pairs(pairs) => Some(of_pairs(study, part, pairs, rows, intervals, rules)),
+        Task::Discrimination { tracks } => {
+            let protocol = study.protocol;
+            let tracks: Vec<&TrackRules> =
+                tracks.iter().filter_map(|id| protocol.track(id)).collect();
+            of_tracks(study, part, &tracks, rows)
+        }
+    }
+}
+
+/// What a rating part says of groups and sessions, in a study that has them. All else about
+/// ratings is in their own analysis.
+fn of_ratings(
+    study: &StudyData<'_>,
+    part: &Part,
+    own: &Presentations,
+    rows: &[&RatingRow],
+) -> Option<Found> {
+    let protocol = study.protocol;
+    if protocol.groups.is_none() && protocol.sessions.is_empty() {
+        return None;
+    }
+    let tested = |id: &ModelId| {
+        let model = protocol.model(id);
+        model.is_some_and(|m| m.role == Role::Test && m.duplicate_of.is_none())
+    };
+    let asked = asked(protocol, part)?;
+    let mut cells: BTreeMap<(&ParticipantId, Option<&PartId>, &ModelId), Vec<f64>> =
+        BTreeMap::new();
+    for row in rows {
+        let model = row
+            .model
+            .as_ref()
+            .filter(|id| own.models.contains(id) && tested(id));
+        let rating = row.answers.get(asked).and_then(Answer::number);
+        if let (Some(model), Some(rating)) = (model, rating) {
+            let cell = (&row.participant, row.session_id.as_ref(), model);
+            cells.entry(cell).or_default().push(rating);
+        }
+    }
+    let sessions = sessions_of(protocol, part);
+    let several = sessions.len() > 1;
+    let groups = groups(rows);
+    let measured: Vec<Measured> = (cells.iter())
+        .filter_map(|((participant, session, model), ratings)| {
+            Some(Measured {
+                participant: participant.as_str().to_owned(),
+                group: groups.get(participant.as_str()).cloned(),
+                session: session.filter(|_| several).map(|s| s.as_str().to_owned()),
+                condition: model.as_str().to_owned(),
+                value: mean(ratings)?,
+            })
+        })
+        .collect();
+    let mut values = Values::default();
+    let ids: Vec<&str> = sessions.iter().flatten().map(|s| s.as_str()).collect();
+    again(&measured, &ids, false, &mut values);
+    Some(Found {
+        task: "rating",
+        trials: rows.len(),
+        values,
+        warnings: Vec::new(),
+        data: PartData::default(),
+        names: Vec::new(),
+    })
+}
+
+/// Adds what depends on the exclusions, as it would be without them.
+fn without_exclusions(before: &Values, values: &mut Values) {
+    for group in [
+        "pairs/ability/",
+        "pairs/vaf/pearson/",
+        "magnitude/",
+        "mushra/",
+        "psy_group/",
+        "psy_mixed/",
+        "sdt_group/",
+        "groups/",
+        "groups_conditions/",
+        "sessions/",
+        "retest/",
+    ] {
+        let ids = before.iter().filter(|(id, _)| id.starts_with(group));
+        for (id, _) in ids {
+            values.copy(before, id, format!("before_exclusion/{id}"));
+        }
+    }
+}
+
+fn of_pairs(
+    study: &StudyData<'_>,
+    part: &Part,
+    pairs: &Pairs,
+    rows: &[&RatingRow],
+    intervals: &Intervals<'_>,
+    rules: &Rules,
+) -> Found {
+    let chosen = |row: &&RatingRow| preference(part, row, intervals);
+    let chosen: Vec<Preference> = rows.iter().filter_map(chosen).collect();
+    let mut values = preferences(&chosen, pairs.tie, in_both_orders(&chosen));
+    by_condition(&shares(&chosen, &groups(rows)), &mut values);
+    let names: BTreeSet<&String> = chosen.iter().flat_map(|p| [&p.first, &p.second]).collect();
+    let models = study.protocol.models.iter();
+    let vaf: BTreeMap<String, f64> = models
+        .filter_map(|m| Some((m.id.as_str().to_owned(), m.vaf?)))
+        .filter(|(id, _)| names.contains(id))
+        .collect();
+    if !vaf.is_empty() {
+        with_vaf(&vaf, rules, &mut values);
+    }
+    Found {
+        task: "pairs",
+        trials: chosen.len(),
+        values,
+        warnings: Vec::new(),
+        names: names.into_iter().cloned().collect(),
+        data: PartData {
+            vaf,
+            ..PartData::default()
+        },
+    }
+}
+
+/// How large a share of their comparisons each participant's realizations win; a tie is half a
+/// win.
+fn shares(chosen: &[Preference], groups: &BTreeMap<String, String>) -> Vec<Measured> {
+    let mut won: BTreeMap<(&str, &str), (f64, f64)> = BTreeMap::new();
+    for p in chosen {
+        let first = match p.choice {
+            Choice::First(_) => 1.0,
+            Choice::Second(_) => 0.0,
+            Choice::Tie(_) => 0.5,
+        };
+        for (item, share) in [(&p.first, first), (&p.second, 1.0 - first)] {
+            let cell = won.entry((&p.participant, item)).or_default();
+            *cell = (cell.0 + share, cell.1 + 1.0);
+        }
+    }
+    let one = |((who, item), (won, of)): ((&str, &str), (f64, f64))| Measured {
+        participant: who.to_owned(),
+        group: groups.get(who).cloned(),
+        session: None,
+        condition: item.to_owned(),
+        value: won / of,
+    };
+    won.into_iter().map(one).collect()
+}
+
+/// The correlation of abilities with VAF over realizations, as that of mean ratings.
+fn with_vaf(vaf: &BTreeMap<String, f64>, rules: &Rules, values: &mut Values) {
+    let ability = |name: &str| values.number(&group_id("pairs/ability", &[name]));
+    let known = vaf
+        .iter()
+        .filter_map(|(name, vaf)| Some((name.as_str(), *vaf, ability(name)?)));
+    let known: Vec<(&str, f64, f64)> = known.collect();
+    let names: Vec<&str> = known.iter().map(|k| k.0).collect();
+    let x: Vec<f64> = known.iter().map(|k| k.1).collect();
+    let y: Vec<f64> = known.iter().map(|k| k.2).collect();
+    let mut correlation = Correlation::of(&x, &y, &names, rules);
+    if names.is_empty() {
+        correlation.explain(&"there are no abilities".into());
+    } else if !is_constant(&x) && is_constant(&y) {
+        correlation.explain(&"all abilities are equal".into());
+    }
+    correlation.put("pairs/vaf", values);
+}
+
+fn preference(part: &Part, row: &RatingRow, intervals: &Intervals<'_>) -> Option<Preference> {
+    let item = |interval: u32| {
+        let felt = intervals.counted(row).iter();
+        let model = felt
+            .filter(|i| i.interval == interval)
+            .find_map(|i| i.model.as_ref());
+        Some(model?.as_str().to_owned())
+    };
+    Some(Preference {
+        participant: row.participant.as_str().to_owned(),
+        first: item(1)?,
+        second: item(2)?,
+        choice: match chosen(part, row)? {
+            "first" => Choice::First(1.0),
+            "second" => Choice::Second(1.0),
+            _ => Choice::Tie(1.0),
+        },
+    })
+}

@@ -1,0 +1,341 @@
+//! Trials of somebody else's experiment, from a CSV.
+
+use super::preferences::{Choice, Preference, in_both_orders, preferences};
+use super::scales::{MagnitudeRow, MushraRoles, MushraRow, magnitude, mushra};
+use super::trials::{Asked, TrialCount, TrialSettings, discrimination};
+use crate::analyze::values::Values;
+use std::io::BufRead;
+use study_base::text::Untrusted;
+use study_stats::mushra::Screening;
+use thiserror::Error;
+
+/// What the rows of a table are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TableKind {
+    /// Trials: `participant[,condition][,level]`, and `target,answer` or `positive`; with
+    /// `trials`, a row stands for so many.
+    Trials(Asked),
+    /// Paired preferences: `[participant,]first,second,answer`.
+    Pairs,
+    /// Magnitude estimation: `participant,level,estimate`.
+    Magnitude,
+    /// Ratings with hidden reference: `participant,condition,role,rating`.
+    Mushra,
+}
+
+impl TableKind {
+    /// The kinds that are no trials, with their names.
+    const OTHERS: [(Self, &str); 3] = [
+        (Self::Pairs, "pairs"),
+        (Self::Magnitude, "magnitude"),
+        (Self::Mushra, "mushra"),
+    ];
+
+    /// The kind of a name.
+    pub fn named(name: &str) -> Option<Self> {
+        let asked = Asked::NAMES.iter().find(|n| n.1 == name);
+        let other = Self::OTHERS.iter().find(|n| n.1 == name);
+        asked
+            .map(|n| Self::Trials(n.0))
+            .or_else(|| other.map(|n| n.0))
+    }
+
+    /// All names.
+    pub fn names() -> impl Iterator<Item = &'static str> {
+        let others = Self::OTHERS.iter().map(|n| n.1);
+        Asked::NAMES.iter().map(|n| n.1).chain(others)
+    }
+}
+
+/// A table that cannot be analyzed.
+#[derive(Debug, Error)]
+pub enum TableError {
+    /// The CSV cannot be read.
+    #[error("{name}: {source}")]
+    Csv {
+        /// The file.
+        name: String,
+        /// What is wrong.
+        source: csv::Error,
+    },
+    /// A column is missing.
+    #[error("{name}: there is no column `{column}`; a table of {kind} has {columns}")]
+    Column {
+        /// The file.
+        name: String,
+        /// The column.
+        column: &'static str,
+        /// The kind of table.
+        kind: &'static str,
+        /// All columns of the kind.
+        columns: &'static str,
+    },
+    /// A cell that is not what its column has.
+    #[error("{name}:{line}: {column} is `{}`, expected {expected}", Untrusted(.cell))]
+    Cell {
+        /// The file.
+        name: String,
+        /// Line, from 1.
+        line: u64,
+        /// The column.
+        column: &'static str,
+        /// The cell. Untrusted.
+        cell: String,
+        /// What would be right.
+        expected: String,
+    },
+    /// Nothing to analyze.
+    #[error("{name}: there are no rows")]
+    Empty {
+        /// The file.
+        name: String,
+    },
+}
+
+/// The statistics of a CSV, and its number of rows.
+///
+/// # Errors
+/// [`TableError`] of the first fault.
+pub fn analyze_table(
+    name: &str,
+    input: impl BufRead,
+    kind: TableKind,
+    settings: &TrialSettings,
+) -> Result<(Values, usize), TableError> {
+    let rows = Rows::read(name, input, kind)?;
+    let values = match kind {
+        TableKind::Trials(asked) => discrimination(asked, &rows.trials(asked)?, settings),
+        TableKind::Pairs => {
+            let pairs = rows.pairs()?;
+            let ties = pairs.iter().any(|p| matches!(p.choice, Choice::Tie(_)));
+            preferences(&pairs, ties, in_both_orders(&pairs))
+        }
+        TableKind::Magnitude => magnitude(&rows.estimates()?),
+        TableKind::Mushra => {
+            let (ratings, roles) = rows.ratings()?;
+            mushra(&ratings, &roles, &Screening::default())
+        }
+    };
+    Ok((values, rows.records.len()))
+}
+
+struct Rows<'a> {
+    name: &'a str,
+    kind: TableKind,
+    header: Vec<String>,
+    records: Vec<(u64, csv::StringRecord)>,
+}
+
+impl<'a> Rows<'a> {
+    fn read(name: &'a str, input: impl BufRead, kind: TableKind) -> Result<Self, TableError> {
+        let fault = |source| TableError::Csv {
+            name: name.to_owned(),
+            source,
+        };
+        let mut reader = csv::ReaderBuilder::new()
+            .trim(csv::Trim::All)
+            .from_reader(input);
+        let header = reader.headers().map_err(fault)?.iter();
+        let header = header.map(|h| h.trim_start_matches('\u{feff}').to_owned());
+        let header = header.collect();
+        let mut records = Vec::new();
+        for record in reader.records() {
+            let record = record.map_err(fault)?;
+            records.push((record.position().map_or(0, csv::Position::line), record));
+        }
+        if records.is_empty() {
+            return Err(TableError::Empty {
+                name: name.to_owned(),
+            });
+        }
+        Ok(Self {
+            name,
+            kind,
+            header,
+            records,
+        })
+    }
+
+    fn column(&self, column: &str) -> Option<usize> {
+        self.header.iter().position(|h| h == column)
+    }
+
+    fn required(&self, column: &'static str) -> Result<usize, TableError> {
+        let found = match column {
+            "participant" => self.column(column).or_else(|| self.column("subject")),
+            _ => self.column(column),
+        };
+        let (kind, columns) = match self.kind {
+            TableKind::Trials(_) => (
+                "trials",
+                "participant[,condition][,level],target,answer[,trials] or participant[,condition],level,positive[,trials]",
+            ),
+            TableKind::Pairs => ("pairs", "[participant,]first,second,answer"),
+            TableKind::Magnitude => ("magnitude estimation", "participant,level,estimate"),
+            TableKind::Mushra => ("MUSHRA", "participant,condition,role,rating"),
+        };
+        found.ok_or_else(|| TableError::Column {
+            name: self.name.to_owned(),
+            column,
+            kind,
+            columns,
+        })
+    }
+
+    fn fault(
+        &self,
+        line: u64,
+        column: &'static str,
+        cell: &str,
+        expected: impl Into<String>,
+    ) -> TableError {
+        TableError::Cell {
+            name: self.name.to_owned(),
+            line,
+            column,
+            cell: cell.to_owned(),
+            expected: expected.into(),
+        }
+    }
+
+    fn number(
+        &self,
+        (line, record): &(u64, csv::StringRecord),
+        (column, at): (&'static str, usize),
+        range: (f64, f64),
+    ) -> Result<f64, TableError> {
+        let cell = &record[at];
+        let good = |x: &f64| x.is_finite() && range.0 <= *x && *x <= range.1;
+        (cell.parse().ok().filter(good)).ok_or_else(|| {
+            let expected = match range {
+                (low, high) if high < f64::MAX => format!("a number from {low} to {high}"),
+                (low, _) if low > f64::MIN => format!("a number of at least {low}"),
+                _ => "a number".to_owned(),
+            };
+            self.fault(*line, column, cell, expected)
+        })
+    }
+
+    /// The place of a word among the answers.
+    fn word(
+        &self,
+        (line, record): &(u64, csv::StringRecord),
+        (column, at): (&'static str, usize),
+        words: &[&str],
+    ) -> Result<usize, TableError> {
+        let cell = &record[at];
+        let found = words.iter().position(|w| w.eq_ignore_ascii_case(cell));
+        found.ok_or_else(|| self.fault(*line, column, cell, words.join(", ")))
+    }
+
+    fn trials(&self, asked: Asked) -> Result<Vec<TrialCount>, TableError> {
+        let participant = self.required("participant")?;
+        let (condition, level) = (self.column("condition"), self.column("level"));
+        let target = self.column("target");
+        let answer = self.column("answer");
+        let positive = self.column("positive");
+        let trials = self.column("trials");
+        if positive.is_none() {
+            self.required("answer")?;
+        } else {
+            self.required("level")?;
+        }
+        let words = asked.answers();
+        let one = |row: &(u64, csv::StringRecord)| {
+            let count = match trials {
+                Some(at) => self.number(row, ("trials", at), (0.0, 1e5))?,
+                None => 1.0,
+            };
+            let correct = match target {
+                Some(at) => Some(self.word(row, ("target", at), words)?),
+                None => None,
+            };
+            let positive = match (positive, answer) {
+                (Some(at), _) => self.number(row, ("positive", at), (0.0, count))?,
+                (None, Some(at)) => {
+                    let given = self.word(row, ("answer", at), words)?;
+                    count * f64::from(u8::from(given == correct.unwrap_or(0)))
+                }
+                (None, None) => 0.0,
+            };
+            let level = match level {
+                Some(at) if !row.1[at].is_empty() => {
+                    Some(self.number(row, ("level", at), (f64::MIN, f64::MAX))?)
+                }
+                _ => None,
+            };
+            Ok(TrialCount {
+                participant: row.1[participant].to_owned(),
+                condition: condition.map_or("all", |at| &row.1[at]).to_owned(),
+                level,
+                target: correct,
+                positive,
+                trials: count,
+            })
+        };
+        self.records.iter().map(one).collect()
+    }
+
+    fn pairs(&self) -> Result<Vec<Preference>, TableError> {
+        let participant = self
+            .column("participant")
+            .or_else(|| self.column("subject"));
+        let (first, second) = (self.required("first")?, self.required("second")?);
+        let answer = self.required("answer")?;
+        let one = |row: &(u64, csv::StringRecord)| {
+            let said = self.word(row, ("answer", answer), &["first", "second", "tie"])?;
+            Ok(Preference {
+                participant: participant.map_or("", |at| &row.1[at]).to_owned(),
+                first: row.1[first].to_owned(),
+                second: row.1[second].to_owned(),
+                choice: match said {
+                    0 => Choice::First(1.0),
+                    1 => Choice::Second(1.0),
+                    _ => Choice::Tie(1.0),
+                },
+            })
+        };
+        self.records.iter().map(one).collect()
+    }
+
+    fn estimates(&self) -> Result<Vec<MagnitudeRow>, TableError> {
+        let participant = self.required("participant")?;
+        let (level, estimate) = (self.required("level")?, self.required("estimate")?);
+        let any = (f64::MIN, f64::MAX);
+        let one = |row: &(u64, csv::StringRecord)| {
+            Ok(MagnitudeRow {
+                participant: row.1[participant].to_owned(),
+                level: self.number(row, ("level", level), any)?,
+                estimate: self.number(row, ("estimate", estimate), any)?,
+            })
+        };
+        self.records.iter().map(one).collect()
+    }
+
+    /// The ratings, and which conditions are hidden reference and mid anchor.
+    fn ratings(&self) -> Result<(Vec<MushraRow>, MushraRoles), TableError> {
+        const ROLES: [&str; 4] = ["test", "hidden-reference", "mid-anchor", "low-anchor"];
+        let participant = self.required("participant")?;
+        let (condition, rating) = (self.required("condition")?, self.required("rating")?);
+        let role = self.required("role")?;
+        let mut roles = MushraRoles {
+            reference: String::new(),
+            mid_anchor: None,
+        };
+        let mut rows = Vec::new();
+        for row in &self.records {
+            let condition = row.1[condition].to_owned();
+            match self.word(row, ("role", role), &ROLES)? {
+                1 => roles.reference.clone_from(&condition),
+                2 => roles.mid_anchor = Some(condition.clone()),
+                _ => {}
+            }
+            rows.push(MushraRow {
+                participant: row.1[participant].to_owned(),
+                condition,
+                rating: self.number(row, ("rating", rating), (0.0, 100.0))?,
+            });
+        }
+        Ok((rows, roles))
+    }
+}

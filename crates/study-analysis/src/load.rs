@@ -1,0 +1,504 @@
+//! Loading a protocol with its model files and its orders file.
+//!
+//! All files are read, each once, and all their faults are collected. Checks that
+//! need several files follow: VAFs that differ, orders that cannot be made.
+//!
+//! ```
+//! # fn main() -> Result<(), study_analysis::load::LoadError> {
+//! # let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../protocols/turn-signal");
+//! let loaded = study_analysis::load::load(folder.as_ref())?;
+//! assert_eq!(loaded.protocol.study.id, "turn-signal");
+//! assert_eq!(loaded.models.len(), loaded.protocol.models.len());
+//! # Ok(())
+//! # }
+//! ```
+
+use crate::preregister;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use study_base::diagnostic::{Fault, Findings, Severity};
+use study_base::text::ModelId;
+use study_haptics::model::{Realization, Units};
+use study_plan::protocol::file::{self, Named, Parsed};
+use study_plan::protocol::fingerprint::{self, Fingerprints, Parts, family_file};
+use study_plan::protocol::{DeviceKind, FileOrders, ModelEntry, Order, Protocol, check};
+use study_session::store::disk::read_capped;
+use study_session::store::layout;
+
+mod families;
+mod frozen;
+mod join;
+mod recordings;
+
+pub use frozen::{FrozenError, changes, damage, frozen, frozen_version, frozen_versions};
+pub use recordings::{Deliveries, RecordingError, deliveries};
+
+/// Largest model file and orders file that are read, bytes.
+const MAX_MODEL_BYTES: usize = 16 * 1024 * 1024;
+const MAX_ORDERS_BYTES: usize = 64 * 1024 * 1024;
+
+/// Hint for a table that fails its certificate.
+const PERMIT: &str = "identify it with m, b >= 0, or permit it in [device]: uncertified = { play = true, force_n = ..., reason = \"...\" }";
+
+/// File name of a protocol in its folder.
+pub const FILE_NAME: &str = "protocol.toml";
+
+/// A protocol that cannot be used, or a file of it.
+#[derive(Debug, Clone, thiserror::Error)]
+#[error("{}", first(.0))]
+pub struct LoadError(pub Vec<Findings>);
+
+/// The first error, for those who print a single line.
+fn first(findings: &[Findings]) -> String {
+    let errors = |f: &Findings| f.only(Severity::Error);
+    let found = (findings.iter()).find_map(|f| Some((&f.path, errors(f).faults.pop()?)));
+    found.map_or_else(
+        || "the protocol cannot be loaded".to_owned(),
+        |(path, fault)| format!("{path}: {}", fault.message),
+    )
+}
+
+/// A realization that a device cannot play or must not play.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Unplayable {
+    /// It has no table, and the device needs one.
+    #[error("realization `{0}` has no table for a {device} device", device = .1.as_str())]
+    NoTable(ModelId, DeviceKind),
+    /// It fails its certificate, and the protocol does not permit that.
+    #[error(
+        "the table of `{0}` can put energy into a hand, which the protocol, made for samples mounted by hand, does not permit"
+    )]
+    NotPermitted(ModelId),
+}
+
+impl Unplayable {
+    /// What to do next.
+    pub fn hint(&self) -> &'static str {
+        match self {
+            Self::NoTable(..) => {
+                "add its `file`; only a child program or a sample mounted by hand needs none"
+            }
+            Self::NotPermitted(_) => PERMIT,
+        }
+    }
+}
+
+/// A protocol with all its files.
+#[derive(Debug)]
+pub struct Loaded {
+    /// Protocol, including the VAFs of the model files.
+    pub protocol: Protocol,
+    /// Folder of the protocol.
+    pub folder: PathBuf,
+    /// Path of the protocol file.
+    pub path: PathBuf,
+    /// The table of each realization that has a file.
+    pub models: BTreeMap<ModelId, Realization>,
+    /// The tables of all levels and standards of families.
+    pub levels: BTreeMap<ModelId, Realization>,
+    /// The orders file, if the design has one.
+    pub orders: Option<FileOrders>,
+    /// The files of the study: relative path, separated by `/`, and bytes;
+    /// `protocol.toml` first, then each other file once.
+    pub files: Vec<(String, Vec<u8>)>,
+    /// What the fingerprints are made of.
+    pub parts: Parts,
+    /// Fingerprints of the study.
+    pub fingerprints: Fingerprints,
+    /// The warnings of all files.
+    pub findings: Vec<Findings>,
+}
+
+impl Loaded {
+    /// Every table that a session may play.
+    pub fn tables(&self) -> BTreeMap<ModelId, Realization> {
+        let all = self.models.iter().chain(&self.levels);
+        all.map(|(id, table)| (id.clone(), table.clone())).collect()
+    }
+
+    /// Refuses realizations that a kind of device cannot play or must not play. Samples
+    /// mounted by hand need no table.
+    ///
+    /// # Errors
+    /// [`Unplayable`], for the first of them.
+    pub fn check_playable(&self, kind: DeviceKind) -> Result<(), Unplayable> {
+        let by_hand = |m: &&ModelEntry| m.device == Some(DeviceKind::Manual);
+        if kind == DeviceKind::Manual {
+            return Ok(());
+        }
+        let rules = self.protocol.device.uncertified.as_ref();
+        let permitted = rules.is_some_and(|rules| rules.play);
+        for model in self.protocol.models.iter().filter(|m| !by_hand(m)) {
+            let id = || model.id.clone();
+            match self.models.get(&model.id) {
+                None if kind != DeviceKind::Process => return Err(Unplayable::NoTable(id(), kind)),
+                Some(table) if !permitted && !table.certificate().passes() => {
+                    return Err(Unplayable::NotPermitted(id()));
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// Number of trials of a session, including practice.
+    pub fn trials(&self) -> usize {
+        match self.orders.as_ref().and_then(|rows| rows.values().next()) {
+            Some(row) => row.len() + self.protocol.design.practice.len(),
+            None => check::trials(&self.protocol) as usize,
+        }
+    }
+}
+
+/// Loads the protocol at `path`, a `protocol.toml` or the folder that contains one.
+///
+/// # Errors
+/// [`LoadError`] with all faults of all files if any of them is an error.
+pub fn load(path: &Path) -> Result<Loaded, LoadError> {
+    let (loaded, findings) = examine(path);
+    loaded.ok_or(LoadError(findings))
+}
+
+/// The same for a study that may have started in `results`, a results folder or the
+/// folder of the study in it. Such a study goes on even if not all its orders can be
+/// made.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_for(path: &Path, results: &Path) -> Result<Loaded, LoadError> {
+    let (loaded, findings) = open(path, Purpose::Sessions(results));
+    loaded.ok_or(LoadError(findings))
+}
+
+/// Loads the frozen protocol of a running study in order to read its data: tables
+/// that must not be played are accepted.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_frozen(path: &Path) -> Result<Loaded, LoadError> {
+    let (loaded, findings) = open(path, Purpose::Data);
+    loaded.ok_or(LoadError(findings))
+}
+
+/// Loads the protocol at `path`; returns all errors and warnings, and the protocol if
+/// there are no errors.
+pub fn examine(path: &Path) -> (Option<Loaded>, Vec<Findings>) {
+    open(path, Purpose::Design)
+}
+
+/// What a protocol is loaded for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Purpose<'a> {
+    /// Everything it contains must be possible.
+    Design,
+    /// Sessions of a study that may have started in this folder.
+    Sessions(&'a Path),
+    /// Reading the data of a study that has started.
+    Data,
+}
+
+impl Purpose<'_> {
+    fn has_started(self, study: &str) -> bool {
+        match self {
+            Self::Design => false,
+            Self::Sessions(results) => [results.join(study), results.to_owned()]
+                .iter()
+                .any(|folder| folder.join(layout::MANIFEST).symlink_metadata().is_ok()),
+            Self::Data => true,
+        }
+    }
+}
+
+fn open(path: &Path, purpose: Purpose<'_>) -> (Option<Loaded>, Vec<Findings>) {
+    let path = if path.is_dir() && purpose != Purpose::Data {
+        path.join(FILE_NAME)
+    } else {
+        path.to_owned()
+    };
+    let shown = path.display().to_string();
+    let bytes = match read_capped(&path, file::MAX_FILE_BYTES) {
+        Ok(bytes) => bytes,
+        Err(problem) => {
+            let fault = Fault::error(problem.to_string())
+                .hint("PROTOCOL is a protocol.toml or the folder that holds one");
+            return (None, vec![Findings::alone(shown, fault)]);
+        }
+    };
+    let text = match text_of(&bytes) {
+        Ok(text) => text,
+        Err(fault) => return (None, vec![Findings::alone(shown, fault)]),
+    };
+    let Parsed {
+        protocol,
+        mut findings,
+        spans,
+        named,
+    } = file::parse(&shown, text);
+    let folder = match path.parent() {
+        Some(parent) if parent != Path::new("") => parent.to_owned(),
+        _ => PathBuf::from("."),
+    };
+    let mut others = OtherFiles::new(&folder);
+    for name in named {
+        if let Err(fault) = others.open(&name) {
+            let place = spans.get(&name.place).cloned();
+            findings.faults.push(fault.at(place));
+        }
+    }
+    let Some(mut protocol) = protocol else {
+        findings.sort();
+        return (None, others.findings(findings));
+    };
+    others.assign(&protocol);
+    others.turn(protocol.device.lever_mm);
+    join::vaf(&mut protocol, &others, &spans, &mut findings);
+    if purpose != Purpose::Data {
+        join::certificates(&protocol, &others, &spans, &mut findings);
+    }
+    let played = purpose != Purpose::Data;
+    let levels = families::realizations(&protocol, &others, &spans, played, &mut findings);
+    let orders = others.orders.take();
+    // An order whose file is missing cannot be checked.
+    if orders.is_some() || !matches!(protocol.design.order, Order::File(_)) {
+        let started = purpose.has_started(&protocol.study.id);
+        join::orders(&protocol, orders.as_ref(), started, &spans, &mut findings);
+    }
+    let unread = others.unread(&protocol);
+    findings
+        .faults
+        .extend(check::warnings(&protocol, &spans, &unread));
+    findings.sort();
+
+    let mut files = vec![(FILE_NAME.to_owned(), bytes)];
+    let parts = fingerprint::parts(&protocol, &others.bytes_by_model(), orders.as_ref());
+    let models = others.realizations();
+    files.extend(others.take_bytes());
+    // Frozen with the protocol; nothing else depends on it.
+    if let Ok(bytes) = read_capped(&folder.join(preregister::FILE), file::MAX_FILE_BYTES) {
+        files.push((preregister::FILE.to_owned(), bytes));
+    }
+    let all = others.findings(findings);
+    if all.iter().any(Findings::has_errors) {
+        return (None, all);
+    }
+    let loaded = Loaded {
+        protocol,
+        folder,
+        path,
+        models,
+        levels,
+        orders,
+        files,
+        fingerprints: parts.fingerprints(),
+        parts,
+        findings: all.clone(),
+    };
+    (Some(loaded), all)
+}
+
+/// The other files of a protocol, each read once.
+#[derive(Debug)]
+struct OtherFiles<'f> {
+    folder: &'f Path,
+    /// In the order of the protocol.
+    opened: Vec<Opened>,
+    orders: Option<FileOrders>,
+    /// Realization → index in `opened`.
+    models: BTreeMap<ModelId, usize>,
+    /// The same for the ends of families.
+    ends: BTreeMap<ModelId, usize>,
+}
+
+#[derive(Debug)]
+struct Opened {
+    file: String,
+    bytes: Vec<u8>,
+    realization: Option<Realization>,
+    findings: Findings,
+}
+
+impl<'f> OtherFiles<'f> {
+    fn new(folder: &'f Path) -> Self {
+        Self {
+            folder,
+            opened: Vec::new(),
+            orders: None,
+            models: BTreeMap::new(),
+            ends: BTreeMap::new(),
+        }
+    }
+
+    /// Reads a file that the protocol names, once. The returned fault concerns the
+    /// protocol; the faults of the file itself are kept with the file.
+    fn open(&mut self, name: &Named) -> Result<(), Fault> {
+        if self.opened.iter().any(|o| o.file == name.file) {
+            return Ok(());
+        }
+        let (most, what) = if name.orders {
+            (MAX_ORDERS_BYTES, "orders")
+        } else {
+            (MAX_MODEL_BYTES, "model")
+        };
+        let path = self.folder.join(&name.file);
+        let bytes = read_capped(&path, most).map_err(|problem| {
+            Fault::error(format!("the {what} file cannot be read: {problem}"))
+                .hint("paths are relative to the protocol")
+        })?;
+        let shown = path.display().to_string();
+        let mut realization = None;
+        let findings = match text_of(&bytes) {
+            Err(fault) => Findings::alone(shown, fault),
+            Ok(text) if name.orders => {
+                let (orders, findings) = file::parse_orders(&shown, text);
+                if !findings.has_errors() {
+                    self.orders = Some(orders);
+                }
+                findings
+            }
+            Ok(text) => {
+                let (read, findings) = study_haptics::model::file::parse(&shown, text);
+                realization = read;
+                findings
+            }
+        };
+        self.opened.push(Opened {
+            file: name.file.clone(),
+            bytes,
+            realization,
+            findings,
+        });
+        Ok(())
+    }
+
+    /// Converts the realizations of a turning handle to mm and N at the lever arm.
+    fn turn(&mut self, lever_mm: Option<f64>) {
+        for opened in &mut self.opened {
+            let rotary = |r: &Realization| r.units != Units::Linear;
+            let Some(realization) = opened.realization.take_if(|r| rotary(r)) else {
+                continue;
+            };
+            match lever_mm {
+                Some(lever_mm) => opened.realization = Some(realization.at_lever(lever_mm)),
+                None => {
+                    let [x, f] = realization.units.names();
+                    opened.findings.faults.push(
+                        Fault::error(format!("the realization is in {x} and {f}"))
+                            .hint("`device.lever_mm` of the protocol says where the hand holds"),
+                    );
+                }
+            }
+        }
+    }
+
+    /// Assigns each realization and each end of a family its file.
+    fn assign(&mut self, protocol: &Protocol) {
+        let index = |file: Option<&String>| self.opened.iter().position(|o| Some(&o.file) == file);
+        for model in &protocol.models {
+            if let Some(index) = index(model.file.as_ref()) {
+                self.models.insert(model.id.clone(), index);
+            }
+        }
+        for family in &protocol.families {
+            for (end, file) in [("from", Some(&family.from)), ("to", family.to.as_ref())] {
+                if let (Some(id), Some(index)) = (family_file(&family.id, end), index(file)) {
+                    self.ends.insert(id, index);
+                }
+            }
+        }
+    }
+
+    /// The realizations whose file is missing or faulty.
+    fn unread<'p>(&self, protocol: &'p Protocol) -> Vec<&'p ModelId> {
+        let models = protocol.models.iter().filter(|m| m.file.is_some());
+        let unread = models.filter(|m| self.realization(&m.id).is_none());
+        unread.map(|m| &m.id).collect()
+    }
+
+    fn realization(&self, id: &ModelId) -> Option<&Realization> {
+        let index = self.models.get(id).or_else(|| self.ends.get(id))?;
+        self.opened[*index].realization.as_ref()
+    }
+
+    fn realizations(&self) -> BTreeMap<ModelId, Realization> {
+        self.models
+            .keys()
+            .filter_map(|id| Some((id.clone(), self.realization(id)?.clone())))
+            .collect()
+    }
+
+    fn bytes_by_model(&self) -> BTreeMap<ModelId, Vec<u8>> {
+        (self.models.iter().chain(&self.ends))
+            .map(|(id, index)| (id.clone(), self.opened[*index].bytes.clone()))
+            .collect()
+    }
+
+    fn take_bytes(&mut self) -> Vec<(String, Vec<u8>)> {
+        self.opened
+            .iter_mut()
+            .map(|o| (o.file.clone(), std::mem::take(&mut o.bytes)))
+            .collect()
+    }
+
+    /// The findings of all files, the protocol's first; files without findings are
+    /// omitted.
+    fn findings(self, protocol: Findings) -> Vec<Findings> {
+        std::iter::once(protocol)
+            .chain(self.opened.into_iter().map(|o| o.findings))
+            .filter(|f| !f.faults.is_empty())
+            .collect()
+    }
+}
+
+fn text_of(bytes: &[u8]) -> Result<&str, Fault> {
+    std::str::from_utf8(bytes).map_err(|e| {
+        let before = &bytes[..e.valid_up_to()];
+        let line = before.iter().filter(|b| **b == b'\n').count() + 1;
+        Fault::error(format!("line {line} is not UTF-8"))
+            .hint("save the file as UTF-8 in your editor")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    /// The order of row 1 is valid, that of row 2 is not.
+    const PROTOCOL: &str = r#"
+format = "study-protocol/1"
+study = { id = "example", title = "An example", seed = 2007 }
+design = { participants = 1, repetitions = 3, order = "williams", min_distance = 3 }
+device = { kind = "manual", limits = { force_n = 12.0, velocity_mm_s = 1000.0 } }
+trial = { reference = "Operate the real switch." }
+models = [{ id = "A" }, { id = "B" }, { id = "C" }, { id = "D" }, { id = "E" }]
+analysis = { primary = "realism" }
+
+[[questions]]
+id = "realism"
+kind = "rating"
+prompt = "How realistic did it feel?"
+from = 1
+to = 7
+labels = { 1 = "not at all realistic", 7 = "very realistic" }
+"#;
+
+    #[test]
+    fn a_study_that_has_started_goes_on_even_if_some_of_its_orders_are_invalid() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(FILE_NAME);
+        fs::write(&path, PROTOCOL).unwrap();
+        assert!(load(&path).is_err());
+        let results = folder.path().join("results");
+        assert!(load_for(&path, &results).is_err());
+
+        let study = results.join("example");
+        fs::create_dir_all(&study).unwrap();
+        fs::write(study.join(layout::MANIFEST), "").unwrap();
+        for results in [&results, &study] {
+            let loaded = load_for(&path, results).unwrap();
+            let mut faults = loaded.findings.iter().flat_map(|f| &f.faults);
+            assert!(faults.any(|f| f.message.starts_with("row 2, position 12: ")));
+        }
+        assert!(load_frozen(&path).is_ok());
+    }
+}

@@ -1,0 +1,406 @@
+//! From a part of pairs or tracks to settings: defaults, then `[power]`, then flags.
+
+use super::parts::{PairsWorld, PartWorld, TrackWorld, TracksWorld, Truth};
+use super::plan::{Defaults, LeftOut, numbers, slope, targets, tests};
+use super::{Assumptions, Cell, Overrides, Pace, Plan, PlanError, Scale, Settings, Test, Vaf};
+use crate::analyze::ALPHA;
+use crate::analyze::psychophysics::track_settings;
+use study_base::text::{ModelId, PartId};
+use study_plan::procedure::Ladder;
+use study_plan::protocol::parts::{IntervalOrder, Pairs, Part, Task, TrackRules, Vary};
+use study_plan::protocol::power::{PowerPlan, PowerTrack};
+use study_plan::protocol::{Method, Protocol, check};
+use study_stats::power::covariate::Spread;
+use study_stats::psychometric::{Core, Curve};
+
+/// Logits.
+const SLOPE: f64 = 0.5;
+const REALIZATION: f64 = 0.3;
+const TASTE: f64 = 0.5;
+const TIES: f64 = 0.2;
+const STUDIES_OF_PAIRS: u64 = 2000;
+/// Of tracks, each of which takes many fits.
+const STUDIES_OF_TRACKS: u64 = 200;
+
+/// The part that is meant: the one of the flag, or the one that asks the primary question;
+/// `None` if that is a part of ratings.
+fn meant<'p>(protocol: &'p Protocol, flag: Option<&PartId>) -> Result<Option<&'p Part>, PlanError> {
+    let primary = &protocol.analysis.primary;
+    let found = match flag {
+        Some(id) => Some(
+            protocol
+                .part(id)
+                .ok_or_else(|| PlanError::NoPart(id.clone()))?,
+        ),
+        None => (protocol.parts.iter()).find(|part| part.asks.first() == Some(primary)),
+    };
+    Ok(found.filter(|part| !matches!(part.task, Task::Rating(_))))
+}
+
+impl Plan {
+    /// The plan of a protocol (with VAF filled in) and flags.
+    ///
+    /// # Errors
+    /// If the two contradict each other, or too few realizations have a VAF.
+    pub fn of(protocol: &Protocol, flags: &Overrides) -> Result<Self, PlanError> {
+        let part = meant(protocol, flags.part.as_ref())?;
+        let (what, pairs, tracks) = match part.map(|part| &part.task) {
+            Some(Task::Pairs(_)) => ("pairs", true, false),
+            Some(Task::Discrimination { .. }) => ("tracks", false, true),
+            _ => ("ratings", false, false),
+        };
+        if let Some(flag) = unused(&flags.plan, pairs, tracks) {
+            return Err(PlanError::Unused(flag, what));
+        }
+        match part {
+            Some(part) => plan(protocol, flags, part),
+            None => Self::of_ratings(protocol, flags),
+        }
+    }
+}
+
+/// A flag that was given and is not one of pairs, of tracks, or else of ratings.
+fn unused(over: &PowerPlan, pairs: bool, tracks: bool) -> Option<&'static str> {
+    let ratings = !pairs && !tracks;
+    let sd = &over.sd;
+    let flags = [
+        ("slope", over.slope.is_some(), !tracks),
+        ("rho", over.rho.is_some(), !tracks),
+        ("smallest", over.smallest.is_some(), ratings),
+        ("mean", over.mean.is_some(), ratings),
+        ("scale", over.scale.is_some(), ratings),
+        ("vaf", over.vaf.is_some(), ratings),
+        ("reference", over.reference.is_some(), ratings),
+        ("ties", over.ties.is_some(), pairs),
+        ("track", over.track != PowerTrack::default(), tracks),
+        ("sd participant", sd.participant.is_some(), !pairs),
+        ("sd realization", sd.realization.is_some(), !tracks),
+        ("sd residual", sd.residual.is_some(), ratings),
+        ("sd slope", sd.slope.is_some(), ratings),
+    ];
+    let found = flags.into_iter().find(|(_, given, used)| *given && !used);
+    found.map(|(flag, ..)| flag)
+}
+
+/// The plan of a part.
+fn plan(protocol: &Protocol, flags: &Overrides, part: &Part) -> Result<Plan, PlanError> {
+    let (base, over) = (&protocol.power, &flags.plan);
+    if flags.pilot.is_some() {
+        return Err(PlanError::PilotOfPart(part.id.clone()));
+    }
+    let mut defaults = Defaults::default();
+    let participants = protocol.design.participants as usize;
+    let (world, spread, slope, own, repetitions) = match &part.task {
+        Task::Pairs(pairs) => of_pairs(protocol, (base, over), pairs, &mut defaults)?,
+        Task::Discrimination { tracks } => {
+            of_tracks(protocol, (base, over), tracks, &mut defaults)?
+        }
+        Task::Rating(_) | Task::Magnitude(_) | Task::Mushra(_) => {
+            return Err(PlanError::NoPower(part.id.clone()));
+        }
+    };
+    let own = Cell {
+        participants,
+        ..own
+    };
+    let given = |of: fn(&PowerPlan) -> &Vec<u32>| !of(over).is_empty() || !of(base).is_empty();
+    let fixed = [
+        (
+            "realizations",
+            given(|p| &p.realizations),
+            numbers((base, over), |p| &p.realizations, vec![own.realizations])
+                != [own.realizations],
+        ),
+        (
+            "repetitions",
+            given(|p| &p.repetitions) && matches!(world, PartWorld::Tracks(_)),
+            numbers((base, over), |p| &p.repetitions, repetitions.clone()) != repetitions,
+        ),
+    ];
+    if let Some((what, ..)) = fixed.into_iter().find(|f| f.1 && f.2) {
+        return Err(PlanError::Fixed(what, part.id.clone()));
+    }
+    let n = own.participants.max(2);
+    let participants = numbers((base, over), |p| &p.participants, vec![n, 2 * n, 4 * n]);
+    let repetitions = numbers((base, over), |p| &p.repetitions, repetitions);
+    let grid = (repetitions.iter())
+        .flat_map(|&repetitions| {
+            participants.iter().map(move |&participants| Cell {
+                participants,
+                repetitions,
+                ..own
+            })
+        })
+        .collect();
+    let tests = of_part(&world, tests((base, over)), &part.id)?;
+    let missing = over.missing.or(base.missing).unwrap_or(0.0);
+    if missing > 0.0 && matches!(world, PartWorld::Tracks(_)) {
+        return Err(PlanError::MissingOfTracks);
+    }
+    let studies = match world {
+        PartWorld::Pairs(_) => STUDIES_OF_PAIRS,
+        PartWorld::Tracks(_) => STUDIES_OF_TRACKS,
+    };
+    Ok(Plan {
+        settings: Settings {
+            assumptions: Assumptions {
+                slope,
+                smallest: None,
+                mean: 0.0,
+                spread,
+                scale: Scale::Continuous,
+                vaf: Vaf::Listed,
+                dropout: over.dropout.or(base.dropout).unwrap_or(0.0),
+                missing,
+                reference: 0.0,
+            },
+            part: Some(world),
+            pilot: None,
+            listed: Vec::new(),
+            tests,
+            alpha: protocol.analysis.alpha.unwrap_or(ALPHA),
+            margin: None,
+            seed: flags.seed.unwrap_or(protocol.study.seed),
+            studies: over.studies.or(base.studies).unwrap_or(studies),
+        },
+        part: Some(part.id.clone()),
+        own,
+        grid,
+        targets: targets((base, over)),
+        defaults: defaults.0,
+        exclusions: protocol.analysis.exclude.len(),
+        left_out: LeftOut::of(protocol, Some(&part.id)),
+        within: over.within.or(base.within),
+        max_session_min: over.max_session_min.or(base.max_session_min),
+        pace: Pace::of_part(protocol, part, own.realizations),
+    })
+}
+
+/// The tests of a part: those that are asked for, or its verdicts.
+fn of_part(
+    world: &PartWorld,
+    asked: Option<Vec<Test>>,
+    part: &PartId,
+) -> Result<Vec<Test>, PlanError> {
+    let possible = match world {
+        PartWorld::Pairs(pairs) => {
+            let mut known: Vec<f64> = pairs.vaf.iter().copied().flatten().collect();
+            known.sort_by(f64::total_cmp);
+            known.dedup();
+            let mut all = vec![Test::Preferred];
+            all.extend((known.len() >= 3).then_some(Test::PreferenceVaf));
+            all
+        }
+        PartWorld::Tracks(tracks) => {
+            let of = |truth: fn(&Truth) -> bool| {
+                tracks.tracks.iter().filter(|t| truth(&t.truth)).count()
+            };
+            let mut all = Vec::new();
+            all.extend((of(|t| matches!(t, Truth::Function(_))) >= 2).then_some(Test::Thresholds));
+            all.extend(
+                (of(|t| matches!(t, Truth::Sensitivity(_))) >= 1).then_some(Test::ToldApart),
+            );
+            all
+        }
+    };
+    let Some(asked) = asked.filter(|tests| *tests != [Test::Verdict]) else {
+        return Ok(possible);
+    };
+    match asked.iter().find(|test| !possible.contains(test)) {
+        Some(test) => Err(PlanError::NotOfPart(test.as_str(), part.clone())),
+        None => Ok(asked),
+    }
+}
+
+type Planned = (PartWorld, Spread, f64, Cell, Vec<usize>);
+
+fn of_pairs(
+    protocol: &Protocol,
+    (base, over): (&PowerPlan, &PowerPlan),
+    pairs: &Pairs,
+    defaults: &mut Defaults,
+) -> Result<Planned, PlanError> {
+    let mut items: Vec<_> = pairs.pairs.iter().flatten().collect();
+    // In the order of the protocol.
+    items.sort_by_key(|id| protocol.models.iter().position(|m| m.id == **id));
+    items.dedup();
+    let place = |id: &ModelId| items.iter().position(|item| **item == *id).unwrap_or(0);
+    let ties = over.ties.or(base.ties);
+    if ties.is_some_and(|share| share > 0.0) && !pairs.tie {
+        return Err(PlanError::NoTies);
+    }
+    let sd = |own: fn(&PowerPlan) -> Option<f64>| own(over).or(own(base));
+    let spread = Spread {
+        realization: defaults.or("sd.realization", sd(|p| p.sd.realization), REALIZATION),
+        interaction: defaults.or("sd.interaction", sd(|p| p.sd.interaction), TASTE),
+        ..NOTHING
+    };
+    let slope = slope((base, over), None, spread.realization)?;
+    let slope = defaults.or("slope", slope, SLOPE);
+    let world = PairsWorld {
+        vaf: (items.iter())
+            .map(|id| protocol.model(id).and_then(|m| m.vaf))
+            .collect(),
+        pairs: (pairs.pairs.iter())
+            .map(|[a, b]| [place(a), place(b)])
+            .collect(),
+        ties: pairs.tie.then(|| defaults.or("ties", ties, TIES)),
+        random_order: pairs.interval_order == IntervalOrder::Random,
+    };
+    let own = Cell {
+        realizations: items.len(),
+        repetitions: pairs.repetitions as usize,
+        participants: 0,
+    };
+    let repetitions = vec![own.repetitions];
+    Ok((PartWorld::Pairs(world), spread, slope, own, repetitions))
+}
+
+const NOTHING: Spread = Spread {
+    subject: 0.0,
+    realization: 0.0,
+    interaction: 0.0,
+    residual: 0.0,
+    slope: 0.0,
+};
+
+/// Two digits of a default, which people read.
+fn neat(x: f64) -> f64 {
+    let unit = 10f64.powi(x.abs().log10().floor() as i32 - 1);
+    if x == 0.0 {
+        0.0
+    } else {
+        (x / unit).round() / (1.0 / unit)
+    }
+}
+
+fn of_tracks(
+    protocol: &Protocol,
+    (base, over): (&PowerPlan, &PowerPlan),
+    ids: &[PartId],
+    defaults: &mut Defaults,
+) -> Result<Planned, PlanError> {
+    let tracks: Vec<&TrackRules> = ids.iter().filter_map(|id| protocol.track(id)).collect();
+    let family = |track: &&TrackRules| track.family().and_then(|id| protocol.family(id));
+    let ratios = !(tracks.iter().filter_map(family)).any(|f| f.vary == Vary::Blend);
+    let ladders: Vec<Option<Ladder>> = (tracks.iter())
+        .map(|track| track.family().map(|_| protocol.ladder(track)))
+        .collect();
+    let key = |of: fn(&PowerTrack) -> Option<f64>| of(&over.track).or(of(&base.track));
+    if let Some(track) = (tracks.iter().zip(&ladders))
+        .find(|(track, ladder)| ladder.is_some() && track.method == Method::SameDifferent)
+    {
+        return Err(PlanError::NoFunction(track.0.id.clone()));
+    }
+    let ends = ladders.iter().flatten().next().map(|ladder| {
+        let levels = ladder.levels();
+        (levels[0], levels[levels.len() - 1])
+    });
+    let ratios = ratios && ends.is_some();
+    let mut truths = Vec::new();
+    let with_levels = ladders.iter().flatten().count();
+    let typical = match ends {
+        None => None,
+        Some((low, high)) => {
+            let middle = match ratios && low > 0.0 {
+                true => (low * high).sqrt(),
+                false => f64::midpoint(low, high),
+            };
+            let threshold = defaults.or("track.threshold", key(|t| t.threshold), neat(middle));
+            let width = if ratios {
+                threshold
+            } else {
+                neat((high - low) / 3.0)
+            };
+            let width = defaults.or("track.width", key(|t| t.width), width);
+            let (ratio, difference) = (key(|t| t.ratio), key(|t| t.difference));
+            if (ratio.is_some() && !ratios) || (difference.is_some() && ratios) {
+                return Err(PlanError::RatioOrDifference(ratios));
+            }
+            let change = match (with_levels > 1, ratios) {
+                (false, _) => 0.0,
+                (true, true) => libm::log(defaults.or("track.ratio", ratio, 1.5)),
+                (true, false) => {
+                    defaults.or("track.difference", difference, neat((high - low) / 5.0))
+                }
+            };
+            let lapse = defaults.or("track.lapse", key(|t| t.lapse), 0.02);
+            Some((threshold, width, change, lapse))
+        }
+    };
+    let mut at = 0;
+    for (track, ladder) in tracks.iter().zip(ladders) {
+        let truth = match (&ladder, typical) {
+            (Some(_), Some((threshold, width, change, lapse))) => {
+                let along = at as f64 / (with_levels.max(2) - 1) as f64;
+                at += 1;
+                let factor = if ratios {
+                    libm::exp(change * along)
+                } else {
+                    1.0
+                };
+                let shift = if ratios { 0.0 } else { change * along };
+                let gamma = match track.method.guess_rate() {
+                    Some(guess) => guess,
+                    None => defaults.or("track.guess", key(|t| t.guess), 0.1),
+                };
+                Truth::Function(Curve {
+                    core: Core::Norm,
+                    threshold: threshold * factor + shift,
+                    width: width * factor,
+                    gamma,
+                    lambda: lapse,
+                })
+            }
+            _ => Truth::Sensitivity(defaults.or("track.d", key(|t| t.d), 1.0)),
+        };
+        truths.push(TrackWorld {
+            rules: (*track).clone(),
+            ladder: ladder.unwrap_or_else(|| protocol.ladder(track)),
+            settings: track_settings(protocol, track),
+            truth,
+        });
+    }
+    let (person, both) = match (ratios, ends) {
+        (true, _) => (0.3, 0.15),
+        (false, Some((low, high))) => (neat((high - low) / 10.0), neat((high - low) / 20.0)),
+        (false, None) => (0.5, 0.25),
+    };
+    let sd = |own: fn(&PowerPlan) -> Option<f64>| own(over).or(own(base));
+    let spread = Spread {
+        subject: defaults.or("sd.participant", sd(|p| p.sd.participant), person),
+        interaction: defaults.or("sd.interaction", sd(|p| p.sd.interaction), both),
+        ..NOTHING
+    };
+    let own = Cell {
+        realizations: truths.len(),
+        repetitions: 1,
+        participants: 0,
+    };
+    let world = TracksWorld {
+        tracks: truths,
+        ratios,
+    };
+    Ok((PartWorld::Tracks(world), spread, 0.0, own, vec![1]))
+}
+
+impl Pace {
+    /// Of a study whose part of pairs has other numbers of repetitions.
+    fn of_part(protocol: &Protocol, part: &Part, realizations: usize) -> Self {
+        let minutes = check::minutes(protocol);
+        let mut longer = protocol.clone();
+        let mut repetitions = 0.0;
+        for other in longer.parts.iter_mut().filter(|p| p.id == part.id) {
+            if let Task::Pairs(own) = &mut other.task {
+                repetitions = f64::from(own.repetitions);
+                own.repetitions += 1;
+            }
+        }
+        let one = check::minutes(&longer) - minutes;
+        Self {
+            fixed: minutes - one * repetitions,
+            trial: one / realizations.max(1) as f64,
+            others: 0,
+        }
+    }
+}

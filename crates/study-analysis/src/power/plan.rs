@@ -1,0 +1,573 @@
+//! From a protocol to settings: defaults, then `[power]`, then a pilot, then flags.
+
+use super::{Assumptions, Cell, Pilot, Scale, Settings, Test, Vaf};
+use crate::analyze::ALPHA;
+use study_base::text::{PartId, QuestionId};
+use study_plan::protocol::parts::Task;
+use study_plan::protocol::power::{PowerLink, PowerPlan, PowerScale};
+use study_plan::protocol::{Protocol, Role, check};
+use study_stats::power::covariate::Spread;
+use thiserror::Error;
+
+/// Assumed where nobody says otherwise.
+const SLOPE: f64 = 0.5;
+const SPREAD: Spread = Spread {
+    subject: 0.6,
+    realization: 0.3,
+    interaction: 0.4,
+    residual: 0.8,
+    slope: 0.0,
+};
+const STUDIES: u64 = 10_000;
+const TARGETS: [f64; 2] = [0.8, 0.9];
+
+/// Why a protocol has no plan.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum PlanError {
+    /// Too few realizations with a VAF.
+    #[error("{0} tested realizations have a VAF, but a correlation over them takes three")]
+    FewRealizations(usize),
+    /// No number and no part of pairs or tracks.
+    #[error("`{0}` is no rating, and no part of pairs or tracks asks it")]
+    NoRatings(QuestionId),
+    /// No such part.
+    #[error("there is no part `{0}`")]
+    NoPart(PartId),
+    /// Another kind of part.
+    #[error(
+        "the power of part `{0}` is not computed: ratings, pairs and tracks are simulated, but not \
+         magnitude estimation and MUSHRA"
+    )]
+    NoPower(PartId),
+    /// A pilot of ratings for another part.
+    #[error("a pilot has estimates for ratings, not for part `{0}`: state its assumptions")]
+    PilotOfPart(PartId),
+    /// Numbers that the protocol fixes.
+    #[error("the number of {0} of part `{1}` is that of the protocol")]
+    Fixed(&'static str, PartId),
+    /// A test of something else.
+    #[error("`{0}` is no test of part `{1}`")]
+    NotOfPart(&'static str, PartId),
+    /// A test of a part for ratings.
+    #[error("`{0}` is no test of ratings, but of a part of pairs or tracks")]
+    NotOfRatings(&'static str),
+    /// A flag that changes nothing.
+    #[error("`--{0}` does not apply to {1}: leave it out")]
+    Unused(&'static str, &'static str),
+    /// Trials of a track are asked until there is an answer.
+    #[error("missing trials of tracks are not simulated: leave missing out")]
+    MissingOfTracks,
+    /// Ties without an answer for them.
+    #[error("ties are no answer in this part: leave them out")]
+    NoTies,
+    /// A ratio of levels without ratios, or the other way round.
+    #[error("{}", match .0 {
+        true => "the levels have ratios: state track.ratio, not track.difference",
+        false => "the levels have no ratios: state track.difference, not track.ratio",
+    })]
+    RatioOrDifference(bool),
+    /// A kind of trial without a psychometric function.
+    #[error("track `{0}`: same-different with levels has no threshold")]
+    NoFunction(PartId),
+    /// Equivalence with a reference that does not exist.
+    #[error("the test `reference-equivalence` needs a realization with the role hidden-reference")]
+    NoReference,
+    /// Thresholds of a pilot without one.
+    #[error("the scale `logit` without thresholds takes them from a pilot, and there is none")]
+    NoPilot,
+    /// Both ways to state the effect.
+    #[error("the slope and rho state the same effect: give one of them")]
+    SlopeAndRho,
+    /// A correlation without scatter.
+    #[error("rho needs scatter of the realizations: sd.realization is 0")]
+    RhoWithoutScatter,
+    /// Listed VAF for another number of realizations.
+    #[error(
+        "vaf = \"listed\" allows only the {0} listed realizations; use \"spread\" or \"drawn\""
+    )]
+    Listed(usize),
+    /// A residual for the link `logit`.
+    #[error("the link `logit` has its own residual: leave sd.residual out")]
+    LogitResidual,
+    /// Thresholds of another scale.
+    #[error(
+        "{0} thresholds are given, but the primary question has {1} levels: one fewer is needed"
+    )]
+    Thresholds(usize, i64),
+    /// An ordered scale for a question without levels.
+    #[error("the primary question is no rating: only scale = \"continuous\" is possible")]
+    NoLevels,
+    /// Stated thresholds for a pilot.
+    #[error(
+        "the estimates of a pilot are rating points, not logits: leave the thresholds out, and they are the pilot's, too"
+    )]
+    PilotLogit,
+    /// Equivalence without a margin.
+    #[error("the test `{0}` needs equivalence_margin in [analysis]")]
+    NoMargin(&'static str),
+}
+
+/// What flags state; later than `[power]`.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Overrides {
+    /// As in `[power]`.
+    pub plan: PowerPlan,
+    /// Seed of all numbers; without it that of the study.
+    pub seed: Option<u64>,
+    /// A pilot's estimates.
+    pub pilot: Option<Pilot>,
+    /// The part that is meant; without it the one with the primary question.
+    pub part: Option<PartId>,
+}
+
+/// What to simulate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// How.
+    pub settings: Settings,
+    /// The part of pairs or tracks; `None`: ratings.
+    pub part: Option<PartId>,
+    /// The protocol's own design.
+    pub own: Cell,
+    /// The designs that are compared.
+    pub grid: Vec<Cell>,
+    /// Power that is wanted.
+    pub targets: Vec<f64>,
+    /// What nobody stated, and so has a default; `key = value`.
+    pub defaults: Vec<String>,
+    /// Exclusion rules of the protocol, which are not simulated.
+    pub exclusions: usize,
+    /// What else of the protocol is not.
+    pub left_out: LeftOut,
+    /// Half-width of the interval of the power at which a cell has enough studies.
+    pub within: Option<f64>,
+    /// The longest session, min.
+    pub max_session_min: Option<f64>,
+    /// What is known of the duration of a session.
+    pub pace: Pace,
+}
+
+/// What is not simulated.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct LeftOut {
+    /// Whether the study has groups: what differs between them.
+    pub groups: bool,
+    /// Whether it has several sessions: all but one.
+    pub sessions: bool,
+    /// Other parts that can be simulated.
+    pub parts: Vec<PartId>,
+    /// Parts of magnitude estimation and MUSHRA.
+    pub never: Vec<PartId>,
+}
+
+impl LeftOut {
+    pub(super) fn of(protocol: &Protocol, simulated: Option<&PartId>) -> Self {
+        let mut found = Self {
+            groups: protocol.groups.is_some(),
+            sessions: protocol.sessions.len() > 1,
+            ..Self::default()
+        };
+        for part in protocol
+            .parts
+            .iter()
+            .filter(|part| Some(&part.id) != simulated)
+        {
+            match part.task {
+                Task::Pairs(_) | Task::Discrimination { .. } => found.parts.push(part.id.clone()),
+                Task::Magnitude(_) | Task::Mushra(_) => found.never.push(part.id.clone()),
+                Task::Rating(_) => {}
+            }
+        }
+        found
+    }
+}
+
+/// The duration of a session, from the estimate of `study check`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pace {
+    /// What does not depend on the number of trials, min.
+    pub(super) fixed: f64,
+    /// A repetition of one realization, min.
+    pub(super) trial: f64,
+    /// Realizations that are presented besides those of a cell.
+    pub(super) others: usize,
+}
+
+impl Pace {
+    fn of(protocol: &Protocol, tested: usize) -> Self {
+        let repetitions = protocol.design.repetitions;
+        let presented = protocol.scheduled_models().count();
+        let mut longer = protocol.clone();
+        longer.design.repetitions = repetitions + 1;
+        let minutes = check::minutes(protocol);
+        let repetition = check::minutes(&longer) - minutes;
+        Self {
+            fixed: minutes - repetition * f64::from(repetitions),
+            trial: repetition / presented.max(1) as f64,
+            others: presented.saturating_sub(tested),
+        }
+    }
+
+    /// A session of a cell, min.
+    pub fn minutes(&self, realizations: usize, repetitions: usize) -> f64 {
+        self.fixed + self.trial * ((realizations + self.others) * repetitions) as f64
+    }
+}
+
+impl Plan {
+    /// The plan of the ratings of a protocol.
+    pub(super) fn of_ratings(protocol: &Protocol, flags: &Overrides) -> Result<Self, PlanError> {
+        let (base, over) = (&protocol.power, &flags.plan);
+        let mut defaults = Defaults::default();
+        let mut stated =
+            |key: &str, value: Option<f64>, default: f64| defaults.or(key, value, default);
+        let primary = &protocol.analysis.primary;
+        let rated = protocol.parts.iter().find_map(|part| match &part.task {
+            Task::Rating(own) if part.asks.contains(primary) => Some(own),
+            _ => None,
+        });
+        let listed: Vec<f64> = (protocol.models.iter())
+            .filter(|m| m.role == Role::Test && m.duplicate_of.is_none())
+            .filter(|m| rated.is_none_or(|own| own.models.contains(&m.id)))
+            .filter_map(|m| m.vaf)
+            .collect();
+        let repetitions = rated.map_or(protocol.design.repetitions, |own| own.repetitions);
+        let asked = protocol.questions.iter().find(|q| q.id == *primary);
+        if asked.is_some_and(|q| !q.kind.scale().is_number()) {
+            return Err(PlanError::NoRatings(primary.clone()));
+        }
+        if listed.len() < 3 {
+            return Err(PlanError::FewRealizations(listed.len()));
+        }
+        let pilot = flags.pilot.as_ref();
+        let asked = over.scale.as_ref().or(base.scale.as_ref());
+        let scale = match asked {
+            Some(PowerScale::FromPilot) => {
+                let found = pilot.and_then(|p| p.estimate.scale.clone());
+                found.ok_or(PlanError::NoPilot)?
+            }
+            _ => scale(protocol, asked)?,
+        };
+        let logit = matches!(
+            scale,
+            Scale::Ordinal {
+                link: PowerLink::Logit,
+                ..
+            }
+        );
+        if logit && pilot.is_some_and(|p| p.estimate.scale.is_none()) {
+            return Err(PlanError::PilotLogit);
+        }
+        let of_pilot = |f: fn(&Spread) -> f64| pilot.map(|p| f(&p.estimate.spread));
+        let sd = |own: fn(&PowerPlan) -> Option<f64>, pilot: Option<f64>| {
+            own(over).or(pilot).or(own(base))
+        };
+        let residual = sd(
+            |p| p.sd.residual,
+            of_pilot(|s| s.residual).filter(|_| !logit),
+        );
+        if logit && residual.is_some() {
+            return Err(PlanError::LogitResidual);
+        }
+        let spread = Spread {
+            subject: stated(
+                "sd.participant",
+                sd(|p| p.sd.participant, of_pilot(|s| s.subject)),
+                SPREAD.subject,
+            ),
+            realization: stated(
+                "sd.realization",
+                sd(|p| p.sd.realization, of_pilot(|s| s.realization)),
+                SPREAD.realization,
+            ),
+            interaction: stated(
+                "sd.interaction",
+                sd(|p| p.sd.interaction, of_pilot(|s| s.interaction)),
+                SPREAD.interaction,
+            ),
+            residual: if logit {
+                0.0
+            } else {
+                stated("sd.residual", residual, SPREAD.residual)
+            },
+            slope: stated("sd.slope", sd(|p| p.sd.slope, None), SPREAD.slope),
+        };
+        let of_pilot = pilot.map(|p| p.estimate.slope);
+        let slope = slope((base, over), of_pilot, spread.realization)?;
+        let slope = stated("slope", slope, SLOPE);
+        let middle = match &scale {
+            Scale::Ordinal { thresholds, .. } => {
+                thresholds.iter().sum::<f64>() / thresholds.len().max(1) as f64
+            }
+            _ => (protocol.primary().and_then(|q| q.kind.scale().ends()))
+                .map_or(0.0, |(low, high)| f64::midpoint(low, high)),
+        };
+        let mean = over.mean.or(pilot.map(|p| p.estimate.mean)).or(base.mean);
+        let mean = stated("mean", mean, middle);
+        let own = Cell {
+            realizations: listed.len(),
+            repetitions: repetitions as usize,
+            participants: protocol.design.participants as usize,
+        };
+        let n = own.participants.max(2);
+        let vaf = over.vaf.or(base.vaf);
+        let more: Vec<usize> = match vaf {
+            Some(Vaf::Listed) => vec![own.realizations],
+            _ => [own.realizations, 8, 12]
+                .into_iter()
+                .filter(|q| *q >= own.realizations)
+                .collect(),
+        };
+        let participants = numbers((base, over), |p| &p.participants, vec![n, 2 * n, 4 * n]);
+        let realizations = numbers((base, over), |p| &p.realizations, more);
+        let repetitions = numbers(
+            (base, over),
+            |p| &p.repetitions,
+            vec![1, own.repetitions.max(1)],
+        );
+        if vaf == Some(Vaf::Listed) && realizations != [own.realizations] {
+            return Err(PlanError::Listed(own.realizations));
+        }
+        let mut grid = Vec::new();
+        for &realizations in &realizations {
+            for &repetitions in &repetitions {
+                grid.extend(participants.iter().map(|&participants| Cell {
+                    realizations,
+                    repetitions,
+                    participants,
+                }));
+            }
+        }
+        let tests = tests((base, over)).unwrap_or_else(|| vec![Test::Verdict]);
+        if let Some(test) = tests.iter().find(|test| !test.is_of_ratings()) {
+            return Err(PlanError::NotOfRatings(test.as_str()));
+        }
+        let margin = protocol.analysis.equivalence_margin;
+        let needs_margin = [Test::Equivalence, Test::ReferenceEquivalence];
+        if let Some(test) = tests.iter().find(|test| needs_margin.contains(test))
+            && margin.is_none()
+        {
+            return Err(PlanError::NoMargin(test.as_str()));
+        }
+        let has_reference = protocol
+            .models
+            .iter()
+            .any(|m| m.role == Role::HiddenReference);
+        if tests.contains(&Test::ReferenceEquivalence) && !has_reference {
+            return Err(PlanError::NoReference);
+        }
+        let targets = targets((base, over));
+        Ok(Self {
+            settings: Settings {
+                assumptions: Assumptions {
+                    slope,
+                    smallest: over.smallest.or(base.smallest),
+                    mean,
+                    spread,
+                    scale,
+                    vaf: vaf.unwrap_or(Vaf::Listed),
+                    dropout: over.dropout.or(base.dropout).unwrap_or(0.0),
+                    missing: over.missing.or(base.missing).unwrap_or(0.0),
+                    reference: over.reference.or(base.reference).unwrap_or(0.0),
+                },
+                part: None,
+                pilot: flags.pilot.clone(),
+                listed,
+                tests,
+                alpha: protocol.analysis.alpha.unwrap_or(ALPHA),
+                margin,
+                seed: flags.seed.unwrap_or(protocol.study.seed),
+                studies: over.studies.or(base.studies).unwrap_or(STUDIES),
+            },
+            part: None,
+            own,
+            grid,
+            targets,
+            defaults: defaults.0,
+            exclusions: protocol.analysis.exclude.len(),
+            left_out: LeftOut::of(protocol, None),
+            within: over.within.or(base.within),
+            max_session_min: over.max_session_min.or(base.max_session_min),
+            pace: Pace::of(protocol, own.realizations),
+        })
+    }
+
+    /// A digest of everything that the numbers depend on, SHA-256 in hexadecimal.
+    pub fn digest(&self, version: &str) -> String {
+        // Numbers are printed as the shortest text that reads back the same.
+        let text = format!(
+            "{version} {:?} {:?} {:?}",
+            self.settings,
+            self.cells(),
+            self.within
+        );
+        study_base::hex::sha256(text)
+    }
+
+    /// Realizations and repetitions of the grid.
+    pub fn shapes(&self) -> Vec<(usize, usize)> {
+        let mut shapes: Vec<(usize, usize)> = (self.grid.iter())
+            .map(|c| (c.realizations, c.repetitions))
+            .collect();
+        shapes.dedup();
+        shapes
+    }
+
+    /// The minutes of a session with so many realizations and repetitions, if these are more
+    /// than are allowed.
+    pub fn too_long(&self, (realizations, repetitions): (usize, usize)) -> Option<f64> {
+        let minutes = self.pace.minutes(realizations, repetitions);
+        (self.max_session_min).and_then(|most| (minutes > most).then_some(minutes))
+    }
+
+    /// The shapes of designs that can be proposed.
+    pub fn proposed(&self) -> Vec<(usize, usize)> {
+        let mut shapes = self.shapes();
+        shapes.retain(|shape| self.too_long(*shape).is_none());
+        shapes
+    }
+
+    /// The largest number of participants that is considered for the smallest designs.
+    pub fn most_participants(&self) -> usize {
+        let most = self.grid.iter().map(|c| c.participants).max();
+        (5 * most.unwrap_or(0)).max(200)
+    }
+
+    /// All cells to simulate, sorted: the grid, the protocol's own design, and the
+    /// candidates for the smallest designs.
+    pub fn cells(&self) -> Vec<Cell> {
+        let mut cells = self.grid.clone();
+        cells.push(self.own);
+        if self.part.is_some() {
+            // No closed form says where the smallest design is.
+            cells.sort_unstable();
+            cells.dedup();
+            return cells;
+        }
+        let most = self.most_participants();
+        cells.extend(super::candidates(
+            &self.settings,
+            &self.proposed(),
+            &self.targets,
+            most,
+        ));
+        cells.sort_unstable();
+        cells.dedup();
+        cells
+    }
+}
+
+/// What nobody stated, as `key = value`.
+#[derive(Debug, Default)]
+pub(super) struct Defaults(pub(super) Vec<String>);
+
+impl Defaults {
+    /// The stated value, or the default, which is noted once.
+    pub(super) fn or(&mut self, key: &str, value: Option<f64>, default: f64) -> f64 {
+        value.unwrap_or_else(|| {
+            let note = format!("{key} = {default}");
+            if !self.0.contains(&note) {
+                self.0.push(note);
+            }
+            default
+        })
+    }
+}
+
+/// `[power]`, and what flags state.
+type Stated<'p> = (&'p PowerPlan, &'p PowerPlan);
+
+/// The effect: the last that is stated, in `[power]`, by a pilot, or by a flag.
+pub(super) fn slope(
+    (base, over): Stated<'_>,
+    of_pilot: Option<f64>,
+    scatter: f64,
+) -> Result<Option<f64>, PlanError> {
+    let effect = |plan: &PowerPlan| {
+        (plan.slope.is_some() || plan.rho.is_some()).then_some((plan.slope, plan.rho))
+    };
+    let of_pilot = of_pilot.map(|slope| (Some(slope), None));
+    match effect(over).or(of_pilot).or_else(|| effect(base)) {
+        Some((Some(_), Some(_))) => Err(PlanError::SlopeAndRho),
+        Some((None, Some(_))) if scatter == 0.0 => Err(PlanError::RhoWithoutScatter),
+        Some((None, Some(rho))) => Ok(Some(scatter * rho / (1.0 - rho * rho).sqrt())),
+        Some((slope, _)) => Ok(slope),
+        None => Ok(None),
+    }
+}
+
+/// Numbers of the grid, sorted.
+pub(super) fn numbers(
+    (base, over): Stated<'_>,
+    of: fn(&PowerPlan) -> &Vec<u32>,
+    default: Vec<usize>,
+) -> Vec<usize> {
+    let given = [of(over), of(base)]
+        .into_iter()
+        .find(|list| !list.is_empty());
+    let mut list = given.map_or(default, |list| list.iter().map(|n| *n as usize).collect());
+    list.sort_unstable();
+    list.dedup();
+    list
+}
+
+/// The tests that are asked for, each once.
+pub(super) fn tests((base, over): Stated<'_>) -> Option<Vec<Test>> {
+    let given = [&over.tests, &base.tests]
+        .into_iter()
+        .find(|list| !list.is_empty())?;
+    let mut tests: Vec<Test> = Vec::new();
+    for test in given {
+        if !tests.contains(test) {
+            tests.push(*test);
+        }
+    }
+    Some(tests)
+}
+
+/// The power that is wanted, sorted.
+pub(super) fn targets((base, over): Stated<'_>) -> Vec<f64> {
+    let targets = [&over.targets, &base.targets]
+        .into_iter()
+        .find(|t| !t.is_empty());
+    let mut targets = targets.map_or(TARGETS.to_vec(), Clone::clone);
+    targets.sort_by(f64::total_cmp);
+    targets.dedup();
+    targets
+}
+
+fn scale(protocol: &Protocol, given: Option<&PowerScale>) -> Result<Scale, PlanError> {
+    let levels = protocol.primary().and_then(|q| q.kind.scale().levels());
+    match (given, levels) {
+        (None | Some(PowerScale::Rounded), Some((from, to))) => Ok(Scale::Rounded(from, to)),
+        (None | Some(PowerScale::Continuous), _) => Ok(Scale::Continuous),
+        (Some(PowerScale::Ordinal { link, thresholds }), Some((from, to))) => {
+            if thresholds.len() as i64 != to - from {
+                return Err(PlanError::Thresholds(thresholds.len(), to - from + 1));
+            }
+            Ok(Scale::Ordinal {
+                link: *link,
+                thresholds: thresholds.clone(),
+                from,
+            })
+        }
+        (Some(PowerScale::FromPilot), _) => Err(PlanError::NoPilot),
+        (Some(_), None) => Err(PlanError::NoLevels),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use study_plan::protocol::example;
+
+    /// References and anchors take time, too.
+    #[test]
+    fn the_own_design_takes_as_long_as_the_protocol() {
+        let mut protocol = example::protocol(5, 3);
+        protocol.models[3].role = Role::HiddenReference;
+        protocol.models[4].role = Role::LowAnchor;
+        let minutes = Pace::of(&protocol, 3).minutes(3, 3);
+        assert!((minutes - check::minutes(&protocol)).abs() < 1e-9);
+    }
+}

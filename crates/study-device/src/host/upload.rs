@@ -1,0 +1,161 @@
+//! Upload of a table or a mechanism as a sequence of requests.
+
+use crate::table::{self, TableError};
+use study_base::limits::Limits;
+use study_haptics::model::{Branch, Mechanism, Profile, Realization};
+use study_wire::message::{
+    Commit, FixedVec, Identity, MechanismBegin, MechanismChunk, Node, Request, TableBegin,
+    TableChunk, UploadCrc,
+};
+
+/// The requests of an upload in order, and the CRC of the table.
+#[derive(Debug)]
+pub(crate) struct Upload {
+    pub(crate) requests: Vec<Request>,
+    pub(crate) crc: u32,
+}
+
+/// The requests that upload these nodes.
+pub(crate) fn requests(begin: TableBegin, nodes: &[Node]) -> Upload {
+    let mut crc = UploadCrc::of_table(&begin);
+    nodes.iter().for_each(|node| crc.node(node));
+    let crc = crc.value();
+    let chunks = nodes.chunks(TableChunk::MAX_NODES).enumerate();
+    let chunks = chunks.map(|(i, nodes)| {
+        Request::TableChunk(TableChunk {
+            // A table has fewer than 65,536 nodes.
+            first: (i * TableChunk::MAX_NODES) as u16,
+            nodes: FixedVec::of(nodes),
+        })
+    });
+    let mut requests = vec![Request::TableBegin(begin)];
+    requests.extend(chunks);
+    requests.push(Request::TableCommit(Commit { crc }));
+    Upload { requests, crc }
+}
+
+/// The requests that upload a mechanism with these values: detents, then frictions.
+pub(crate) fn mechanism_requests(begin: MechanismBegin, values_n: &[f64]) -> Upload {
+    let mut crc = UploadCrc::of_mechanism(&begin);
+    values_n.iter().for_each(|value| crc.value_n(*value));
+    let crc = crc.value();
+    let chunks = values_n.chunks(MechanismChunk::MAX_VALUES).enumerate();
+    let chunks = chunks.map(|(i, values)| {
+        Request::MechanismChunk(MechanismChunk {
+            // There are fewer than 65,536 values.
+            first: (i * MechanismChunk::MAX_VALUES) as u16,
+            values: FixedVec::of(values),
+        })
+    });
+    let mut requests = vec![Request::MechanismBegin(begin)];
+    requests.extend(chunks);
+    requests.push(Request::MechanismCommit(Commit { crc }));
+    Upload { requests, crc }
+}
+
+/// Builds the upload of a realization. If it fails its certificate or is stiffer than
+/// the device's limit, `allow_uncertified` requests its playback anyway, within the
+/// force limit; otherwise the device refuses it.
+///
+/// # Errors
+/// [`TableError`] if it is invalid, too large, or a mechanism that the device cannot play.
+pub(super) fn of(
+    table: &Realization,
+    limits: Limits,
+    allow_uncertified: bool,
+    device: &Identity,
+) -> Result<Upload, TableError> {
+    table::check(table)?;
+    let count = table.x_mm.len();
+    let nodes = u16::try_from(count).map_err(|_| TableError::TooManyNodes(count))?;
+    let certificate = table.certificate();
+    // As the device judges it in the minor version of the connection.
+    let stiffness_n_per_mm = match device.constants {
+        Some(_) => certificate.rendered_n_per_mm(),
+        None => certificate.stiffness_n_per_mm,
+    };
+    let certified = certificate.passes()
+        && stiffness_n_per_mm <= device.stiffness_n_per_mm
+        && certificate.damping_n_s_per_mm <= device.damping_n_s_per_mm;
+    let armed = allow_uncertified && !certified;
+    let uncertified_n = armed.then(|| limits.force_n.get());
+    if let Some(mechanism) = &table.mechanism {
+        let features = device.constants.map(|told| told.features);
+        if !features.is_some_and(|features| features.mechanism) {
+            return Err(TableError::Mechanism);
+        }
+        return of_mechanism(table, mechanism, limits, uncertified_n);
+    }
+    let begin = TableBegin {
+        nodes,
+        lookup: table.lookup,
+        direction: table.direction,
+        range_mm: table.trained.x_mm,
+        trained_mm_s: table.trained.v_mm_s,
+        force_n: limits.force_n.get(),
+        velocity_mm_s: limits.velocity_mm_s.get(),
+        uncertified_n,
+    };
+    let all: Vec<Node> = (0..count)
+        .map(|i| Node {
+            x_mm: table.x_mm[i],
+            positive: parameters(&table.positive, i),
+            negative: parameters(&table.negative, i),
+        })
+        .collect();
+    Ok(requests(begin, &all))
+}
+
+fn of_mechanism(
+    realization: &Realization,
+    mechanism: &Mechanism,
+    limits: Limits,
+    uncertified_n: Option<f64>,
+) -> Result<Upload, TableError> {
+    let values_n = [&mechanism.detent.n[..], &mechanism.friction.n].concat();
+    let too_many = |_| TableError::TooManyValues(values_n.len());
+    u16::try_from(values_n.len()).map_err(too_many)?;
+    let place = |profile: &Profile| [profile.first_mm, profile.step_mm];
+    let begin = MechanismBegin {
+        detents: mechanism.detent.n.len() as u16,
+        frictions: mechanism.friction.n.len() as u16,
+        detent_mm: place(&mechanism.detent),
+        friction_mm: place(&mechanism.friction),
+        range_mm: realization.trained.x_mm,
+        trained_mm_s: realization.trained.v_mm_s,
+        force_n: limits.force_n.get(),
+        velocity_mm_s: limits.velocity_mm_s.get(),
+        uncertified_n,
+        scalars: mechanism.scalars,
+    };
+    Ok(mechanism_requests(begin, &values_n))
+}
+
+fn parameters(branch: &Branch, node: usize) -> [f64; 4] {
+    [
+        &branch.m_kg,
+        &branch.b_n_s_per_mm,
+        &branch.k_n_per_mm,
+        &branch.f0_n,
+    ]
+    .map(|values| values[node])
+}
+
+/// Describes a request in messages.
+pub(super) fn describe(request: &Request) -> &'static str {
+    match request {
+        Request::Hello(_) => "the connection",
+        Request::TableBegin(_) | Request::TableChunk(_) | Request::TableCommit(_) => "the table",
+        Request::MechanismBegin(_) | Request::MechanismChunk(_) | Request::MechanismCommit(_) => {
+            "the mechanism"
+        }
+        Request::Play(_) => "the start",
+        Request::Stop(_) => "the stop",
+        Request::Limp => "the command LIMP",
+        Request::Heartbeat(_) => "a heartbeat",
+        Request::Rearm => "to re-arm",
+        Request::State => "the request for its state",
+        Request::PathBegin(_) | Request::PathChunk(_) | Request::PathCommit(_) => "the path",
+        Request::Record(_) => "the recording",
+    }
+}

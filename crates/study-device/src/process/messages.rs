@@ -1,0 +1,312 @@
+//! Messages between host and program, one JSON object per line.
+
+use crate::Stimulus;
+use serde::Deserialize;
+use serde_json::{Value, json};
+use study_base::limits::Limits;
+use study_base::text::Untrusted;
+use study_session::outcome::{Playback, Sample};
+
+/// Version of the messages, stated in the program's `hello`.
+pub const FORMAT: &str = "study-process/1";
+
+/// Longest text of a program that is kept, characters.
+const MAX_TEXT: usize = 200;
+/// Longest device id, characters.
+const MAX_ID: usize = 64;
+/// Largest number of samples in one line.
+const MAX_SAMPLES: usize = 4096;
+
+/// Why a message of a program is rejected.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum MessageError {
+    /// Not valid JSON of a known message; the error and the line.
+    #[error("{0}: {1}")]
+    Json(serde_json::Error, String),
+    #[error("more than {MAX_SAMPLES} samples in one line")]
+    TooManySamples,
+    #[error("it uses the format `{format}`; this program supports {FORMAT}", format = Untrusted(.0))]
+    Format(String),
+    #[error("its id needs 1 to {MAX_ID} characters")]
+    Id,
+    #[error("it sends `{0}` before `hello`")]
+    NoHello(&'static str),
+    #[error("it is another device than before, `{id}`", id = Untrusted(.0))]
+    OtherDevice(String),
+    #[error("it sends `{message}` while {state}")]
+    WrongState {
+        message: &'static str,
+        state: &'static str,
+    },
+}
+
+/// A message of a program.
+#[derive(Debug, Deserialize)]
+#[serde(tag = "say", rename_all = "kebab-case")]
+pub(super) enum ChildMessage {
+    Hello(Hello),
+    Loaded {
+        load: u64,
+    },
+    Refused {
+        load: u64,
+        why: String,
+    },
+    Started {
+        load: u64,
+    },
+    Samples {
+        load: u64,
+        samples: Vec<SampleRow>,
+    },
+    Progress {
+        load: u64,
+        strokes: u32,
+        clamps: u64,
+    },
+    Stopped {
+        load: u64,
+        #[serde(flatten)]
+        outcome: PlaybackOutcome,
+    },
+    Fault {
+        what: String,
+    },
+}
+
+/// Identity and limits of a program.
+#[derive(Debug, Deserialize)]
+pub(super) struct Hello {
+    pub(super) format: String,
+    pub(super) id: String,
+    pub(super) telemetry: bool,
+    /// Whether it is simulated, without motor and hand.
+    #[serde(default)]
+    pub(super) simulated: bool,
+    /// Whether it plays mechanisms, and not only tables.
+    #[serde(default)]
+    pub(super) mechanisms: bool,
+    pub(super) limits: Limits,
+}
+
+/// Outcome of a playback.
+#[derive(Debug, Deserialize)]
+pub(super) struct PlaybackOutcome {
+    duration_s: f64,
+    strokes: u32,
+    least_energy_j: f64,
+    switches_per_s: f64,
+    clamps: u64,
+}
+
+/// t in s, x in mm, v in mm/s, commanded force in N, measured force in N or null.
+#[derive(Debug, Deserialize)]
+pub(super) struct SampleRow(f64, f64, f64, f64, Option<f64>);
+
+impl From<SampleRow> for Sample {
+    fn from(row: SampleRow) -> Self {
+        Self {
+            t_s: row.0,
+            x_mm: row.1,
+            v_mm_s: row.2,
+            force_command_n: row.3,
+            force_measured_n: row.4,
+        }
+    }
+}
+
+impl From<PlaybackOutcome> for Playback {
+    fn from(outcome: PlaybackOutcome) -> Self {
+        Self {
+            exploration_s: outcome.duration_s,
+            strokes: outcome.strokes,
+            least_energy_j: outcome.least_energy_j,
+            switches_per_s: outcome.switches_per_s,
+            clamp_count: outcome.clamps,
+            samples: 0,
+            samples_lost: 0,
+            time_ratio: None,
+            host_late_ms: None,
+        }
+    }
+}
+
+impl ChildMessage {
+    pub(super) fn hello(self) -> Result<Hello, MessageError> {
+        match self {
+            Self::Hello(hello) if hello.format != FORMAT => {
+                Err(MessageError::Format(short_text(&hello.format)))
+            }
+            Self::Hello(hello) if hello.id.is_empty() || hello.id.chars().count() > MAX_ID => {
+                Err(MessageError::Id)
+            }
+            Self::Hello(hello) => Ok(hello),
+            other => Err(MessageError::NoHello(other.as_str())),
+        }
+    }
+
+    /// Number of the load that the message is about, if it is about one.
+    pub(super) fn load(&self) -> Option<u64> {
+        match self {
+            Self::Hello(_) | Self::Fault { .. } => None,
+            Self::Loaded { load }
+            | Self::Refused { load, .. }
+            | Self::Started { load }
+            | Self::Samples { load, .. }
+            | Self::Progress { load, .. }
+            | Self::Stopped { load, .. } => Some(*load),
+        }
+    }
+
+    pub(super) fn as_str(&self) -> &'static str {
+        match self {
+            Self::Hello(_) => "hello",
+            Self::Loaded { .. } => "loaded",
+            Self::Refused { .. } => "refused",
+            Self::Started { .. } => "started",
+            Self::Samples { .. } => "samples",
+            Self::Progress { .. } => "progress",
+            Self::Stopped { .. } => "stopped",
+            Self::Fault { .. } => "fault",
+        }
+    }
+}
+
+/// Reads a line of a program.
+pub(super) fn read(line: &[u8]) -> Result<ChildMessage, MessageError> {
+    let mut message: ChildMessage = serde_json::from_slice(line).map_err(|e| {
+        let shown = String::from_utf8_lossy(line);
+        MessageError::Json(e, short_text(shown.trim_end()))
+    })?;
+    match &mut message {
+        ChildMessage::Samples { samples, .. } if samples.len() > MAX_SAMPLES => {
+            return Err(MessageError::TooManySamples);
+        }
+        ChildMessage::Refused { why: text, .. } | ChildMessage::Fault { what: text } => {
+            *text = short_text(text);
+        }
+        _ => {}
+    }
+    Ok(message)
+}
+
+/// The beginning of a program's text.
+pub(super) fn short_text(text: &str) -> String {
+    beginning(text, MAX_TEXT)
+}
+
+/// The first `max` characters of a text.
+pub(super) fn beginning(text: &str, max: usize) -> String {
+    let mut short: String = text.chars().take(max).collect();
+    if short.len() < text.len() {
+        short.push('…');
+    }
+    short
+}
+
+fn line(value: &Value) -> String {
+    format!("{value}\n")
+}
+
+/// The command `start`, `stop`, `limp` or `alive`.
+pub(super) fn command(name: &str, load: u64) -> String {
+    line(&json!({"do": name, "load": load}))
+}
+
+/// The command `load` with table or mechanism and limits.
+pub(super) fn load(number: u64, what: &Stimulus<'_>, limits: Limits) -> String {
+    let mechanism = what
+        .table
+        .and_then(|own| Some((own, own.mechanism.as_ref()?)));
+    let table = what.table.filter(|_| mechanism.is_none()).map(|table| {
+        let branch = |b: &study_haptics::model::Branch| {
+            json!({
+                "m_kg": b.m_kg, "b_n_s_per_mm": b.b_n_s_per_mm,
+                "k_n_per_mm": b.k_n_per_mm, "f0_n": b.f0_n,
+            })
+        };
+        let direction = table.direction;
+        json!({
+            "lookup": table.lookup.as_str(),
+            "direction": {"rule": direction.as_str(), "delta_mm": direction.delta_mm()},
+            "trained": {"x_mm": table.trained.x_mm, "v_mm_s": table.trained.v_mm_s},
+            "x_mm": table.x_mm,
+            "positive": branch(&table.positive),
+            "negative": branch(&table.negative),
+        })
+    });
+    let mut command = json!({
+        "do": "load", "load": number, "model": what.model, "uncertified": what.allow_uncertified,
+        "limits": {"force_n": limits.force_n.get(), "velocity_mm_s": limits.velocity_mm_s.get()},
+        "table": table,
+    });
+    if let Some((own, mechanism)) = mechanism {
+        let profile = |p: &study_haptics::model::Profile| json!({"first_mm": p.first_mm, "step_mm": p.step_mm, "n": p.n});
+        let mut parameters = json!({
+            "trained": {"x_mm": own.trained.x_mm, "v_mm_s": own.trained.v_mm_s},
+            "detent": profile(&mechanism.detent),
+            "friction": profile(&mechanism.friction),
+        });
+        let scalars = mechanism.scalars.to_array();
+        for (key, value) in study_haptics::model::file::SCALAR_KEYS.iter().zip(scalars) {
+            parameters[*key] = json!(value);
+        }
+        command["mechanism"] = parameters;
+    }
+    line(&command)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn messages_that_violate_the_specification_are_rejected() {
+        for (line, why) in [
+            ("no json", "expected"),
+            (r#"{"say":"hallo"}"#, "unknown variant"),
+            (r#"{"say":"loaded"}"#, "missing field `load`"),
+            (
+                r#"{"say":"samples","load":1,"samples":[[0,1,2,NaN,null]]}"#,
+                "expected",
+            ),
+            (
+                r#"{"say":"samples","load":1,"samples":[[0,1,2,3]]}"#,
+                "invalid length",
+            ),
+            (
+                r#"{"say":"hello","format":"study-process/1","id":"a","telemetry":true,"limits":{"force_n":-1,"velocity_mm_s":1}}"#,
+                "above zero",
+            ),
+        ] {
+            let error = read(line.as_bytes()).unwrap_err().to_string();
+            assert!(error.contains(why), "{line}: {error}");
+        }
+        let other = r#"{"say":"hello","format":"study-process/2","id":"a","telemetry":true,"limits":{"force_n":1,"velocity_mm_s":1}}"#;
+        let error = read(other.as_bytes()).unwrap().hello().unwrap_err();
+        let error = error.to_string();
+        assert!(error.contains("study-process/1"), "{error}");
+    }
+
+    #[test]
+    fn a_long_text_is_cut() {
+        let line = format!(r#"{{"say":"fault","what":"{}"}}"#, "x".repeat(5000));
+        let ChildMessage::Fault { what } = read(line.as_bytes()).unwrap() else {
+            panic!("no fault");
+        };
+        assert_eq!(what.chars().count(), MAX_TEXT + 1);
+    }
+
+    #[test]
+    fn a_line_has_at_most_so_many_samples() {
+        let line = |n: usize| {
+            let rows = vec!["[0,1,2,3,null]"; n].join(",");
+            format!(r#"{{"say":"samples","load":1,"samples":[{rows}]}}"#)
+        };
+        assert!(read(line(MAX_SAMPLES).as_bytes()).is_ok());
+        assert!(matches!(
+            read(line(MAX_SAMPLES + 1).as_bytes()),
+            Err(MessageError::TooManySamples)
+        ));
+    }
+}

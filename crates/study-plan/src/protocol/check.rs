@@ -1,0 +1,500 @@
+//! Warnings about a valid protocol whose design is doubtful.
+//!
+//! No finding here prevents a study from running. Warnings that need the models'
+//! tables or the orders are given where these are loaded.
+
+mod parts;
+
+use super::phrases::{self, Phrase};
+use super::{Design, DeviceKind, ModelEntry, Protocol, Question, Role};
+use std::collections::BTreeMap;
+use std::ops::Range;
+use study_base::diagnostic::Fault;
+use study_base::text::{ModelId, Untrusted, counted};
+use study_stats::distribution::t_quantile;
+
+/// Number of test realizations from which a correlation over them is informative.
+const ENOUGH_REALIZATIONS: usize = 8;
+
+/// Number of trials without a break that needs no warning.
+const TRIALS_WITHOUT_BREAK: u32 = 15;
+
+/// Duration of a session, min, that needs no warning.
+const LONG_SESSION_MIN: f64 = 60.0;
+
+/// Just noticeable difference of a force, N (Doerrer & Werthschützky 2002).
+pub const FORCE_JND_N: f64 = 0.1;
+
+/// Standard deviation of the force of a turn-signal switch operated by hand, N. It
+/// converts a VAF to a residual force if there is no recording. The simulated switch
+/// at 1.5 Hz has 5.3 N.
+const FORCE_SD_N: f64 = 5.0;
+
+/// Path of a value → its bytes in the file, as in `file::Parsed`.
+pub type Spans = BTreeMap<String, Range<usize>>;
+
+/// All warnings. VAFs should have been filled in from the model files; those of
+/// `unread` could not be, which is reported as an error elsewhere.
+pub fn warnings(protocol: &Protocol, spans: &Spans, unread: &[&ModelId]) -> Vec<Fault> {
+    let mut faults = Vec::new();
+    language(protocol, spans, &mut faults);
+    untranslated(protocol, spans, &mut faults);
+    birth_dates(protocol, spans, &mut faults);
+    if parts::is_about_realizations(protocol) {
+        realizations(protocol, spans, &mut faults);
+        vaf(protocol, spans, unread, &mut faults);
+    }
+    if protocol.parts.is_empty() {
+        practice(protocol, spans, &mut faults);
+    } else {
+        parts::warnings(protocol, spans, &mut faults);
+    }
+    duration(protocol, spans, &mut faults);
+    roles(protocol, spans, &mut faults);
+    faults
+}
+
+/// Fixed sentences that the language of the study lacks.
+fn language(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
+    let Some(lang) = &protocol.text.lang else {
+        return;
+    };
+    if phrases::is_right_to_left(lang) && protocol.text.scale_direction.is_none() {
+        let what = "scales begin on the right, in the terminal and on the participant's page";
+        faults.push(
+            Fault::warning(what)
+                .at(spans.get("text.lang").cloned())
+                .hint("say so, scale_direction = \"rtl\" in [text], or let them begin on the left: \"ltr\""),
+        );
+    }
+    if phrases::is_shipped(lang) {
+        return;
+    }
+    let own = &protocol.text.words;
+    let all = Phrase::ALL.iter().map(|phrase| phrase.key());
+    let missing: Vec<&str> = all.filter(|key| !own.contains_key(*key)).collect();
+    let Some(first) = missing.first() else {
+        return;
+    };
+    let count = counted(missing.len(), "fixed sentence", "fixed sentences");
+    let shipped: Vec<&str> = phrases::languages().collect();
+    faults.push(
+        Fault::warning(format!(
+            "{count} that participants read would be in English: `{}` is not one of {}",
+            Untrusted(lang),
+            shipped.join(", ")
+        ))
+        .at(spans.get("text.lang").cloned())
+        .hint(format!(
+            "write them in [text.words], beginning with `{first}`: {}",
+            missing.join(", ")
+        )),
+    );
+}
+
+/// Questionnaires that are in English in a study of another language.
+fn untranslated(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
+    let lang = protocol.text.lang.as_deref().unwrap_or("en");
+    if lang.split('-').next() == Some("en") {
+        return;
+    }
+    for (i, own) in protocol.questionnaires.iter().enumerate() {
+        let has = |key: &str| spans.contains_key(&format!("questionnaires[{i}].{key}"));
+        if !has("items") || !has("labels") {
+            faults.push(
+                Fault::warning(format!(
+                    "the questionnaire `{}` is in English, and the study in `{}`",
+                    own.id,
+                    Untrusted(lang)
+                ))
+                .at(spans.get(&format!("questionnaires[{i}].id")).cloned())
+                .hint("write a published translation in `items` and `labels`"),
+            );
+        }
+    }
+}
+
+/// Questions that ask for a date of birth, which identifies a person.
+fn birth_dates(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
+    const WORDS: [&str; 6] = ["birth", "geburt", "naissance", "nacimiento", "生年", "出生"];
+    for (i, question) in protocol.intake.iter().enumerate() {
+        let asked = format!("{} {}", question.id, question.prompt).to_lowercase();
+        if WORDS.iter().any(|word| asked.contains(word)) {
+            faults.push(
+                Fault::warning(format!(
+                    "the question `{}` seems to ask for a date of birth, which identifies a person",
+                    question.id
+                ))
+                .at(spans.get(&format!("intake[{i}].prompt")).cloned())
+                .hint("ask for the age in years"),
+            );
+        }
+    }
+}
+
+/// Trials of a session, practice included, unless an orders file has fewer; with staircases
+/// the most.
+pub fn trials(protocol: &Protocol) -> u32 {
+    if !protocol.parts.is_empty() {
+        let parts = protocol.parts.iter();
+        return parts.map(|part| parts::trials(protocol, part)).sum();
+    }
+    let Design {
+        repetitions,
+        practice,
+        ..
+    } = &protocol.design;
+    let models = u32::try_from(protocol.scheduled_models().count()).unwrap_or(u32::MAX);
+    let practice = u32::try_from(practice.len()).unwrap_or(u32::MAX);
+    models.saturating_mul(*repetitions).saturating_add(practice)
+}
+
+/// Assumed durations, s, for a participant who takes their time.
+mod pace {
+    /// Arrival: welcome, instructions, hand on the device.
+    pub(super) const ARRIVAL_S: f64 = 120.0;
+    /// Reading and signing a consent form.
+    pub(super) const CONSENT_S: f64 = 120.0;
+    /// Operating the reference before a trial.
+    pub(super) const REFERENCE_S: f64 = 15.0;
+    /// Loading a table, or mounting a sample by hand.
+    pub(super) const LOAD_S: f64 = 2.0;
+    pub(super) const MOUNT_S: f64 = 30.0;
+    /// Exploring a realization without a time limit.
+    pub(super) const EXPLORE_S: f64 = 25.0;
+    /// The same for an interval that is compared with another.
+    pub(super) const COMPARE_S: f64 = 10.0;
+}
+
+/// Estimated duration of a session, min. Assumes 25 s of exploration and 15 s with
+/// the reference in a trial, 6 s for an answer that is chosen, 15 s for one that is
+/// typed (8 s if optional), 30 s to mount a sample by hand, 2 min for arrival, 2 min
+/// for consent, and breaks of the least duration.
+pub fn minutes(protocol: &Protocol) -> f64 {
+    let mut seconds = pace::ARRIVAL_S;
+    if protocol.consent.is_some() {
+        seconds += pace::CONSENT_S;
+    }
+    for once in [&protocol.setup, &protocol.intake, &protocol.outro] {
+        seconds += answers_s(once);
+    }
+    let reference = match protocol.trial.reference {
+        Some(_) => pace::REFERENCE_S.max(protocol.trial.reference_min_s),
+        None => protocol.trial.reference_min_s,
+    };
+    let trial = reference + pace::EXPLORE_S + answers_s(&protocol.questions);
+    let load = |model: &ModelEntry| match protocol.device_of(model) {
+        DeviceKind::Manual => pace::MOUNT_S,
+        DeviceKind::Simulated | DeviceKind::Serial | DeviceKind::Process => pace::LOAD_S,
+    };
+    for part in &protocol.parts {
+        seconds += parts::seconds(protocol, part, reference);
+    }
+    let whole = protocol.parts.is_empty();
+    let repetitions = f64::from(if whole {
+        protocol.design.repetitions
+    } else {
+        0
+    });
+    for model in protocol.scheduled_models() {
+        seconds += repetitions * (trial + load(model));
+    }
+    for id in &protocol.design.practice {
+        seconds += trial + protocol.model(id).map_or(0.0, load);
+    }
+    if let Some(breaks) = protocol.design.breaks {
+        let counted = trials(protocol).saturating_sub(practice_trials(protocol));
+        let rests = counted.saturating_sub(1) / breaks.every.max(1);
+        seconds += f64::from(rests) * breaks.at_least_s;
+    }
+    seconds / 60.0
+}
+
+fn answers_s(questions: &[Question]) -> f64 {
+    questions.iter().map(|q| q.kind.seconds(q.required)).sum()
+}
+
+fn practice_trials(protocol: &Protocol) -> u32 {
+    u32::try_from(protocol.design.practice.len()).unwrap_or(u32::MAX)
+}
+
+fn tests(protocol: &Protocol) -> impl Iterator<Item = &ModelEntry> {
+    protocol
+        .models
+        .iter()
+        .filter(|m| m.role == Role::Test && m.duplicate_of.is_none())
+}
+
+fn realizations(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
+    let n = tests(protocol).count();
+    if n >= ENOUGH_REALIZATIONS {
+        return;
+    }
+    // What ratings are correlated with.
+    let of_forces = tests(protocol).any(|m| m.file.is_some() || m.vaf.is_some());
+    let with = match of_forces {
+        true => "VAF",
+        false if tests(protocol).any(|m| !m.covariates.is_empty()) => "a covariate",
+        false => return,
+    };
+    let alpha = protocol.analysis.alpha();
+    let so = match critical_r(n, alpha) {
+        None => format!("no correlation of ratings with {with} can be tested"),
+        Some(r) => {
+            let level = alpha.to_string();
+            let level = level.trim_start_matches('0');
+            format!("|r| with {with} has to exceed {r:.3} for p < {level}")
+        }
+    };
+    let count = counted(n, "test realization", "test realizations");
+    faults.push(
+        Fault::warning(format!("{count}: {so}"))
+            .at(spans.get("models").cloned().or(spans.get("models[0]").cloned()).map(first_line))
+            .hint(format!(
+                "what differs between realizations is tested over realizations, not over ratings; {ENOUGH_REALIZATIONS} or more are better"
+            )),
+    );
+}
+
+/// |r| of n points at a two-sided p of `alpha`: t/√(t² + n − 2).
+fn critical_r(n: usize, alpha: f64) -> Option<f64> {
+    let df = n.checked_sub(2).filter(|df| *df > 0)? as f64;
+    let t = t_quantile(1.0 - alpha / 2.0, df)?;
+    Some(t / (t * t + df).sqrt())
+}
+
+fn vaf(protocol: &Protocol, spans: &Spans, unread: &[&ModelId], faults: &mut Vec<Fault>) {
+    let known: Vec<f64> = tests(protocol).filter_map(|m| m.vaf).collect();
+    if known.is_empty() {
+        return;
+    }
+    let without: Vec<&str> = tests(protocol)
+        .filter(|m| m.vaf.is_none() && !unread.contains(&&m.id))
+        .map(|m| m.id.as_str())
+        .collect();
+    if !without.is_empty() {
+        faults.push(
+            Fault::warning(format!(
+                "no VAF is known for {}: the correlation excludes them",
+                without.join(", ")
+            ))
+            .at(spans.get("analysis.vaf").cloned()),
+        );
+    }
+    // Realizations that could not be read may differ enough.
+    if known.len() < 2 || !unread.is_empty() {
+        return;
+    }
+    let low = known.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = known.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    // residual force: σ_F √(1 − VAF)
+    let span_n = FORCE_SD_N * ((1.0 - low).sqrt() - (1.0 - high).sqrt());
+    if span_n < FORCE_JND_N {
+        faults.push(
+            Fault::warning(format!(
+                "the test realizations differ too little: VAF {low:.4} to {high:.4} is {span_n:.2} N of residual force at {FORCE_SD_N} N rms, and {FORCE_JND_N} N is just noticeable"
+            ))
+            .hint("take realizations that are further apart"),
+        );
+    }
+}
+
+fn practice(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
+    for (i, id) in protocol.design.practice.iter().enumerate() {
+        let role = protocol.model(id).map(|m| m.role);
+        if role == Some(Role::Test) {
+            faults.push(
+                Fault::warning(format!("`{id}` is practiced and then tested"))
+                    .at(spans.get(&format!("design.practice[{i}]")).cloned())
+                    .hint("practice with realizations of role \"practice\" or an anchor"),
+            );
+        }
+    }
+    for (i, model) in protocol.models.iter().enumerate() {
+        if model.role == Role::Practice && !protocol.design.practice.contains(&model.id) {
+            faults.push(
+                Fault::warning(format!("`{}` is never played", model.id))
+                    .at(spans.get(&format!("models[{i}].id")).cloned())
+                    .label("not in `design.practice`"),
+            );
+        }
+    }
+}
+
+fn duration(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
+    let counted = trials(protocol).saturating_sub(practice_trials(protocol));
+    let minutes = minutes(protocol);
+    let part = || spans.get("parts[0]").cloned().map(first_line);
+    let place = spans.get("design.repetitions").cloned().or_else(part);
+    if protocol.design.breaks.is_none() && counted > TRIALS_WITHOUT_BREAK {
+        faults.push(
+            Fault::warning(format!("{counted} trials without a break"))
+                .at(place.clone())
+                .hint("such as breaks = { every = 15, at_least_s = 60 }"),
+        );
+    }
+    if let Some(breaks) = protocol.design.breaks
+        && breaks.every >= counted
+    {
+        faults.push(
+            Fault::warning(format!(
+                "no break occurs: a session has {counted} trials, the first break would be after {}",
+                breaks.every
+            ))
+            .at(spans.get("design.breaks").cloned()),
+        );
+    }
+    if minutes > LONG_SESSION_MIN {
+        faults.push(
+            Fault::warning(format!("a session takes about {minutes:.0} minutes"))
+                .at(place)
+                .hint("fewer repetitions or realizations reduce fatigue"),
+        );
+    }
+}
+
+fn roles(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
+    for (i, model) in protocol.models.iter().enumerate() {
+        let by_hand = protocol.device_of(model) == DeviceKind::Manual;
+        if model.role == Role::Physical && !by_hand {
+            faults.push(
+                Fault::warning(format!(
+                    "`{}` is a physical sample, but a device plays it",
+                    model.id
+                ))
+                .at(spans.get(&format!("models[{i}].role")).cloned())
+                .hint("add device = \"manual\""),
+            );
+        }
+    }
+    for (i, rule) in protocol.analysis.exclude.iter().enumerate() {
+        let Some(lacks) = rule.idle(protocol) else {
+            continue;
+        };
+        let name = rule.name();
+        faults.push(
+            Fault::warning(format!("the rule `{name}` excludes nobody: {lacks}"))
+                .at(spans.get(&format!("analysis.exclude[{i}].rule")).cloned()),
+        );
+    }
+}
+
+/// The start of a long span, so that the caret does not cover the file.
+fn first_line(span: Range<usize>) -> Range<usize> {
+    span.start..span.end.min(span.start + 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::protocol::{Breaks, example};
+
+    fn messages(protocol: &Protocol) -> Vec<String> {
+        warnings(protocol, &Spans::new(), &[])
+            .into_iter()
+            .map(|f| f.message)
+            .collect()
+    }
+
+    #[test]
+    fn eight_spread_realizations_in_fifteen_trials_give_no_warning() {
+        let mut protocol = example::protocol(8, 1);
+        for (i, model) in protocol.models.iter_mut().enumerate() {
+            model.vaf = Some(0.9 - 0.1 * i as f64);
+        }
+        assert_eq!(messages(&protocol), Vec::<String>::new());
+    }
+
+    #[test]
+    fn few_realizations_give_a_warning_with_the_critical_correlation() {
+        let mut protocol = example::protocol(5, 3);
+        // without numbers that could explain the ratings nothing is correlated
+        assert_eq!(messages(&protocol), Vec::<String>::new());
+        for (i, model) in (1u8..).zip(&mut protocol.models) {
+            model.covariates = [("roughness".to_owned(), f64::from(i))].into();
+        }
+        assert_eq!(
+            messages(&protocol),
+            ["5 test realizations: |r| with a covariate has to exceed 0.878 for p < .05"]
+        );
+        for (i, model) in (1u8..).zip(&mut protocol.models) {
+            model.vaf = Some(0.9 - 0.1 * f64::from(i));
+        }
+        assert_eq!(
+            messages(&protocol),
+            ["5 test realizations: |r| with VAF has to exceed 0.878 for p < .05"]
+        );
+        // by the level of the protocol; R: qt(.995, 3) / sqrt(qt(.995, 3)^2 + 3)
+        protocol.analysis.alpha = Some(0.01);
+        assert_eq!(
+            messages(&protocol),
+            ["5 test realizations: |r| with VAF has to exceed 0.959 for p < .01"]
+        );
+    }
+
+    #[test]
+    fn vafs_below_the_just_noticeable_difference_give_a_warning() {
+        let mut protocol = example::protocol(8, 1);
+        for (i, model) in protocol.models.iter_mut().enumerate() {
+            model.vaf = Some(0.75 + 0.001 * i as f64);
+        }
+        let found = messages(&protocol);
+        assert!(found[0].contains("differ too little"), "{found:?}");
+    }
+
+    #[test]
+    fn minutes_grow_with_trials_and_breaks() {
+        let mut protocol = example::protocol(5, 3);
+        // 120 s + 15 × (15 + 25 + 2 + 6 + 8) s
+        assert!((minutes(&protocol) - (120.0 + 15.0 * 56.0) / 60.0).abs() < 1e-9);
+        protocol.design.breaks = Some(Breaks {
+            every: 5,
+            at_least_s: 60.0,
+        });
+        // after trials 5 and 10, not after the last
+        assert!((minutes(&protocol) - (240.0 + 15.0 * 56.0) / 60.0).abs() < 1e-9);
+        assert_eq!(trials(&protocol), 15);
+    }
+
+    #[test]
+    fn practice_with_a_test_realization_gives_a_warning() {
+        let mut protocol = example::protocol(8, 1);
+        let id = protocol.models[0].id.clone();
+        protocol.design.practice = vec![id];
+        assert_eq!(messages(&protocol), ["`A` is practiced and then tested"]);
+        protocol.models[1].role = Role::Practice;
+        assert!(messages(&protocol).contains(&"`B` is never played".to_owned()));
+    }
+
+    #[test]
+    fn a_date_of_birth_gives_a_warning() {
+        let about_birth = |prompt: &str| {
+            let mut protocol = example::protocol(8, 1);
+            let mut question = protocol.questions[0].clone();
+            prompt.clone_into(&mut question.prompt);
+            protocol.intake.push(question);
+            messages(&protocol)
+                .iter()
+                .any(|m| m.contains("date of birth"))
+        };
+        assert!(about_birth("Date of birth") && about_birth("生年月日"));
+        assert!(!about_birth("How old are you?"));
+    }
+
+    #[test]
+    fn a_break_that_never_occurs_gives_a_warning() {
+        let mut protocol = example::protocol(8, 2);
+        for (every, warned) in [(15, false), (16, true), (17, true)] {
+            protocol.design.breaks = Some(Breaks {
+                every,
+                at_least_s: 60.0,
+            });
+            let found = messages(&protocol);
+            assert_eq!(
+                found.iter().any(|m| m.starts_with("no break occurs")),
+                warned,
+                "{every}: {found:?}"
+            );
+        }
+    }
+}

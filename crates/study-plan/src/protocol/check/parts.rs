@@ -1,0 +1,249 @@
+//! Number of trials, duration, and doubtful designs of studies with parts.
+
+use super::{Spans, answers_s, pace};
+use crate::procedure::{Rule, Staircase};
+use crate::protocol::{
+    DeviceKind, IntervalOrder, Method, Mushra, Part, Protocol, Question, Role, Task, TrackRules,
+};
+use study_base::diagnostic::Fault;
+use study_base::text::{ModelId, PartId};
+
+/// Fewest levels of a magnitude estimation that need no warning.
+const MAGNITUDE_LEVELS: usize = 5;
+/// Fewest trials of an adaptive track that need no warning: the threshold is then known
+/// to about half the standard deviation of the noise.
+const TRACK_TRIALS: u32 = 30;
+/// The same for each of the constant stimuli.
+const TRIALS_OF_A_LEVEL: u32 = 20;
+/// The same for the catch trials of a track.
+const CATCH_TRIALS: f64 = 10.0;
+/// The same for the reversals of a staircase.
+const REVERSALS: u32 = 6;
+
+/// The most trials of a track, catch and easy trials included.
+fn track_trials(track: &TrackRules) -> u32 {
+    let ruled = f64::from(track.rule.most_trials());
+    (ruled / (1.0 - track.catch - track.easy)).round() as u32
+}
+
+fn tracks<'p>(protocol: &'p Protocol, ids: &'p [PartId]) -> impl Iterator<Item = &'p TrackRules> {
+    ids.iter().filter_map(|id| protocol.track(id))
+}
+
+/// The most trials of a part, practice included.
+pub(super) fn trials(protocol: &Protocol, part: &Part) -> u32 {
+    let all = |n: usize, repetitions: u32| {
+        let n = u32::try_from(n).unwrap_or(u32::MAX);
+        n.saturating_mul(repetitions)
+    };
+    match &part.task {
+        Task::Rating(own)
+        | Task::Magnitude(own)
+        | Task::Mushra(Mushra {
+            presentations: own, ..
+        }) => all(own.models.len(), own.repetitions) + all(own.practice.len(), 1),
+        Task::Pairs(own) => all(own.pairs.len(), own.repetitions),
+        Task::Discrimination { tracks: ids } => tracks(protocol, ids).map(track_trials).sum(),
+    }
+}
+
+/// Estimated duration of a part without breaks, s. `reference_s` is that of the reference
+/// before each trial.
+pub(super) fn seconds(protocol: &Protocol, part: &Part, reference_s: f64) -> f64 {
+    let intervals = match &part.task {
+        Task::Rating(_) | Task::Magnitude(_) => 1,
+        Task::Mushra(own) => 1 + usize::from(own.reference.is_some()),
+        Task::Pairs(_) => 2,
+        Task::Discrimination { tracks: ids } => tracks(protocol, ids)
+            .map(|track| track.method.sequences()[0].len())
+            .max()
+            .unwrap_or(1),
+    } as f64;
+    let free_s = match &part.task {
+        Task::Rating(_) => pace::EXPLORE_S,
+        Task::Magnitude(_) | Task::Mushra(_) | Task::Pairs(_) | Task::Discrimination { .. } => {
+            pace::COMPARE_S
+        }
+    };
+    let felt_s = part.exposure.max_s.map_or(free_s, |max| max.min(free_s));
+    let load_s = match protocol.device.kind {
+        DeviceKind::Manual => pace::MOUNT_S,
+        DeviceKind::Simulated | DeviceKind::Serial | DeviceKind::Process => pace::LOAD_S,
+    };
+    let asked: Vec<Question> = (part.asks.iter())
+        .filter_map(|id| protocol.questions.iter().find(|q| q.id == *id).cloned())
+        .collect();
+    let gaps_s = (intervals - 1.0) * part.gap_s;
+    let trial_s = reference_s + load_s + intervals * felt_s + gaps_s + answers_s(&asked);
+    f64::from(trials(protocol, part)) * trial_s
+}
+
+/// All warnings about parts and tracks.
+pub(super) fn warnings(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
+    for (i, model) in protocol.models.iter().enumerate() {
+        if !presented(protocol, &model.id) {
+            let what = format!("`{}` is never played: no part presents it", model.id);
+            let place = spans.get(&format!("models[{i}].id")).cloned();
+            faults.push(Fault::warning(what).at(place));
+        }
+    }
+    for (i, part) in protocol.parts.iter().enumerate() {
+        let place = spans.get(&format!("parts[{i}].id")).cloned();
+        let doubts = [magnitudes(protocol, part), one_order(part)];
+        let doubts = doubts.into_iter().flatten();
+        faults.extend(doubts.map(|fault| fault.at(place.clone())));
+    }
+    for (i, track) in protocol.tracks.iter().enumerate() {
+        let place = spans.get(&format!("tracks[{i}].id")).cloned();
+        let doubts = [
+            few_trials(track),
+            target(track),
+            one_side(protocol, track),
+            catch(track),
+        ];
+        for fault in doubts.into_iter().flatten() {
+            faults.push(fault.at(place.clone()));
+        }
+    }
+}
+
+fn presented(protocol: &Protocol, model: &ModelId) -> bool {
+    let by_track = protocol.tracks.iter().any(|track| {
+        let compared = protocol.comparison(track, 0);
+        track.standard() == *model || compared.as_ref() == Some(model)
+    });
+    let by_part = protocol.parts.iter().any(|part| match &part.task {
+        Task::Pairs(own) => own.pairs.iter().any(|pair| pair.contains(model)),
+        task => {
+            let own = task.presentations();
+            own.is_some_and(|own| own.models.contains(model) || own.practice.contains(model))
+                || task.reference() == Some(model)
+        }
+    });
+    by_track || by_part
+}
+
+/// Whether realizations are rated or compared, so that their number matters.
+pub(super) fn is_about_realizations(protocol: &Protocol) -> bool {
+    let about = |part: &Part| match &part.task {
+        Task::Discrimination { .. } => false,
+        Task::Magnitude(own) => own.models.iter().all(|m| protocol.level_of(m).is_none()),
+        Task::Rating(_) | Task::Mushra(_) | Task::Pairs(_) => true,
+    };
+    let tested = protocol.models.iter().any(|m| m.role == Role::Test);
+    protocol.parts.is_empty() || (protocol.parts.iter().any(about) && tested)
+}
+
+/// Too few levels for an exponent, or levels that it leaves out.
+fn magnitudes(protocol: &Protocol, part: &Part) -> Option<Fault> {
+    let Task::Magnitude(own) = &part.task else {
+        return None;
+    };
+    let levels = own.models.iter().filter_map(|id| protocol.level_of(id));
+    let levels: Vec<f64> = levels.collect();
+    if levels.is_empty() {
+        return None;
+    }
+    let id = &part.id;
+    if levels.iter().any(|level| *level <= 0.0) {
+        let what = format!("the exponent of the part `{id}` leaves out levels of 0 and less");
+        return Some(Fault::warning(what).hint("take levels above 0"));
+    }
+    (levels.len() < MAGNITUDE_LEVELS).then(|| {
+        Fault::warning(format!(
+            "the part `{id}` has {} levels: an exponent of fewer than {MAGNITUDE_LEVELS} is uncertain",
+            levels.len()
+        ))
+    })
+}
+
+/// Pairs whose trials do not have both orders equally often.
+fn one_order(part: &Part) -> Option<Fault> {
+    let Task::Pairs(own) = &part.task else {
+        return None;
+    };
+    let uneven = own.interval_order == IntervalOrder::Balanced && own.repetitions % 2 == 1;
+    uneven.then(|| {
+        let what = format!(
+            "`repetitions = {}`: nobody has both orders of a pair of `{}` equally often",
+            own.repetitions, part.id
+        );
+        Fault::warning(what).hint("take an even number; the orders are balanced over two rows")
+    })
+}
+
+fn few_trials(track: &TrackRules) -> Option<Fault> {
+    let id = &track.id;
+    let trials = track.rule.most_trials();
+    let what = match &track.rule {
+        Rule::Staircase(rule) if rule.stop.reversals < REVERSALS => format!(
+            "the track `{id}` stops after {} reversals: {REVERSALS} or more are usual",
+            rule.stop.reversals
+        ),
+        Rule::Staircase(rule) if rule.stop.reversals < rule.estimate_last => format!(
+            "the estimate of the track `{id}` is the mean of {} reversals, and it stops after {}",
+            rule.estimate_last, rule.stop.reversals
+        ),
+        Rule::Staircase(rule) if rule.estimate_last % 2 == 1 => format!(
+            "the estimate of the track `{id}` is the mean of an odd number of reversals, {}: the peaks or the valleys weigh more",
+            rule.estimate_last
+        ),
+        Rule::QuestPlus(_) | Rule::Staircase(_) if trials < TRACK_TRIALS => format!(
+            "the track `{id}` has at most {trials} trials: about 40 give a threshold to half the noise"
+        ),
+        // Of two realizations there is no curve to fit.
+        Rule::Constant(rule)
+            if rule.repetitions < TRIALS_OF_A_LEVEL && track.family().is_some() =>
+        {
+            format!(
+                "the track `{id}` has {} trials of each level: 20 to 40 are usual",
+                rule.repetitions
+            )
+        }
+        Rule::Constant(_) | Rule::QuestPlus(_) | Rule::Staircase(_) => return None,
+    };
+    Some(Fault::warning(what))
+}
+
+/// A rule that settles near the share of correct answers by guessing.
+fn target(track: &TrackRules) -> Option<Fault> {
+    let (Rule::Staircase(rule), Some(guess)) = (&track.rule, track.method.guess_rate()) else {
+        return None;
+    };
+    let target = Staircase::target(rule)?;
+    (target < guess + 0.1).then(|| {
+        Fault::warning(format!(
+            "the track `{}` settles at {:.0} % correct, and guessing gives {:.0} %",
+            track.id,
+            100.0 * target,
+            100.0 * guess
+        ))
+        .hint("such as up = 1, down = 3 for 79 %")
+    })
+}
+
+/// Levels on both sides of the standard, where the share of correct answers does not rise
+/// with the level.
+fn one_side(protocol: &Protocol, track: &TrackRules) -> Option<Fault> {
+    let standard = track.standard_level()?;
+    let below = protocol.ladder(track).first() < standard;
+    let modeled = matches!(track.rule, Rule::QuestPlus(_));
+    (below && modeled && track.method != Method::YesNo).then(|| {
+        Fault::warning(format!(
+            "levels below the standard of the track `{}`: its function rises with the level, and there the share of correct answers falls",
+            track.id
+        ))
+        .hint("begin the family at the standard")
+    })
+}
+
+fn catch(track: &TrackRules) -> Option<Fault> {
+    let planned = f64::from(track_trials(track)) * track.catch;
+    let needed = !track.method.catch_sequences().is_empty();
+    (needed && planned < CATCH_TRIALS).then(|| {
+        Fault::warning(format!(
+            "the track `{}` has {planned:.0} catch trials: fewer than 10 do not tell the share of false alarms",
+            track.id
+        ))
+    })
+}

@@ -1,0 +1,342 @@
+//! Reading a protocol file.
+//!
+//! Strict, and never stopping at the first fault: unknown keys, wrong types,
+//! values out of range, and sections that contradict each other are all reported
+//! at once, each with its place. Faults that need other files (do the models
+//! load? is the order feasible?) are found elsewhere.
+//!
+//! [`ROOT`] declares every key. [`parse_orders`] reads the `orders.csv` that a
+//! protocol may name.
+
+mod agree;
+mod analysis;
+mod design;
+mod device;
+mod families;
+mod general;
+mod grids;
+mod groups;
+mod looked;
+mod models;
+mod orders;
+mod parts;
+mod power;
+mod questionnaires;
+mod questions;
+mod resolve;
+mod tracks;
+
+pub use orders::parse_orders;
+
+use super::keys::{Key, Kind, Variants, Word, keys};
+use super::section::Section;
+use super::{FORMAT, FORMAT_2, Protocol, Question};
+use agree::Sections;
+use models::PartialModel;
+use questions::PartialQuestion;
+use std::collections::BTreeMap;
+use std::ops::Range;
+use study_base::diagnostic::table::Document;
+use study_base::diagnostic::{Fault, Findings};
+use study_base::text::Untrusted;
+
+/// Every key of a protocol file, by section.
+pub const ROOT: &[Key] = keys! {
+    /// The file format with its version.
+    "format": Kind::Word(FORMATS), r#""study-protocol/1""#, required;
+    /// Identity and provenance of the study.
+    "study": Kind::Table(general::STUDY), "", required;
+    /// What participants read, in any language. Each text can be left out.
+    "text": Kind::Table(general::TEXT), "";
+    /// The document that the participant agrees to before the session.
+    "consent": Kind::Table(general::CONSENT), "";
+    /// The trials of a participant and their order.
+    "design": Kind::Table(design::DESIGN), "", required;
+    /// How a session goes.
+    "session": Kind::Table(general::SESSION), "";
+    /// What plays the realizations, and its limits.
+    "device": Kind::Table(device::DEVICE), "", required;
+    /// How a trial goes.
+    "trial": Kind::Table(general::TRIAL), "";
+    /// The realizations; at least one whose role is not `practice`.
+    "models": Kind::Tables(models::MODELS), "", derived("required, unless every part takes its levels from families");
+    /// The parts of a session, in their order. Without any, the study is one rating part, whose
+    /// keys are in `[design]`. Parts need the format `study-protocol/2`.
+    "parts": Kind::Variants(&parts::PARTS), "";
+    /// Dimensions of the stimulus: each is a ladder of levels, and each level a table of its
+    /// own, certified and hashed before the session. Needs the format `study-protocol/2`.
+    "families": Kind::Tables(families::FAMILIES), "";
+    /// Tracks of the parts of kind `discrimination`. Needs the format `study-protocol/2`.
+    "tracks": Kind::Tables(tracks::TRACKS), "";
+    /// Groups of participants: each belongs to one for good. Needs the format
+    /// `study-protocol/2` and `[[parts]]`.
+    "groups": Kind::Table(groups::GROUPS), "";
+    /// Repeated sessions, in their order: the same participant comes again. Without any, a
+    /// participant comes once. Needs the format `study-protocol/2` and `[[parts]]`.
+    "sessions": Kind::Tables(groups::SESSIONS), "";
+    /// Asked after each trial; at least one.
+    "questions": Kind::Variants(&questions::QUESTIONS), "", derived("required, unless every part has an answer of its own");
+    /// Asked of the experimenter before the first trial.
+    "setup": Kind::Variants(&questions::QUESTIONS), "";
+    /// Asked of the participant once, before the first trial.
+    "intake": Kind::Variants(&questions::QUESTIONS), "";
+    /// Asked of the participant once, at the end.
+    "outro": Kind::Variants(&questions::QUESTIONS), "";
+    /// Standard questionnaires, asked of the participant after `[[outro]]`, with their scores in
+    /// the analysis.
+    "questionnaires": Kind::Variants(&questionnaires::QUESTIONNAIRES), "";
+    /// Decisions that were made before the data.
+    "analysis": Kind::Table(analysis::ANALYSIS), "", required;
+    /// What is assumed before the data, for `study power`. It changes no session and no
+    /// result.
+    "power": Kind::Table(power::POWER), "";
+};
+
+/// The keys of a question, the same in four places.
+pub static QUESTIONS: &Variants = &questions::QUESTIONS;
+
+/// The formats of a protocol.
+const FORMATS: &[Word] = &[
+    Word::new(FORMAT, "A study of ratings."),
+    Word::new(FORMAT_2, "A study of parts, such as pairs and thresholds."),
+];
+
+/// Sections that need [`FORMAT_2`].
+const OF_FORMAT_2: [&str; 5] = ["parts", "families", "tracks", "groups", "sessions"];
+
+/// Largest protocol file that is read, bytes.
+pub const MAX_FILE_BYTES: usize = 1024 * 1024;
+
+/// The result of reading a protocol file.
+#[derive(Debug, Clone)]
+pub struct Parsed {
+    /// The protocol, if the file has no errors.
+    pub protocol: Option<Protocol>,
+    /// Every fault of the file.
+    pub findings: Findings,
+    /// Path of a value (`models[2].vaf`, `design.order`) → its bytes in the file.
+    pub spans: BTreeMap<String, Range<usize>>,
+    /// The other files that it names, even if the protocol has errors.
+    pub named: Vec<Named>,
+}
+
+/// A file that a protocol names.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Named {
+    /// Path of the value, such as `models[2].file`.
+    pub place: String,
+    /// Relative to the protocol, with `/`.
+    pub file: String,
+    /// Whether it contains orders rather than a model.
+    pub orders: bool,
+}
+
+/// Reads a protocol file; `path` is only for messages.
+pub fn parse(path: &str, text: &str) -> Parsed {
+    let length = text.len();
+    if length > MAX_FILE_BYTES {
+        let what = format!("the file has {length} bytes, more than {MAX_FILE_BYTES}");
+        return Parsed {
+            protocol: None,
+            findings: Findings::alone(path, Fault::error(what)),
+            spans: BTreeMap::new(),
+            named: Vec::new(),
+        };
+    }
+    let mut findings = Findings::new(path, text);
+    let document = Document::parse(text);
+    let broken = document.fault_count();
+    let mut named = Vec::new();
+    let known = format_is_known(&document, broken > 0);
+    let protocol = known
+        .then(|| read(&document, broken > 0, &mut named))
+        .flatten();
+    let read = document.finish();
+    findings.faults = read.faults;
+    drop_echoes(&mut findings.faults, broken);
+    findings.sort();
+    Parsed {
+        protocol: protocol.filter(|_| !findings.has_errors()),
+        findings,
+        spans: read.spans,
+        named,
+    }
+}
+
+/// Removes faults at the places of syntax errors (the first `broken` faults): they are
+/// consequences of these.
+fn drop_echoes(faults: &mut Vec<Fault>, broken: usize) {
+    let holes: Vec<Range<usize>> = faults[..broken]
+        .iter()
+        .filter_map(|f| f.span.clone())
+        .collect();
+    let mut at = 0;
+    faults.retain(|fault| {
+        at += 1;
+        at <= broken
+            || !fault.span.as_ref().is_some_and(|span| {
+                holes
+                    .iter()
+                    .any(|hole| span.start <= hole.end && hole.start <= span.end)
+            })
+    });
+}
+
+/// Checks the format. A file of another format is not read any further, because every
+/// key would be a fault.
+fn format_is_known(document: &Document<'_>, broken: bool) -> bool {
+    let mut root = document.root();
+    let Some(value) = root.value("format") else {
+        if !broken {
+            document.fault(
+                Fault::error("the file has no `format`")
+                    .hint(format!("its first line has to be: format = \"{FORMAT}\"")),
+            );
+        }
+        return true;
+    };
+    let Some(format) = value.text() else {
+        return true;
+    };
+    if format == FORMAT {
+        for name in OF_FORMAT_2 {
+            if let Some(value) = root.value(name) {
+                let name = match name {
+                    "groups" => "[groups]".to_owned(),
+                    name => format!("[[{name}]]"),
+                };
+                value.fault(
+                    Fault::error(format!("{name} needs the format `{FORMAT_2}`"))
+                        .hint(format!("write format = \"{FORMAT_2}\" in the first line")),
+                );
+            }
+        }
+        return true;
+    }
+    if format == FORMAT_2 {
+        return true;
+    }
+    let version =
+        |format: &str| -> Option<u32> { format.strip_prefix("study-protocol/")?.parse().ok() };
+    let given = Untrusted(&format);
+    value.fault(match (version(&format), version(FORMAT_2)) {
+        (Some(theirs), Some(ours)) if theirs > ours => Fault::error(format!(
+            "the format `{given}` is newer than this program, which reads `{FORMAT_2}`"
+        ))
+        .hint("use a newer version of study"),
+        _ => Fault::error(format!("`{given}` is not a format of a protocol"))
+            .label(format!("`{FORMAT}` is")),
+    });
+    false
+}
+
+/// Reads all sections; `None` if a part is faulty, which has been reported.
+fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option<Protocol> {
+    let mut root = Section::root(document, broken, ROOT);
+    let study = root.section("study").and_then(general::study);
+    let text = root.section("text").map(general::text);
+    let consent = root.section("consent").and_then(general::consent);
+    let raw = resolve::Raw {
+        parts: parts::read(&mut root),
+        families: (root.sections("families").into_iter())
+            .map(families::read)
+            .collect(),
+        tracks: root
+            .sections("tracks")
+            .into_iter()
+            .map(tracks::read)
+            .collect(),
+    };
+    let groups = root.section("groups").map(groups::groups);
+    let sessions = root.sections("sessions").into_iter().map(groups::session);
+    let sessions: Option<Vec<_>> = sessions.collect();
+    let has_parts = !raw.parts.is_empty();
+    let design = (root.section("design")).and_then(|section| design::read(section, has_parts));
+    let session = root.section("session").and_then(general::session);
+    let device = root.section("device").and_then(device::read);
+    let trial = root.section("trial").and_then(general::trial);
+    let models = root.sections("models").into_iter().map(models::read);
+    let mut questions = questions::read(&mut root, "questions");
+    let own_questions = raw.questions();
+    let has_faulty_parts = raw.rating_parts() + own_questions.len() < raw.parts.len();
+    questions.extend(own_questions);
+    let setup = questions::read(&mut root, "setup");
+    let intake = questions::read(&mut root, "intake");
+    let mut outro = questions::read(&mut root, "outro");
+    let questionnaires = questionnaires::read(&mut root);
+    outro.extend(questionnaires.iter().flat_map(|q| q.questions()));
+    let analysis = root.section("analysis").and_then(analysis::read);
+    let power = root.section("power").and_then(power::read);
+
+    let mut sections = Sections {
+        design: design.as_ref(),
+        device: device.as_ref(),
+        minimum_strokes: trial.as_ref().map_or(0, |t| t.minimum_strokes),
+        exposure: trial.as_ref().map(|t| t.exposure).unwrap_or_default(),
+        models: models.collect(),
+        questions,
+        setup,
+        intake,
+        outro,
+        analysis: analysis.as_ref(),
+        has_parts,
+        has_faulty_parts,
+    };
+    named.extend(sections.files());
+    named.extend(raw.files());
+    if !broken {
+        sections.agree(document);
+        questionnaires::agree(&questionnaires, &raw.parts, document);
+    }
+    let resolved = raw.resolve(&sections, document, broken);
+    if let (Some(sessions), Some(parts), Some(families), false) =
+        (&sessions, &resolved.parts, &resolved.families, broken)
+    {
+        let known = groups.as_ref().and_then(Option::as_ref);
+        groups::agree(known, sessions, (parts, families), document);
+    }
+    sections.fill_duplicates();
+    let Sections {
+        models,
+        questions,
+        setup,
+        intake,
+        outro,
+        ..
+    } = sections;
+    let models: Option<_> = models.into_iter().map(PartialModel::finish).collect();
+    Some(Protocol {
+        study: study?,
+        text: text?,
+        consent,
+        session: session?,
+        trial: trial?,
+        models: models?,
+        questions: all(questions)?,
+        setup: all(setup)?,
+        intake: all(intake)?,
+        outro: all(outro)?,
+        questionnaires: (questionnaires.iter())
+            .map(|q| q.finish())
+            .collect::<Option<_>>()?,
+        design: design?,
+        device: device?,
+        analysis: analysis?,
+        parts: resolved.parts?,
+        families: resolved.families?,
+        tracks: resolved.tracks?,
+        groups: match groups {
+            None => None,
+            Some(groups) => Some(groups?),
+        },
+        sessions: sessions?,
+        power: power?,
+    })
+}
+
+fn all(questions: Vec<PartialQuestion>) -> Option<Vec<Question>> {
+    questions.into_iter().map(PartialQuestion::finish).collect()
+}
+
+#[cfg(test)]
+mod tests;

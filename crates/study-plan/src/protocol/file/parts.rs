@@ -1,0 +1,371 @@
+//! `[[parts]]`: trials of one kind each.
+
+use crate::protocol::keys::{Id, Key, Kind, Shape, Variants, Words as _, keys};
+use crate::protocol::section::{Section, Variant, shapes};
+use crate::protocol::{Exposure, IntervalOrder, Order, Presentations};
+use std::collections::BTreeMap;
+use study_base::diagnostic::Fault;
+use study_base::diagnostic::table::Value;
+use study_base::text::{ModelId, PartId, QuestionId, Untrusted};
+
+pub(super) static PARTS: Variants = Variants {
+    tag: "kind",
+    effect: "The kind of trial",
+    common: keys! {
+        /// The name of the part. The answers of pairs and of discrimination are in a column of
+        /// this name.
+        "id": Kind::Id(Id::Part), r#""which-is-more-real""#, required;
+        /// Shown before the first trial of the part.
+        "text": Kind::Text, r#""You will feel two switches in each trial.""#;
+        /// The `[[questions]]` of a trial, by id; after the answer, where the kind of trial has
+        /// one.
+        "questions": Kind::Ids(Id::Question), r#"["realism"]"#, derived("in a rating part all questions that no other part names, else none");
+        /// How long each interval is felt.
+        "exposure": Kind::Table(EXPOSURE), "{ min_s = 2, max_s = 8 }", derived("that of `[trial]`");
+    },
+    shapes: &SHAPES,
+};
+
+pub(super) const EXPOSURE: &[Key] = keys! {
+    /// The least time that a realization, or an interval of several, is felt.
+    "min_s": Kind::not_negative("s"), "2", default("0");
+    /// The device stops by itself after this time. The time left is shown.
+    "max_s": Kind::positive("s"), "8";
+    /// How often a trial can be felt again before it is answered.
+    "replays": Kind::Whole(0, 100), "1", default("0");
+};
+
+static SHAPES: [Shape; KINDS.len()] = shapes(&KINDS);
+
+/// The words of `order`: a part has no file of orders.
+const ORDER: Kind = Kind::Word(Order::WORDS);
+
+/// Keys of the kinds with one realization a trial.
+macro_rules! presentation_keys {
+    ($($own:tt)*) => {
+        keys! {
+            $($own)*
+            /// How often each is presented.
+            "repetitions": Kind::Whole(1, 10_000), "3", required;
+            /// How the order of the trials is made.
+            "order": ORDER, r#""williams""#, default(r#""blocked""#);
+            /// The largest number of consecutive trials with the same realization.
+            "max_run": Kind::COUNT, "1";
+            /// The least distance between two positions of the same realization.
+            "min_distance": Kind::COUNT, "2";
+        }
+    };
+}
+
+/// The kinds of trial. A new one is declared here and in [`crate::protocol::Task`].
+pub(super) const KINDS: [Variant<RawTask>; 5] = [
+    Variant::new(
+        "rating",
+        "One realization is felt and rated.",
+        presentation_keys! {
+            /// The realizations, by id.
+            "models": Kind::ModelIds, r#"["lambda-0.9991", "lambda-0.9995"]"#, derived("all whose role is not `practice`");
+            /// The realizations of the practice trials of the part, in this order.
+            "practice": Kind::ModelIds, r#"["spring"]"#;
+        },
+        rating,
+    ),
+    Variant::new(
+        "magnitude",
+        "Magnitude estimation: one level of a family, or one realization, is felt, and a number above 0 is typed for it.",
+        presentation_keys! {
+            /// What is asked, in any language.
+            "prompt": Kind::Text, r#""How strong did it feel?""#, required;
+            /// One of `[[families]]`, whose levels are felt.
+            "family": Kind::Id(Id::Part), r#""detent""#;
+            /// Levels of the ladder.
+            "levels": Kind::NumberList, "[0.5, 1.0, 2.0]", derived("all levels of the ladder");
+            /// The realizations, by id, in a part without a family.
+            "models": Kind::ModelIds, r#"["lambda-0.9991", "lambda-0.9995"]"#, derived("all whose role is not `practice`");
+            /// The realizations of the practice trials of the part, in this order.
+            "practice": Kind::ModelIds, r#"["spring"]"#;
+        },
+        magnitude,
+    ),
+    Variant::new(
+        "mushra",
+        "One realization is rated from 0 to 100 beside a reference, which is among the realizations, too, unlabeled (after ITU-R BS.1534-3, one at a time).",
+        presentation_keys! {
+            /// What is asked, in any language.
+            "prompt": Kind::Text, r#""How close was it to the reference?""#, required;
+            /// Texts at some of the numbers.
+            "labels": Kind::NumberLabels, r#"{ 0 = "bad", 100 = "excellent" }"#;
+            /// The realizations, by id. One has the role `hidden-reference`; anchors have the roles
+            /// `low-anchor` and `mid-anchor`.
+            "models": Kind::ModelIds, r#"["target", "spring", "lambda-0.9995"]"#, derived("all whose role is not `practice`");
+            /// The realization that is felt as the reference before each one. Without it the
+            /// reference is a real one, which `trial.reference` asks to feel.
+            "reference": Kind::Id(Id::Model), r#""target""#;
+            /// The realizations of the practice trials of the part, in this order.
+            "practice": Kind::ModelIds, r#"["spring"]"#;
+            /// From the end of the reference to the start of the realization. Both are loaded anew
+            /// in this time, whether they differ or not.
+            "gap_s": Kind::positive("s"), "1.5", default("1");
+        },
+        mushra,
+    ),
+    Variant::new(
+        "pairs",
+        "Two realizations are felt one after the other, and one is chosen: `first` or `second`.",
+        keys! {
+            /// What is asked, in any language.
+            "prompt": Kind::Text, r#""Which one felt more real?""#, required;
+            /// The realizations, by id.
+            "models": Kind::ModelIds, r#"["lambda-0.9991", "lambda-0.9995", "passive"]"#, derived("all whose role is not `practice`, without duplicates");
+            /// Which are compared: all with all, neighbors in the order of `models`, all with one,
+            /// or a list.
+            "pairs": Kind::Pairs, r#""versus:passive""#, default(r#""all""#);
+            /// How often each pair is compared.
+            "repetitions": Kind::Whole(1, 10_000), "2", required;
+            /// How the order of the pairs is made.
+            "order": ORDER, r#""shuffled""#, default(r#""blocked""#);
+            /// Whether "no difference" is an answer, `tie`.
+            "tie": Kind::Flag, "true", default("false");
+            /// Which of a pair comes first.
+            "interval_order": Kind::Word(IntervalOrder::WORDS), r#""random""#, default(r#""balanced""#);
+            /// From the end of the first interval to the start of the second. Both are loaded
+            /// anew in this time, whether they differ or not.
+            "gap_s": Kind::positive("s"), "1.5", default("1");
+        },
+        pairs,
+    ),
+    Variant::new(
+        "discrimination",
+        "Levels are told from a standard, on one track or several interleaved ones.",
+        keys! {
+            /// What is asked, in any language.
+            "prompt": Kind::Text, r#""Which one had more damping?""#, required;
+            /// The `[[tracks]]`, by id; all of the same method. Each pass through the part takes
+            /// every unfinished track once, in random order.
+            "tracks": Kind::Ids(Id::Part), r#"["damping-up"]"#, required;
+            /// From the end of an interval to the start of the next. Every interval is loaded
+            /// anew in this time, also an equal one.
+            "gap_s": Kind::positive("s"), "1.5", default("1");
+        },
+        discrimination,
+    ),
+];
+
+/// A part as it was read; its ids are not looked up yet.
+#[derive(Debug)]
+pub(super) struct RawPart {
+    /// Such as `parts[0]`.
+    pub(super) path: String,
+    pub(super) id: Option<PartId>,
+    pub(super) text: Option<String>,
+    pub(super) questions: Option<Vec<QuestionId>>,
+    /// `None` inside: that of `[trial]`.
+    pub(super) exposure: Option<Option<Exposure>>,
+    pub(super) task: Option<RawTask>,
+}
+
+#[derive(Debug)]
+pub(super) enum RawTask {
+    Rating {
+        /// Its models are empty if none are named.
+        presentations: Presentations,
+    },
+    Magnitude {
+        prompt: String,
+        /// With its levels, if they are named.
+        family: Option<(PartId, Option<Vec<f64>>)>,
+        /// Its models are empty if none are named.
+        presentations: Presentations,
+    },
+    Mushra {
+        prompt: String,
+        labels: BTreeMap<String, String>,
+        reference: Option<ModelId>,
+        /// Its models are empty if none are named.
+        presentations: Presentations,
+        gap_s: f64,
+    },
+    Pairs {
+        prompt: String,
+        models: Option<Vec<ModelId>>,
+        pairs: RawPairs,
+        repetitions: u32,
+        order: Order,
+        tie: bool,
+        interval_order: IntervalOrder,
+        gap_s: f64,
+    },
+    Discrimination {
+        prompt: String,
+        tracks: Vec<PartId>,
+        gap_s: f64,
+    },
+}
+
+/// Which pairs are compared.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum RawPairs {
+    All,
+    Adjacent,
+    Versus(ModelId),
+    List(Vec<[ModelId; 2]>),
+}
+
+pub(super) fn read(root: &mut Section<'_, '_>) -> Vec<RawPart> {
+    (root.variants("parts", &KINDS).into_iter())
+        .map(|(mut section, kind)| RawPart {
+            path: section.path().to_owned(),
+            id: section.part_id("id"),
+            text: section.text("text"),
+            questions: section.ids("questions"),
+            exposure: match section.value("exposure") {
+                None => Some(None),
+                Some(_) => section.section("exposure").and_then(exposure).map(Some),
+            },
+            task: kind.and_then(|kind| (kind.read)(&mut section)),
+        })
+        .collect()
+}
+
+pub(super) fn exposure(mut section: Section<'_, '_>) -> Option<Exposure> {
+    let (min_s, max_s) = (section.number("min_s"), section.number("max_s"));
+    let replays = section.whole("replays");
+    if let (Some(min), Some(max)) = (min_s, max_s)
+        && min > max
+    {
+        let what = format!("`{}.min_s` is above `max_s`: {min} > {max}", section.path());
+        section.fault_at("min_s", Fault::error(what));
+    }
+    Some(Exposure {
+        min_s: min_s?,
+        max_s,
+        replays: replays?,
+    })
+}
+
+fn rating(section: &mut Section<'_, '_>) -> Option<RawTask> {
+    let (models, practice) = (section.model_ids("models"), section.model_ids("practice"));
+    let presentations = presentations(section, models, practice)?;
+    Some(RawTask::Rating { presentations })
+}
+
+fn presentations(
+    section: &mut Section<'_, '_>,
+    models: Vec<ModelId>,
+    practice: Vec<ModelId>,
+) -> Option<Presentations> {
+    let (repetitions, order) = (section.whole("repetitions"), section.word("order"));
+    let (max_run, min_distance) = (section.whole("max_run"), section.whole("min_distance"));
+    Some(Presentations {
+        models,
+        order: order?,
+        repetitions: repetitions?,
+        max_run,
+        min_distance,
+        practice,
+    })
+}
+
+fn magnitude(section: &mut Section<'_, '_>) -> Option<RawTask> {
+    let (prompt, family) = (section.text("prompt"), section.part_id("family"));
+    let levels = section.numbers("levels");
+    let (models, practice) = (section.model_ids("models"), section.model_ids("practice"));
+    let path = section.path();
+    if family.is_some() && !models.is_empty() {
+        let what = format!("`{path}` has `models` and a family");
+        section.fault_at("models", Fault::error(what).hint("leave one of them out"));
+    }
+    if family.is_none() && levels.is_some() {
+        let what = format!("`{path}` has `levels` without a family");
+        section.fault_at("levels", Fault::error(what).hint("add family = \"…\""));
+    }
+    let presentations = presentations(section, models, practice);
+    Some(RawTask::Magnitude {
+        prompt: prompt?,
+        family: family.map(|family| (family, levels)),
+        presentations: presentations?,
+    })
+}
+
+fn mushra(section: &mut Section<'_, '_>) -> Option<RawTask> {
+    let (prompt, reference) = (section.text("prompt"), section.model_id("reference"));
+    let labels = section.number_labels(0.0, 100.0);
+    let (models, practice) = (section.model_ids("models"), section.model_ids("practice"));
+    let presentations = presentations(section, models, practice);
+    let gap_s = section.number("gap_s");
+    Some(RawTask::Mushra {
+        prompt: prompt?,
+        labels: labels?,
+        reference,
+        presentations: presentations?,
+        gap_s: gap_s?,
+    })
+}
+
+fn pairs(section: &mut Section<'_, '_>) -> Option<RawTask> {
+    let prompt = section.text("prompt");
+    let models = section.ids("models");
+    let pairs = match section.value("pairs") {
+        None => Some(RawPairs::All),
+        Some(value) => which(&value),
+    };
+    let repetitions = section.whole("repetitions");
+    let order = section.word("order");
+    let (tie, interval_order) = (section.flag("tie"), section.word("interval_order"));
+    let gap_s = section.number("gap_s");
+    Some(RawTask::Pairs {
+        prompt: prompt?,
+        models,
+        pairs: pairs?,
+        repetitions: repetitions?,
+        order: order?,
+        tie: tie?,
+        interval_order: interval_order?,
+        gap_s: gap_s?,
+    })
+}
+
+/// Reads `pairs`.
+fn which(value: &Value<'_, '_>) -> Option<RawPairs> {
+    let expected = Kind::Pairs.describe();
+    let refuse = |given: &str| {
+        let given = Untrusted(given);
+        value.refuse(format_args!("has to be {expected}, not `{given}`"))
+    };
+    if value.is_array() {
+        let list = value.array()?;
+        if list.is_empty() {
+            return value.refuse("is empty");
+        }
+        let mut pairs = Vec::new();
+        for pair in list {
+            let ids: Vec<ModelId> = (pair.array()?.iter())
+                .filter_map(crate::protocol::section::parsed)
+                .collect();
+            match <[ModelId; 2]>::try_from(ids) {
+                Ok(ids) if ids[0] != ids[1] => pairs.push(ids),
+                _ => return pair.refuse("has to be two different ids of realizations"),
+            }
+        }
+        return Some(RawPairs::List(pairs));
+    }
+    let text = value.text()?;
+    match text.as_str() {
+        "all" => Some(RawPairs::All),
+        "adjacent" => Some(RawPairs::Adjacent),
+        other => match other.strip_prefix("versus:").map(ModelId::new) {
+            Some(Ok(id)) => Some(RawPairs::Versus(id)),
+            _ => refuse(other),
+        },
+    }
+}
+
+fn discrimination(section: &mut Section<'_, '_>) -> Option<RawTask> {
+    let (prompt, tracks) = (section.text("prompt"), section.ids("tracks"));
+    let gap_s = section.number("gap_s");
+    Some(RawTask::Discrimination {
+        prompt: prompt?,
+        tracks: tracks?,
+        gap_s: gap_s?,
+    })
+}

@@ -1,0 +1,141 @@
+//! `[[questionnaires]]`.
+
+use super::agree::{at, collision};
+use super::parts::RawPart;
+use super::questions::PartialQuestion;
+use crate::protocol::keys::{Id, Kind, Shape, Variants, keys};
+use crate::protocol::questionnaires::{Inventory, Questionnaire, item_id};
+use crate::protocol::section::{Section, Variant, shapes};
+use study_base::diagnostic::Fault;
+use study_base::diagnostic::table::Document;
+use study_base::text::{PartId, counted};
+
+pub(super) static QUESTIONNAIRES: Variants = Variants {
+    tag: "kind",
+    effect: "Which questionnaire",
+    common: keys! {
+        /// The name of the questionnaire. Its answers are in columns that begin with this name,
+        /// such as `sus_1`.
+        "id": Kind::Id(Id::Part), r#""sus""#, required;
+        /// The texts at both ends of every scale.
+        "labels": Kind::Texts(2), r#"["stimme gar nicht zu", "stimme voll zu"]"#, derived("those of the source, in English");
+    },
+    shapes: &SHAPES,
+};
+
+static SHAPES: [Shape; KINDS.len()] = shapes(&KINDS);
+
+/// Reads the own key of a questionnaire: the word for what is judged.
+type Read = (Inventory, Option<String>);
+
+const KINDS: [Variant<Read>; 2] = [
+    Variant::new(
+        "sus",
+        "The System Usability Scale (Brooke 1996), free to use where the source is named.",
+        keys! {
+            /// What is judged, in its sentences: "I thought the switch was easy to use."
+            "system": Kind::Text, r#""switch""#, default(r#""system""#);
+            /// The ten items in other words or in another language, in their order. `{system}`
+            /// stands for that word.
+            "items": Kind::Texts(1), r#"["Den {system} würde ich gern oft nutzen.", "…", "…", "…", "…", "…", "…", "…", "…", "…"]"#, derived("those of the source, in English");
+        },
+        |section| Some((Inventory::Sus, section.text("system"))),
+    ),
+    Variant::new(
+        "nasa-tlx",
+        "The NASA Task Load Index without weights, the raw TLX (Hart 2006).",
+        keys! {
+            /// The six items in other words or in another language, in their order.
+            "items": Kind::Texts(1), r#"["Wie hoch war die geistige Anforderung?", "…", "…", "…", "…", "…"]"#, derived("those of the source, in English");
+        },
+        |_| Some((Inventory::NasaTlx, None)),
+    ),
+];
+
+/// A questionnaire that may be faulty in part.
+#[derive(Debug)]
+pub(super) struct PartialQuestionnaire {
+    /// Such as `questionnaires[0]`.
+    path: String,
+    id: Option<PartId>,
+    kind: Option<Inventory>,
+    /// The texts of its items, with the labels of their scales.
+    items: Vec<(String, [String; 2])>,
+}
+
+pub(super) fn read(root: &mut Section<'_, '_>) -> Vec<PartialQuestionnaire> {
+    (root.variants("questionnaires", &KINDS).into_iter())
+        .map(|(mut section, kind)| {
+            let read = kind.and_then(|kind| (kind.read)(&mut section));
+            PartialQuestionnaire {
+                path: section.path().to_owned(),
+                id: section.part_id("id"),
+                kind: read.as_ref().map(|(kind, _)| *kind),
+                items: read.map_or_else(Vec::new, |read| items(&mut section, &read)),
+            }
+        })
+        .collect()
+}
+
+/// The texts of the items, as they are asked.
+fn items(section: &mut Section<'_, '_>, (kind, system): &Read) -> Vec<(String, [String; 2])> {
+    let texts = |section: &mut Section<'_, '_>, key: &str, needed: usize| -> Vec<String> {
+        let texts: Vec<String> = section.texts(key).into_iter().map(|(_, t)| t).collect();
+        if !texts.is_empty() && texts.len() != needed {
+            let what = format!(
+                "`{}.{key}` has {}, not {needed}",
+                section.path(),
+                counted(texts.len(), "text", "texts")
+            );
+            section.fault_at(key, Fault::error(what));
+        }
+        texts
+    };
+    let known = kind.items();
+    let own = texts(section, "items", known.len());
+    let labels = texts(section, "labels", 2);
+    let system = system.as_deref().unwrap_or("system");
+    let item = |(i, item): (usize, &crate::protocol::questionnaires::Item)| {
+        let prompt = own.get(i).map_or(item.prompt, String::as_str);
+        let [low, high] = [(0, item.low), (1, item.high)]
+            .map(|(end, label)| labels.get(end).map_or(label, String::as_str).to_owned());
+        (prompt.replace("{system}", system), [low, high])
+    };
+    known.iter().enumerate().map(item).collect()
+}
+
+impl PartialQuestionnaire {
+    /// The items as questions at the end of a session.
+    pub(super) fn questions(&self) -> Vec<PartialQuestion> {
+        let (Some(id), Some(kind)) = (&self.id, self.kind) else {
+            return Vec::new();
+        };
+        let items = kind.items().iter().zip(&self.items);
+        let question = |(item, (prompt, [low, high])): (_, &(String, [String; 2]))| {
+            let name = item_id(id, item);
+            PartialQuestion::made(&self.path, name.as_str(), prompt, kind.scale(low, high))
+        };
+        items.map(question).collect()
+    }
+
+    pub(super) fn finish(&self) -> Option<Questionnaire> {
+        Some(Questionnaire {
+            id: self.id.clone()?,
+            kind: self.kind?,
+        })
+    }
+}
+
+/// Reports ids of questionnaires that are there twice or belong to a part.
+pub(super) fn agree(all: &[PartialQuestionnaire], parts: &[RawPart], document: &Document<'_>) {
+    let of_parts: Vec<&PartId> = parts.iter().filter_map(|p| p.id.as_ref()).collect();
+    for (i, own) in all.iter().enumerate() {
+        let Some(id) = &own.id else { continue };
+        let earlier = all[..i].iter().filter_map(|q| q.id.as_ref());
+        let mut others = earlier.chain(of_parts.iter().copied());
+        if let Some(other) = others.find(|other| other.collides_with(id)) {
+            let fault = collision(id.as_str(), other.as_str());
+            document.fault(fault.at(at(document, &own.path, "id")));
+        }
+    }
+}

@@ -1,0 +1,468 @@
+//! From parts, families and tracks as they were read to those of a protocol: ids are
+//! looked up, and defaults that depend on other sections are filled in.
+
+use super::Named;
+use super::agree::{Sections, at, collision, unknown};
+use super::families::PartialFamily;
+use super::grids::Grids;
+use super::looked::Looked;
+use super::parts::{RawPart, RawTask};
+use super::questions::PartialQuestion;
+use super::tracks::{RawRule, RawTrack};
+use crate::procedure::{Constant, Ladder, QuestPlus, Rule, Staircase, Track};
+use crate::protocol::{
+    Compared, FamilyRules, Method, Mushra, Pairs, Part, Presentations, QuestionKind, Task,
+    TrackRules, kinds,
+};
+use study_base::diagnostic::Fault;
+use study_base::diagnostic::table::Document;
+use study_base::rng::Stream;
+use study_base::text::{ModelId, PartId, QuestionId};
+use study_stats::psychometric::Spacing;
+
+/// The answers to a pair.
+const FIRST_OR_SECOND: [&str; 3] = ["first", "second", "tie"];
+
+fn one_of(options: &[&str]) -> QuestionKind {
+    QuestionKind::Choice(kinds::Choice {
+        options: options.iter().map(|o| (*o).to_owned()).collect(),
+        multiple: false,
+    })
+}
+
+/// Parts, families and tracks as they were read.
+#[derive(Debug)]
+pub(super) struct Raw {
+    pub(super) parts: Vec<RawPart>,
+    pub(super) families: Vec<PartialFamily>,
+    pub(super) tracks: Vec<RawTrack>,
+}
+
+/// The same without faults; each `None` if it has one.
+#[derive(Debug)]
+pub(super) struct Resolved {
+    pub(super) parts: Option<Vec<Part>>,
+    pub(super) families: Option<Vec<FamilyRules>>,
+    pub(super) tracks: Option<Vec<TrackRules>>,
+}
+
+impl Raw {
+    /// The files that families name.
+    pub(super) fn files(&self) -> Vec<Named> {
+        let of = |family: &PartialFamily| {
+            let named = family.files.iter().map(|(key, file)| Named {
+                place: format!("{}.{key}", family.path),
+                file: file.clone(),
+                orders: false,
+            });
+            named.collect::<Vec<_>>()
+        };
+        self.families.iter().flat_map(of).collect()
+    }
+
+    /// The questions with which trials of pairs and of discrimination begin.
+    pub(super) fn questions(&self) -> Vec<PartialQuestion> {
+        let question = |part: &RawPart| {
+            let id = part.id.as_ref()?.as_str();
+            match part.task.as_ref()? {
+                RawTask::Rating { .. } => None,
+                RawTask::Magnitude { prompt, .. } => {
+                    let positive = QuestionKind::Number(kinds::Number {
+                        unit: None,
+                        min: None,
+                        max: None,
+                        above: Some(0.0),
+                    });
+                    Some(PartialQuestion::made(&part.path, id, prompt, positive))
+                }
+                RawTask::Mushra { prompt, labels, .. } => {
+                    let scale = QuestionKind::Slider(kinds::Slider {
+                        from: 0.0,
+                        to: 100.0,
+                        step: 1.0,
+                        labels: labels.clone(),
+                    });
+                    Some(PartialQuestion::made(&part.path, id, prompt, scale))
+                }
+                RawTask::Pairs { prompt, tie, .. } => {
+                    let options = &FIRST_OR_SECOND[..if *tie { 3 } else { 2 }];
+                    Some(PartialQuestion::made(
+                        &part.path,
+                        id,
+                        prompt,
+                        one_of(options),
+                    ))
+                }
+                RawTask::Discrimination { prompt, tracks, .. } => {
+                    let first = self.track(tracks.first()?)?;
+                    let options = first.method?.answers();
+                    Some(PartialQuestion::made(
+                        &part.path,
+                        id,
+                        prompt,
+                        one_of(options),
+                    ))
+                }
+            }
+        };
+        self.parts.iter().filter_map(question).collect()
+    }
+
+    /// Parts without an answer of their own.
+    pub(super) fn rating_parts(&self) -> usize {
+        let rated = |part: &&RawPart| matches!(part.task, Some(RawTask::Rating { .. }));
+        self.parts.iter().filter(rated).count()
+    }
+
+    fn track(&self, id: &PartId) -> Option<&RawTrack> {
+        self.tracks.iter().find(|t| t.id.as_ref() == Some(id))
+    }
+
+    /// Looks up every id. Ids are not reported while the syntax of the file is `broken`.
+    pub(super) fn resolve(
+        &self,
+        sections: &Sections<'_>,
+        document: &Document<'_>,
+        broken: bool,
+    ) -> Resolved {
+        if broken {
+            return Resolved {
+                parts: None,
+                families: None,
+                tracks: None,
+            };
+        }
+        self.ids(sections, document);
+        self.unused(document);
+        let looked = Looked { sections, document };
+        let families: Option<Vec<FamilyRules>> =
+            self.families.iter().map(|f| f.family.clone()).collect();
+        let known = families.as_deref();
+        let tracks = self.tracks.iter().map(|t| looked.track(t, known)).collect();
+        let parts = self.parts.iter().map(|p| self.part(p, known, &looked));
+        let parts = parts.collect();
+        Resolved {
+            parts,
+            families,
+            tracks,
+        }
+    }
+
+    /// Reports ids that are there twice, and names of levels that models have.
+    fn ids(&self, sections: &Sections<'_>, document: &Document<'_>) {
+        let parts = self.parts.iter().map(|p| (p.id.clone(), p.path.as_str()));
+        let families = (self.families.iter())
+            .map(|f| (f.family.as_ref().map(|f| f.id.clone()), f.path.as_str()));
+        let tracks = self.tracks.iter().map(|t| (t.id.clone(), t.path.as_str()));
+        for list in [
+            parts.collect::<Vec<_>>(),
+            families.collect(),
+            tracks.collect(),
+        ] {
+            for (i, (id, path)) in list.iter().enumerate() {
+                let Some(id) = id else { continue };
+                let earlier = list[..i].iter().filter_map(|(id, _)| id.as_ref());
+                let mut twice = earlier.filter(|other| other.collides_with(id));
+                if let Some(other) = twice.next() {
+                    let fault = collision(id.as_str(), other.as_str());
+                    document.fault(fault.at(at(document, path, "id")));
+                }
+                for model in &sections.models {
+                    let name = model.id.as_ref().map_or("", ModelId::as_str);
+                    let level = name.strip_prefix(id.as_str());
+                    if level.is_some_and(|rest| rest.starts_with('.')) {
+                        let what = format!("`{name}` could be a level of `{id}`");
+                        let fault = Fault::error(what).label("choose another name");
+                        document.fault(fault.at(at(document, &model.path, "id")));
+                    }
+                }
+            }
+        }
+    }
+
+    /// Reports tracks and families that no part uses.
+    fn unused(&self, document: &Document<'_>) {
+        let named = |part: &RawPart| match &part.task {
+            Some(RawTask::Discrimination { tracks, .. }) => tracks.clone(),
+            _ => Vec::new(),
+        };
+        let used: Vec<PartId> = self.parts.iter().flat_map(named).collect();
+        for track in &self.tracks {
+            let Some(id) = &track.id else { continue };
+            if !used.contains(id) {
+                let what = format!("no part of kind \"discrimination\" has the track `{id}`");
+                document.fault(Fault::error(what).at(at(document, &track.path, "id")));
+            }
+        }
+        for family in &self.families {
+            let Some(id) = family.family.as_ref().map(|f| &f.id) else {
+                continue;
+            };
+            let of = |t: &RawTrack| matches!(&t.compared, Some(Compared::Levels { family, .. }) if family == id);
+            let estimated = |p: &RawPart| matches!(&p.task, Some(RawTask::Magnitude { family: Some((family, _)), .. }) if family == id);
+            if !self.tracks.iter().any(of) && !self.parts.iter().any(estimated) {
+                let fault = Fault::warning(format!("no track and no part has the family `{id}`"));
+                document.fault(fault.at(at(document, &family.path, "id")));
+            }
+        }
+    }
+
+    /// `families`: `None` if one of them has a fault of its own.
+    fn part(
+        &self,
+        raw: &RawPart,
+        families: Option<&[FamilyRules]>,
+        looked: &Looked<'_>,
+    ) -> Option<Part> {
+        let path = &raw.path;
+        let (id, exposure) = (raw.id.clone()?, raw.exposure?);
+        let exposure = exposure.unwrap_or(looked.sections.exposure);
+        let mut asks = Vec::new();
+        let (task, gap_s) = match raw.task.as_ref()? {
+            RawTask::Rating { presentations } => {
+                asks.extend(self.asked(raw, &looked.sections.questions));
+                if asks.is_empty() {
+                    let fault = Fault::error(format!("nothing to ask in the part `{id}`"));
+                    let hint = "add [[questions]] with an id, a prompt and a kind";
+                    looked.fault(path, "id", fault.hint(hint));
+                }
+                (
+                    Task::Rating(looked.presentations(presentations, path)?),
+                    0.0,
+                )
+            }
+            RawTask::Magnitude {
+                family,
+                presentations,
+                ..
+            } => {
+                asks.push(QuestionId::new(id.as_str()).ok()?);
+                let own = match family {
+                    None => looked.presentations(presentations, path)?,
+                    Some((family, levels)) => {
+                        let family = looked.family(family, families?, path)?;
+                        looked.practice(presentations, path);
+                        Presentations {
+                            models: looked.levels(family, levels.as_deref(), path)?,
+                            ..presentations.clone()
+                        }
+                    }
+                };
+                (Task::Magnitude(own), 0.0)
+            }
+            RawTask::Mushra {
+                reference,
+                presentations,
+                gap_s,
+                ..
+            } => {
+                asks.push(QuestionId::new(id.as_str()).ok()?);
+                if let Some(reference) = reference {
+                    looked.model(reference, &format!("{path}.reference"));
+                }
+                let presentations = looked.presentations(presentations, path)?;
+                looked.hidden_reference(&presentations, path);
+                let task = Mushra {
+                    reference: reference.clone(),
+                    presentations,
+                };
+                let gap_s = if reference.is_some() { *gap_s } else { 0.0 };
+                (Task::Mushra(task), gap_s)
+            }
+            RawTask::Pairs {
+                models,
+                pairs,
+                repetitions,
+                order,
+                tie,
+                interval_order,
+                gap_s,
+                ..
+            } => {
+                asks.push(QuestionId::new(id.as_str()).ok()?);
+                let task = Pairs {
+                    pairs: looked.pairs(models.as_deref(), pairs, path)?,
+                    order: order.clone(),
+                    repetitions: *repetitions,
+                    tie: *tie,
+                    interval_order: *interval_order,
+                };
+                (Task::Pairs(task), *gap_s)
+            }
+            RawTask::Discrimination { tracks, gap_s, .. } => {
+                asks.push(QuestionId::new(id.as_str()).ok()?);
+                self.tracks_of(tracks, path, looked)?;
+                let tracks = tracks.clone();
+                (Task::Discrimination { tracks }, *gap_s)
+            }
+        };
+        if !matches!(task, Task::Rating(_)) {
+            asks.extend(raw.questions.clone().unwrap_or_default());
+        }
+        for (i, question) in raw.questions.iter().flatten().enumerate() {
+            looked.question(question, &format!("{path}.questions[{i}]"));
+        }
+        Some(Part {
+            id,
+            task,
+            text: raw.text.clone(),
+            asks,
+            exposure,
+            gap_s,
+        })
+    }
+
+    /// The questions of a rating part: those that it names, or all that no other part
+    /// does.
+    fn asked(&self, raw: &RawPart, questions: &[PartialQuestion]) -> Vec<QuestionId> {
+        if let Some(named) = &raw.questions {
+            return named.clone();
+        }
+        let elsewhere = |id: &QuestionId| {
+            let mut named = self.parts.iter().flat_map(|p| p.questions.iter().flatten());
+            let of_part = |p: &RawPart| p.id.as_ref().is_some_and(|p| p.as_str() == id.as_str());
+            named.any(|n| n == id) || self.parts.iter().any(of_part)
+        };
+        let ids = questions.iter().filter_map(|q| q.id.clone());
+        ids.filter(|id| !elsewhere(id)).collect()
+    }
+
+    /// Checks the tracks of a part.
+    fn tracks_of(&self, tracks: &[PartId], path: &str, looked: &Looked<'_>) -> Option<()> {
+        let mut method: Option<Method> = None;
+        if tracks.is_empty() {
+            looked.fault(
+                path,
+                "tracks",
+                Fault::error(format!("`{path}.tracks` is empty")),
+            );
+        }
+        for (i, id) in tracks.iter().enumerate() {
+            let place = format!("{path}.tracks[{i}]");
+            let Some(track) = self.track(id) else {
+                let known = self.tracks.iter().filter_map(|t| t.id.as_ref());
+                let fault = unknown("track", id.as_str(), known.map(PartId::as_str));
+                looked.fault_at(&place, fault);
+                continue;
+            };
+            let holds = |p: &&RawPart| matches!(&p.task, Some(RawTask::Discrimination { tracks, .. }) if tracks.contains(id));
+            let again = tracks[..i].contains(id) || self.parts.iter().filter(holds).count() > 1;
+            if again {
+                let fault = Fault::error(format!("the track `{id}` is there twice"));
+                looked.fault_at(&place, fault);
+            }
+            if let (Some(first), Some(other)) = (method, track.method)
+                && first != other
+            {
+                let fault = Fault::error(format!(
+                    "the tracks of a part have one method, not {} and {}",
+                    first.as_str(),
+                    other.as_str()
+                ));
+                looked.fault_at(&place, fault.hint("make a part of each"));
+            }
+            method = method.or(track.method);
+        }
+        (!tracks.is_empty()).then_some(())
+    }
+}
+
+impl Looked<'_> {
+    /// `families`: `None` if one of them has a fault of its own.
+    fn track(&self, raw: &RawTrack, families: Option<&[FamilyRules]>) -> Option<TrackRules> {
+        let path = &raw.path;
+        let (id, method) = (raw.id.clone()?, raw.method?);
+        let compared = raw.compared.clone()?;
+        let ladder = match &compared {
+            Compared::Models { models } => {
+                self.models(models, &format!("{path}.models"));
+                Ladder::new(vec![1.0]).ok()?
+            }
+            Compared::Levels { family, .. } => self.family(family, families?, path)?.ladder.clone(),
+        };
+        let rule = self.rule(raw.rule.clone()?, method, &compared, &ladder);
+        if let Rule::Staircase(Staircase {
+            min_level: Some(standard),
+            start,
+            ..
+        }) = &rule
+            && start < standard
+        {
+            let what = format!("the staircase begins at {start}, below its standard {standard}");
+            let hint = "a staircase goes down to the standard: levels below it are not easier to tell from it";
+            self.fault(path, "standard", Fault::error(what).hint(hint));
+            return None;
+        }
+        if let Err(why) = Track::new(&rule, &ladder, &mut Stream::new(0, &["check"])) {
+            self.fault(path, "procedure", Fault::error(why.to_string()));
+            return None;
+        }
+        if raw.fit.scale == Some(Spacing::Log) && ladder.first() <= 0.0 {
+            let first = ladder.first();
+            let what = format!("`{path}.fit`: the level {first} has no logarithm");
+            let hint = "fit over scale = \"lin\", or begin the ladder above 0";
+            self.fault(path, "fit", Fault::error(what).hint(hint));
+            return None;
+        }
+        let catch = raw.catch.unwrap_or(match method {
+            Method::YesNo => 0.2,
+            Method::SameDifferent => 0.5,
+            _ => 0.0,
+        });
+        Some(TrackRules {
+            id,
+            method,
+            compared,
+            rule,
+            feedback: raw.feedback,
+            catch,
+            easy: raw.easy,
+            fit: raw.fit,
+        })
+    }
+
+    /// The rule with its defaults.
+    fn rule(&self, raw: RawRule, method: Method, compared: &Compared, ladder: &Ladder) -> Rule {
+        match raw {
+            RawRule::Staircase(rule) => {
+                let standard = match compared {
+                    Compared::Levels { standard, .. } => Some(*standard),
+                    Compared::Models { .. } => None,
+                };
+                // Below the standard a smaller level is easier, not harder.
+                let min_level = standard.filter(|s| *s > ladder.first());
+                Rule::Staircase(Staircase { min_level, ..rule })
+            }
+            RawRule::Constant {
+                levels,
+                repetitions,
+            } => Rule::Constant(Constant {
+                levels: levels.unwrap_or_else(|| ladder.levels().to_vec()),
+                repetitions,
+            }),
+            RawRule::QuestPlus {
+                rule,
+                threshold,
+                slope,
+                guess,
+                lapse,
+            } => {
+                if !rule.parameters.is_empty() {
+                    return Rule::QuestPlus(rule);
+                }
+                let grids = Grids {
+                    threshold,
+                    slope,
+                    guess,
+                    lapse,
+                };
+                let standard = match compared {
+                    Compared::Levels { standard, .. } => Some(*standard),
+                    Compared::Models { .. } => None,
+                };
+                let parameters = grids.parameters(&rule.function, method, ladder, standard);
+                Rule::QuestPlus(QuestPlus { parameters, ..rule })
+            }
+        }
+    }
+}

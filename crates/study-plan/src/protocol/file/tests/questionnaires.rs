@@ -1,0 +1,118 @@
+//! `[[questionnaires]]`.
+
+use crate::protocol::file::parse;
+use crate::protocol::{Answer, QuestionKind, kinds};
+
+const STUDY: &str = r#"
+format = "study-protocol/1"
+study = { id = "s", title = "t", seed = 1 }
+design = { participants = 4, repetitions = 1, order = "blocked" }
+device = { kind = "simulated", limits = { force_n = 12.0, velocity_mm_s = 1000.0 } }
+analysis = { primary = "realism" }
+models = [{ id = "a", file = "a.toml" }]
+questions = [{ id = "realism", kind = "rating", prompt = "?", from = 1, to = 7 }]
+outro = [{ id = "comment", kind = "text", prompt = "?" }]
+"#;
+
+fn with(questionnaires: &str) -> String {
+    format!("{STUDY}{questionnaires}")
+}
+
+const BOTH: &str = r#"
+[[questionnaires]]
+id = "sus"
+kind = "sus"
+system = "switch"
+
+[[questionnaires]]
+id = "load"
+kind = "nasa-tlx"
+labels = ["gering", "hoch"]
+"#;
+
+#[test]
+fn items_are_asked_after_the_outro() {
+    let parsed = parse("p", &with(BOTH));
+    let shown = parsed.findings.render(false);
+    let protocol = parsed.protocol.unwrap_or_else(|| panic!("{shown}"));
+    let ids: Vec<&str> = protocol.outro.iter().map(|q| q.id.as_str()).collect();
+    assert_eq!(ids.len(), 1 + 10 + 6);
+    assert_eq!(ids[..3], ["comment", "sus_1", "sus_2"]);
+    assert_eq!(ids[10..12], ["sus_10", "load_mental"]);
+    let prompt = &protocol.outro[3].prompt;
+    assert_eq!(prompt, "I thought the switch was easy to use.");
+    assert!(protocol.outro[1].required);
+    assert!(protocol.outro[1].accepts(&Answer::Rating(5)).is_ok());
+    assert!(protocol.outro[1].accepts(&Answer::Rating(6)).is_err());
+    let QuestionKind::Slider(kinds::Slider {
+        from, to, labels, ..
+    }) = &protocol.outro[11].kind
+    else {
+        panic!()
+    };
+    assert_eq!((*from, *to), (0.0, 100.0));
+    assert_eq!(
+        (labels["0"].as_str(), labels["100"].as_str()),
+        ("gering", "hoch")
+    );
+}
+
+#[test]
+fn wrong_questionnaires_are_refused() {
+    let sus = "[[questionnaires]]\nid = \"sus\"\nkind = \"sus\"\n";
+    let intake = "[[intake]]\nid = \"sus_3\"\nkind = \"text\"\nprompt = \"?\"\n";
+    for (text, expected) in [
+        (format!("{sus}{sus}"), "`sus` is there twice"),
+        (
+            format!("{sus}items = [\"a\", \"b\"]\n"),
+            "`questionnaires[0].items` has 2 texts, not 10",
+        ),
+        (
+            format!("{sus}labels = [\"a\", \"b\", \"c\"]\n"),
+            "`questionnaires[0].labels` has 3 texts, not 2",
+        ),
+        (
+            sus.replace("\"sus\"\nkind", "\"a b\"\nkind"),
+            "is not a part id",
+        ),
+        (sus.replace("kind = \"sus\"", "kind = \"umux\""), "umux"),
+        (
+            sus.replace("kind = \"sus\"", "kind = \"nasa-tlx\"\nsystem = \"x\""),
+            "system",
+        ),
+        (format!("{sus}{intake}"), "`sus_3` is there twice"),
+    ] {
+        let parsed = parse("p", &with(&text));
+        assert!(parsed.protocol.is_none(), "{text}");
+        let shown = parsed.findings.render(false);
+        assert!(shown.contains(expected), "{text}\n{shown}");
+    }
+}
+
+#[test]
+fn a_questionnaire_in_another_language_than_the_study_is_a_warning() {
+    let warned = |text: &str| -> Vec<String> {
+        let parsed = parse("p", text);
+        let protocol = parsed.protocol.unwrap();
+        let faults = crate::protocol::check::warnings(&protocol, &parsed.spans, &[]);
+        let messages = faults.into_iter().map(|f| f.message);
+        messages.filter(|m| m.contains("questionnaire")).collect()
+    };
+    let german = with(BOTH).replace(
+        "[[questionnaires]]\nid = \"sus\"",
+        "[text]\nlang = \"de\"\n[[questionnaires]]\nid = \"sus\"",
+    );
+    let expected = ["sus", "load"]
+        .map(|id| format!("the questionnaire `{id}` is in English, and the study in `de`"));
+    assert_eq!(warned(&german), expected);
+    assert!(warned(&german.replace("\"de\"", "\"en-GB\"")).is_empty());
+    let items: Vec<String> = (1..=10).map(|i| format!("\"Satz {i}\"")).collect();
+    let items = format!(
+        "id = \"sus\"\nlabels = [\"a\", \"b\"]\nitems = [{}]",
+        items.join(", ")
+    );
+    assert_eq!(
+        warned(&german.replace("id = \"sus\"", &items)),
+        expected[1..]
+    );
+}

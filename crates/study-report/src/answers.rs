@@ -1,0 +1,211 @@
+//! Answers to the study's questions, for the terminal page and the report: the findings
+//! of the analysis, in sentences.
+
+mod conditional;
+mod pairs;
+mod sites;
+mod target;
+mod vaf;
+
+pub(super) use conditional::conditional;
+
+use super::{apa, sentences};
+use study_analysis::analyze::{Analysis, Finding, Question};
+use study_base::text::sentence;
+
+/// The answer to a question. Names in it are untrusted.
+pub(super) struct Answer {
+    pub(super) question: String,
+    /// The verdict, in one sentence.
+    pub(super) short: String,
+    /// Results on the terminal page and in the report.
+    pub(super) main: Vec<String>,
+    /// Results in the report only.
+    pub(super) more: Vec<String>,
+}
+
+impl Answer {
+    fn new(question: &str, short: String) -> Self {
+        Self {
+            question: question.to_owned(),
+            short,
+            main: Vec::new(),
+            more: Vec::new(),
+        }
+    }
+
+    /// The answer of a finding: its sentence where it is decided, else its reason; then
+    /// its caveats.
+    fn of(question: &str, f: &Finding, decided: impl FnOnce(&str) -> String) -> Self {
+        let verdict = sentences::verdict(&f.verdict);
+        let short = sentences::undefined(f).unwrap_or_else(|| decided(verdict));
+        let mut answer = Self::new(question, short);
+        answer.main = f.caveats.iter().map(sentences::caveat).collect();
+        answer
+    }
+}
+
+/// All questions that the data allow an answer to.
+pub(super) fn answers(a: &Analysis) -> Vec<Answer> {
+    let all = [
+        target::target(a),
+        vaf::predicts(a),
+        vaf::delivered(a),
+        vaf::covariates(a),
+        pairs::best_two(a),
+        differ(a),
+        pairs::which(a),
+        disagreement(a),
+        variance(a),
+        order(a),
+        carry_over(a),
+    ];
+    let mut answers: Vec<Answer> = all.into_iter().flatten().collect();
+    answers.extend(target::repeats(a));
+    answers.extend(sites::sites(a));
+    answers
+}
+
+/// Whether the realizations differ.
+fn differ(a: &Analysis) -> Option<Answer> {
+    let f = a.finding(&Question::Differ)?;
+    let mut answer = Answer::of("Do the realizations differ?", f, |verdict| {
+        let test = f.test.as_ref();
+        let effect = test.map_or_else(String::new, |t| sentences::anova_effect(a, t));
+        let name = test.map_or("", |t| sentences::test_name(t.kind));
+        let result = sentences::result(f).unwrap_or_default();
+        format!(
+            "{verdict}, {result}{effect} ({name}, {}).",
+            sentences::participants(f.participants)
+        )
+    });
+    let friedman = sentences::friedman(a).map(|s| format!("{s}."));
+    answer.main.extend(friedman);
+    answer.more.extend(residuals(a));
+    Some(answer)
+}
+
+/// The shape of what the analysis of variance leaves unexplained.
+fn residuals(a: &Analysis) -> Option<String> {
+    let get = |id: &str| a.values.number(&format!("residuals/{id}"));
+    let (skewness, kurtosis) = (get("skewness")?, get("excess_kurtosis")?);
+    Some(format!(
+        "Residuals of the cell means: skewness {}, excess kurtosis {} (0 if normally distributed); the \
+         largest is {} standard deviations.",
+        apa::two(skewness),
+        apa::two(kurtosis),
+        apa::two(get("largest")?)
+    ))
+}
+
+/// Whether participants differ in how they rate the realizations.
+fn disagreement(a: &Analysis) -> Option<Answer> {
+    let f = a.finding(&Question::Disagreement)?;
+    let question = "Do participants disagree about the realizations?";
+    let mut answer = Answer::of(question, f, |verdict| {
+        let test = f.test.as_ref();
+        let name = test.map_or("", |t| sentences::test_name(t.kind));
+        let result = sentences::result(f).unwrap_or_default();
+        format!("{verdict}, {result} ({name}).")
+    });
+    if let Some(share) = f.effect {
+        answer.main.push(format!(
+            "Participants × realizations are {} of the variance.",
+            apa::percent(share.value)
+        ));
+    }
+    let get = |id: &str| a.values.number(&format!("slope_variance/{id}"));
+    if let (Some(sd), Some(slope), Some(chi2), Some(p)) =
+        (get("sd"), get("slope"), get("chi2"), get("p"))
+    {
+        answer.more.push(format!(
+            "The slopes of the participants on VAF have the mean {} and the standard deviation {} per .01 \
+             of VAF (mixed model with random slopes and realizations; of the variance, χ² = {}, p {}).",
+            apa::two(slope / 100.0),
+            apa::two(sd / 100.0),
+            apa::two(chi2),
+            apa::p(p)
+        ));
+    }
+    Some(answer)
+}
+
+/// The variance components.
+fn variance(a: &Analysis) -> Option<Answer> {
+    let shares = variance_shares(a);
+    let all: Vec<String> = (shares.iter())
+        .map(|(name, share)| format!("{name} {}", apa::percent(*share)))
+        .collect();
+    let mut answer = Answer::new("Variance components", sentence(&all.join(", ")));
+    answer.more.push(
+        "The share of the realizations is the least precise: it rests on as many values as there \
+         are realizations."
+            .to_owned(),
+    );
+    (!shares.is_empty()).then_some(answer)
+}
+
+/// Name and share of each variance component: by expected mean squares, else of the
+/// mixed model with crossed random effects.
+pub(super) fn variance_shares(a: &Analysis) -> Vec<(&'static str, f64)> {
+    let get = |id: &str| a.values.number(&format!("variance/share/{id}"));
+    let complete = a.design.uses_complete();
+    if let (Some(model), Some(subject), true) = (get("model"), get("subject"), complete) {
+        let mut shares = vec![("realizations", model), ("participants", subject)];
+        match get("interaction").zip(get("noise")) {
+            Some((interaction, noise)) => {
+                shares.push(("participants × realizations", interaction));
+                shares.push(("within cells", noise));
+            }
+            None => shares.extend(
+                get("interaction_and_noise").map(|x| ("participants × realizations and noise", x)),
+            ),
+        }
+        return shares;
+    }
+    let get = |id: &str| a.values.number(&format!("lmm_variance/share_{id}"));
+    let all = [
+        ("realizations", get("model")),
+        ("participants", get("subject")),
+        ("participants × realizations", get("subject_model")),
+        ("within cells", get("error")),
+    ];
+    all.into_iter()
+        .filter_map(|(name, x)| Some((name, x?)))
+        .collect()
+}
+
+/// Whether ratings drift over the session.
+fn order(a: &Analysis) -> Option<Answer> {
+    let f = a.finding(&Question::Order)?;
+    let get = |id: &str| a.values.number(id);
+    let decimals = apa::decimals(get("order_trial/se").unwrap_or(0.0), 3);
+    let slope = f
+        .estimate
+        .map_or_else(String::new, |e| apa::number(e.value, decimals));
+    let mut answer = Answer::of("Do order and learning matter?", f, |verdict| {
+        let result = sentences::result(f).unwrap_or_default();
+        format!("{verdict}: the change is {slope} points per trial, {result} (t test).")
+    });
+    (answer.more)
+        .push("The change per trial is adjusted for participants and realizations.".to_owned());
+    Some(answer)
+}
+
+/// Whether a rating depends on the one before it.
+fn carry_over(a: &Analysis) -> Option<Answer> {
+    let f = a.finding(&Question::CarryOver)?;
+    let mut answer = Answer::of("Does a rating depend on the one before it?", f, |verdict| {
+        let size = f
+            .estimate
+            .map_or_else(String::new, |e| sentences::estimate(&e, apa::two));
+        let result = sentences::result(f).unwrap_or_default();
+        format!("{verdict}: {size} points per point of the preceding rating, {result} (t test).")
+    });
+    answer.more.push(
+        "Neighboring ratings are compared with all orders of the trials of a block, over \
+         participants."
+            .to_owned(),
+    );
+    Some(answer)
+}

@@ -1,0 +1,204 @@
+//! Whether the realizations feel like the target: the best mean, its share of realistic
+//! ratings, references and hidden duplicates.
+
+use super::Answer;
+use crate::{apa, sentences};
+use study_analysis::analyze::{
+    Analysis, Better, Finding, PreregisteredRule, Question, Verdict, group_id,
+};
+use study_base::text::capital;
+use study_session::outcome::Role;
+
+/// Realizations whose shares are listed.
+const MAX_SHARES: usize = 12;
+
+/// The best-rated realization, and how it compares with the target.
+pub(super) fn target(a: &Analysis) -> Option<Answer> {
+    let ranked = a.ranked();
+    let (mean, best) = *ranked.first()?;
+    let equals = ranked.iter().filter(|r| (r.0 - mean).abs() < 1e-10).count();
+    let what = sentences::mean(a);
+    let most = a.better.most();
+    let subject = match (ranked.len(), equals) {
+        (1, _) => format!("The only realization is {best}"),
+        (_, 1) => format!("The best-rated realization is {best}"),
+        _ => format!(
+            "{} realizations share the {most} {what}; one of them is {best}",
+            capital(&apa::count(equals))
+        ),
+    };
+    let scale = a.scale.map_or_else(String::new, |(from, to)| {
+        format!(" on a scale from {from} to {to}")
+    });
+    let id = group_id("adjusted", &[best]);
+    let ci = if a.design.is_complete() {
+        format!("{}/subject_mean/ci95", group_id("desc", &[best]))
+    } else {
+        format!("{id}/ci95")
+    };
+    let ci = sentences::ci(a, &ci, apa::two);
+    let realistic = realistic(a, best).map_or_else(String::new, |r| format!("; {r}"));
+    let question = if sentences::is_about_realism(a) {
+        "Do the realizations feel like the target?".to_owned()
+    } else {
+        match &a.construct {
+            Some(construct) => format!("Which realization is rated {most} in {construct}?"),
+            None => format!("Which realization is rated {most}?"),
+        }
+    };
+    let lower = match a.better {
+        Better::Higher => "",
+        Better::Lower => ", of which lower ratings are better",
+    };
+    let short = format!(
+        "{subject}, {what} {}{ci}{scale}{lower}{realistic}.",
+        apa::two(mean)
+    );
+    let mut answer = Answer::new(&question, short);
+    answer.main = against_references(a);
+    answer.more.extend(shares(a, &ranked));
+    for (role, name) in [
+        (Role::HiddenReference, "hidden reference"),
+        (Role::Physical, "physical device"),
+        (Role::LowAnchor, "low anchor"),
+        (Role::MidAnchor, "mid anchor"),
+    ] {
+        for m in a.realizations.iter().filter(|m| m.role == role) {
+            if let Some(mean) = a.described(&m.id, "mean") {
+                let mean = apa::two(mean);
+                (answer.more).push(format!("Mean rating of the {name} {}: {mean}.", m.id));
+            }
+        }
+    }
+    Some(answer)
+}
+
+/// The share of realistic ratings of a realization with its interval: `60 %, 95 % CI [41 %,
+/// 77 %]`.
+pub(super) fn share(a: &Analysis, name: &str) -> Option<String> {
+    let share = apa::percent(a.about("realistic", &[name], "share")?);
+    let id = format!("{}/ci95", group_id("realistic", &[name]));
+    Some(format!("{share}{}", sentences::ci(a, &id, apa::percent)))
+}
+
+fn realistic(a: &Analysis, best: &str) -> Option<String> {
+    let changed = a.changed(PreregisteredRule::RealisticFrom);
+    match a.realistic_from.zip(a.about("realistic", &[best], "share")) {
+        Some((from, part)) => {
+            let later = if changed {
+                ", a threshold changed after the study began"
+            } else {
+                ""
+            };
+            let id = format!("{}/ci95", group_id("realistic", &[best]));
+            let ci = sentences::ci(a, &id, apa::percent);
+            let part = apa::percent(part);
+            Some(format!(
+                "{part} of its ratings are {from} or higher{later}{ci}"
+            ))
+        }
+        None if changed => Some(
+            "the threshold for “realistic” was changed after the study began: see Deviations"
+                .to_owned(),
+        ),
+        None if sentences::is_about_realism(a) => {
+            Some("no threshold for “realistic” was preregistered".to_owned())
+        }
+        None => None,
+    }
+}
+
+fn shares(a: &Analysis, ranked: &[(f64, &str)]) -> Option<String> {
+    let from = a.realistic_from?;
+    let all = ranked.iter().take(MAX_SHARES);
+    let all: Vec<String> = all
+        .filter_map(|(_, id)| Some(format!("{id} {}", share(a, id)?)))
+        .collect();
+    (all.len() > 1).then(|| format!("Share of ratings of {from} or higher: {}.", all.join("; ")))
+}
+
+/// The best realization against each reference and anchor.
+fn against_references(a: &Analysis) -> Vec<String> {
+    let mut found = Vec::new();
+    for f in &a.findings {
+        let Question::Reference(reference) = &f.question else {
+            continue;
+        };
+        let role = a
+            .realizations
+            .iter()
+            .find(|m| m.id == *reference)
+            .map(|m| m.role);
+        let (Some(best), Some(role)) = (f.names.first(), role) else {
+            continue;
+        };
+        let equivalence = match role {
+            Role::LowAnchor | Role::MidAnchor => None,
+            _ => equivalence(a, best, reference),
+        };
+        let equivalence = equivalence.map_or_else(String::new, |e| format!(" {e}"));
+        let differ = match f.verdict {
+            Verdict::Yes => "they differ, ",
+            Verdict::NotShown | Verdict::Undefined(_) => "a difference is not shown, ",
+        };
+        let difference = difference(f, (best, reference), differ);
+        found.push(format!("{difference}{equivalence}"));
+    }
+    found
+}
+
+/// The difference of two realizations, with `verdict` before its test.
+fn difference(f: &Finding, (first, second): (&str, &str), verdict: &str) -> String {
+    let size = f
+        .estimate
+        .map_or_else(String::new, |e| sentences::estimate(&e, apa::two));
+    let result = match (&f.test, f.reason()) {
+        (Some(test), _) => format!(
+            "{verdict}{} ({})",
+            sentences::tested(test, f.participants),
+            sentences::corrected(test)
+        ),
+        (None, why) => format!("not tested: {}", why.unwrap_or_default()),
+    };
+    format!("{first} minus {second} over participants: {size}; {result}.")
+}
+
+fn equivalence(a: &Analysis, best: &str, reference: &str) -> Option<String> {
+    let id = group_id("reference", &[reference, best]);
+    let f = a.finding(&Question::Equivalence(reference.to_owned()));
+    let Some((f, test)) = f.and_then(|f| Some((f, f.test.as_ref()?))) else {
+        return sentences::no_equivalence(a, &id);
+    };
+    let margin = a.values.number(&format!("{id}/margin"))?;
+    let later = match a.changed(PreregisteredRule::Margin) {
+        true => " (changed after the study began)",
+        false => "",
+    };
+    let not = if f.is_yes() { "" } else { "not shown to be " };
+    Some(format!(
+        "Within the margin of ± {margin}{later} they are {not}equivalent ({}, {}).",
+        sentences::test_name(test.kind),
+        sentences::p(test)
+    ))
+}
+
+/// Whether hidden duplicates are rated like their originals.
+pub(super) fn repeats(a: &Analysis) -> Option<Answer> {
+    let all: Vec<&Finding> = (a.findings.iter())
+        .filter(|f| matches!(f.question, Question::Repeat(_)))
+        .collect();
+    let (first, others) = all.split_first()?;
+    let sentence = |f: &Finding| {
+        let difference = match &f.names[..] {
+            [duplicate, original] => difference(f, (duplicate, original), ""),
+            _ => String::new(),
+        };
+        format!("{}: {difference}", sentences::verdict(&f.verdict))
+    };
+    let mut answer = Answer::new(
+        "Are hidden duplicates rated differently from their originals?",
+        sentence(first),
+    );
+    answer.main.extend(others.iter().map(|f| sentence(f)));
+    Some(answer)
+}

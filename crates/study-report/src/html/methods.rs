@@ -1,0 +1,399 @@
+//! The methods paragraph: conduct of the sessions, exclusions, and the tests that were
+//! done.
+
+use super::Details;
+use crate::{apa, sentences};
+use study_analysis::analyze::{Analysis, Better, PreregisteredRule, Question, TestKind, Value};
+use study_base::text::{capital, counted};
+use study_stats::permutation::DRAWS;
+
+/// The paragraph.
+pub(super) fn paragraph(d: &Details, a: &Analysis) -> String {
+    let mut text = design(d, a);
+    if a.better == Better::Lower {
+        text.push("Lower ratings are better.".to_owned());
+    }
+    text.extend(exclusions(a));
+    text.extend(tests(a));
+    text.extend(complete_only(a));
+    let any = |what: &str| a.tested().any(|m| a.described(&m.id, what).is_some());
+    if any("sd") {
+        let sd = "Standard deviations are over all ratings of a realization (n − 1)";
+        let intervals = if any("subject_mean/ci95_lo") {
+            "; confidence intervals of means are t intervals over participants"
+        } else {
+            ""
+        };
+        text.push(format!("{sd}{intervals}."));
+    }
+    text.push(format!(
+        "The level of significance is {}, two-sided. The analysis was done with study {}.",
+        sentences::level(a.alpha),
+        env!("CARGO_PKG_VERSION")
+    ));
+    text.join(" ")
+}
+
+/// The analyses restricted to participants who rated everything, unless all did.
+fn complete_only(a: &Analysis) -> Option<String> {
+    let (all, complete) = (a.design.participants, a.design.complete);
+    let defined = |id: &str| a.values.number(id).is_some();
+    let compared = a.design.uses_complete();
+    let done: Vec<String> = [
+        (defined("rmanova/F") && compared, "the analysis of variance"),
+        (defined("friedman/chi2"), "Friedman's test"),
+        (!a.pairs.is_empty() && compared, "the comparison of pairs"),
+        (
+            defined("variance/share/model") && compared,
+            "the variance components",
+        ),
+    ]
+    .into_iter()
+    .filter(|(done, _)| *done)
+    .map(|(_, what)| what.to_owned())
+    .collect();
+    (complete < all && !done.is_empty()).then(|| {
+        format!(
+            "Of the {all} participants, {complete} rated every realization; only they are included in \
+             {}.",
+            apa::listing(&done)
+        )
+    })
+}
+
+/// Participants, realizations, order, device and question.
+fn design(d: &Details, a: &Analysis) -> Vec<String> {
+    let mut text = vec![ratings(d, a)];
+    text.extend(sample(d));
+    let others: Vec<String> = (a.realizations.iter())
+        .filter(|m| !m.tested)
+        .map(|m| match &m.duplicate_of {
+            Some(of) => format!("{} (a hidden duplicate of {of})", m.id),
+            None => format!("{} ({})", m.id, m.role.as_str().replace('-', " ")),
+        })
+        .collect();
+    if !others.is_empty() {
+        text.push(format!(
+            "Also rated, but not included in the tests: {}.",
+            apa::listing(&others)
+        ));
+    }
+    if let Some(order) = &d.order {
+        text.push(format!(
+            "The order of trials was {order}, fixed before each session."
+        ));
+    }
+    text.extend(d.conduct.iter().cloned());
+    if let Some(reference) = &d.reference {
+        text.push(format!(
+            "Before each trial the screen showed: “{reference}”"
+        ));
+    }
+    if let Some(prompt) = &d.prompt {
+        let scale = a.scale.map_or_else(String::new, |(from, to)| {
+            let label = |at: f64| {
+                let label = d.labels.iter().find(|l| l.0 == at);
+                label.map_or_else(String::new, |l| format!(" (“{}”)", l.1))
+            };
+            format!(
+                " on a scale from {from}{} to {to}{}",
+                label(from),
+                label(to)
+            )
+        });
+        text.push(format!(
+            "After each trial participants answered the question “{prompt}”{scale}."
+        ));
+    }
+    if let Some(from) = a.realistic_from {
+        text.push(if a.changed(PreregisteredRule::RealisticFrom) {
+            format!(
+                "A rating of {from} or higher counts as realistic; this threshold was changed after \
+                 the study began (see Deviations)."
+            )
+        } else {
+            format!("A rating of {from} or higher was preregistered to count as realistic.")
+        });
+    }
+    if d.states.iter().any(|(state, _)| state != "done") {
+        let all: Vec<String> = (d.states.iter())
+            .map(|(state, n)| format!("{n} {state}"))
+            .collect();
+        text.push(format!("States of all sessions: {}.", apa::listing(&all)));
+    }
+    text
+}
+
+/// How many participants rated how many realizations how often.
+/// The sample and the ethics approval, with placeholders for what the study does not say.
+fn sample(d: &Details) -> Vec<String> {
+    let mut text = d.sample.clone();
+    text.push(
+        match d.sample.is_empty() {
+            true => "[Participants: age, gender, handedness, recruitment, compensation.]",
+            false => "[Participants: recruitment, compensation.]",
+        }
+        .to_owned(),
+    );
+    text.push(match &d.ethics {
+        Some(approval) => format!("Ethics: {approval}."),
+        None => "[Ethics approval and consent.]".to_owned(),
+    });
+    text
+}
+
+fn ratings(d: &Details, a: &Analysis) -> String {
+    let c = &a.counts;
+    let all = |one, many| counted(c.with_ratings, one, many);
+    let pilots = counted(c.pilots, "pilot", "pilots");
+    let (participants, others) = match (c.pilots, c.simulated) {
+        (_, s) if s > 0 && s == c.participants => (
+            all(
+                "simulated participant (no person)",
+                "simulated participants (no people)",
+            ),
+            String::new(),
+        ),
+        (p, _) if p > 0 && p == c.participants => (
+            all("pilot participant", "pilot participants"),
+            String::new(),
+        ),
+        (0, 0) => (all("participant", "participants"), String::new()),
+        (_, 0) => (all("participant", "participants"), format!(" ({pilots})")),
+        (0, s) => (
+            all("participant", "participants"),
+            format!(" ({s} simulated)"),
+        ),
+        (_, s) => (
+            all("participant", "participants"),
+            format!(" ({pilots} and {s} simulated)"),
+        ),
+    };
+    let times = d.repetitions.map_or_else(String::new, |n| match n {
+        1 => " once each".to_owned(),
+        2 => " twice each".to_owned(),
+        n => format!(" {n} times each"),
+    });
+    let tested = a.tested().count();
+    let has_ratings = |id: &str| a.described(id, "n").is_some_and(|n| n > 0.0);
+    let rated = a.tested().filter(|m| has_ratings(&m.id)).count();
+    let without = match c.participants - c.with_ratings {
+        0 => String::new(),
+        n => format!(" {n} more took part but gave no rating."),
+    };
+    let realizations = counted(tested, "realization", "realizations");
+    if c.rated == 0 {
+        "No rating is included: there is nothing to analyze.".to_owned()
+    } else if tested == 0 {
+        let ratings = counted(c.rated, "rating", "ratings");
+        format!("{participants}{others} gave {ratings}.{without}")
+    } else if rated < tested {
+        format!(
+            "{participants}{others} rated {rated} of {realizations}{times}; nobody rated the others.{without}"
+        )
+    } else {
+        format!("{participants}{others} rated {realizations}{times}.{without}")
+    }
+}
+
+/// The exclusion rules and their effects.
+fn exclusions(a: &Analysis) -> Vec<String> {
+    let c = &a.counts;
+    let mut text = Vec::new();
+    if !a.exclusions.is_empty() {
+        let rules: Vec<String> = (a.exclusions.iter())
+            .map(|e| {
+                let rows = counted(e.rows, "row", "rows");
+                let participants = counted(e.participants, "participant", "participants");
+                format!("{} ({rows} of {participants})", e.rule.words())
+            })
+            .collect();
+        let rules = apa::listing(&rules);
+        text.push(if a.changed(PreregisteredRule::Exclusions) {
+            format!(
+                "The exclusion rules were changed after the study began (see Deviations); they now \
+                 exclude {rules}."
+            )
+        } else {
+            format!("The preregistered rules exclude {rules}.")
+        });
+    }
+    let by_rules: usize = a.exclusions.iter().map(|e| e.rows).sum();
+    let rows: usize = c.excluded.values().sum();
+    if rows > by_rules {
+        text.push(format!(
+            "In total, {} of {} excluded; “Included and excluded data” lists the reasons.",
+            counted(rows, "row", "rows"),
+            counted(
+                c.excluded_participants,
+                "participant is",
+                "participants are"
+            )
+        ));
+    }
+    if c.without_rating > 0 {
+        text.push(format!(
+            "{} no rating.",
+            counted(
+                c.without_rating,
+                "included trial has",
+                "included trials have"
+            )
+        ));
+    }
+    text
+}
+
+/// How differences between realizations were tested.
+fn differences(a: &Analysis) -> Option<String> {
+    let test = a.finding(&Question::Differ)?.test.as_ref()?;
+    let correction = |name: &str| format!(" with the {name} correction");
+    let anova = "a repeated-measures analysis of variance on the cell means";
+    let friedman = "Friedman's test with mid-ranks";
+    let by = match test.kind {
+        TestKind::Anova => anova.to_owned(),
+        TestKind::AnovaGreenhouseGeisser => anova.to_owned() + &correction("Greenhouse–Geisser"),
+        TestKind::AnovaHuynhFeldt => {
+            anova.to_owned()
+                + &correction("Huynh–Feldt")
+                + ", because there are not more participants than realizations"
+        }
+        TestKind::MixedModel => format!(
+            "a linear mixed model of all cell means with random intercepts of participants and \
+             Satterthwaite's degrees of freedom, because only {} of {} rated every realization",
+            a.design.complete,
+            counted(a.design.participants, "participant", "participants")
+        ),
+        _ => friedman.to_owned(),
+    };
+    let besides = match test.kind {
+        TestKind::Friedman | TestKind::FriedmanExact => String::new(),
+        _ if a.values.number("friedman/chi2").is_some() => format!("; {friedman} is given besides"),
+        _ => String::new(),
+    };
+    Some(format!(
+        "Differences between realizations were tested by {by}{besides}."
+    ))
+}
+
+/// How disagreement was tested.
+fn disagreement(a: &Analysis) -> Option<String> {
+    let test = a.finding(&Question::Disagreement)?.test.as_ref()?;
+    let by = match test.kind {
+        TestKind::Interaction => {
+            "the interaction of participants and realizations against the variance within cells"
+        }
+        _ => "the differences between their slopes on VAF against the rest of the interaction",
+    };
+    Some(format!(
+        "Whether participants disagree about the realizations was tested by F of {by}."
+    ))
+}
+
+/// The tests whose results are defined.
+fn tests(a: &Analysis) -> Vec<String> {
+    let v = &a.values;
+    let defined = |id: &str| v.number(id).is_some();
+    let any = |start: &str, end: &str| {
+        v.iter().any(|(id, value)| {
+            id.starts_with(start) && id.ends_with(end) && matches!(value, Value::Number(_))
+        })
+    };
+    let finding = |question: &Question| a.finding(question);
+    let mut text = Vec::new();
+    if let Some(test) = finding(&Question::Vaf).and_then(|f| f.test.as_ref()) {
+        let p = match test.kind {
+            TestKind::PermutationExact => "all permutations".to_owned(),
+            _ => format!("{DRAWS} random permutations"),
+        };
+        let means = if a.design.is_complete() {
+            "means of the realizations (averages of the participants' cell means)"
+        } else {
+            "adjusted means of the realizations (marginal means of a linear mixed model of the \
+             cell means)"
+        };
+        text.push(format!(
+            "Whether the variance accounted for (VAF) predicts the rating was tested by Pearson's \
+             correlation over the {means}; p is from {p} of the realizations."
+        ));
+    }
+    text.extend(differences(a));
+    let wilcoxon = any("posthoc/", "/p_wilcoxon_exact");
+    let test = finding(&Question::Pairs).and_then(|f| f.test.as_ref());
+    let test = test.or_else(|| finding(&Question::Best)?.test.as_ref());
+    if let Some(test) = test {
+        let how = match test.kind {
+            TestKind::MixedContrast => "contrasts of the same model by Kenward and Roger's method",
+            _ => "paired t tests",
+        };
+        let wilcoxon = if wilcoxon {
+            "; p of Wilcoxon's signed-rank test (exact, conditional on ties) is given besides"
+        } else {
+            ""
+        };
+        text.push(match test.comparisons {
+            0 | 1 => format!("The pair was compared by {how}{wilcoxon}."),
+            n => format!(
+                "Pairs were compared by {how} with Holm's correction over all {n} pairs{wilcoxon}. \
+                 The two {} means were also compared by themselves, two-sided and without a \
+                 correction, which keeps the level for the claim that one is the best (Gutmann & \
+                 Maymin, 1987; Hung & Fithian, 2019).",
+                a.better.most()
+            ),
+        });
+    }
+    text.extend(disagreement(a));
+    if defined("lmm_vaf_crossed/slope") {
+        let effects = if defined("lmm_vaf_crossed/var_subject_model") {
+            ", realizations and their combinations"
+        } else {
+            " and realizations"
+        };
+        text.push(format!(
+            "A linear mixed model of the ratings on VAF with random intercepts of participants{effects} \
+             was fitted by restricted maximum likelihood, with Satterthwaite's degrees of freedom."
+        ));
+    }
+    let between = defined("icc_subjects/ICC2")
+        .then(|| "Agreement between participants is ICC(2,1) over cell means".to_owned());
+    let within = defined("icc_repetitions/ICC1")
+        .then(|| "consistency over repetitions is ICC(1,1)".to_owned());
+    let iccs: Vec<String> = [between, within].into_iter().flatten().collect();
+    if !iccs.is_empty() {
+        text.push(format!(
+            "{} (Shrout and Fleiss), with F intervals.",
+            capital(&iccs.join(", "))
+        ));
+    }
+    if !a.sites.is_empty() {
+        text.push(format!(
+            "Participants of {} (site as a factor between participants) were analyzed together. Whether \
+             the differences between realizations depend on the site was tested by the interaction in \
+             an analysis of variance between and within participants with the Greenhouse–Geisser \
+             correction; means and slopes on VAF of the participants were compared by analyses of \
+             variance between sites.",
+            apa::listing(&a.sites)
+        ));
+    }
+    if any("reference/", "/p_tost") {
+        let margin = if a.changed(PreregisteredRule::Margin) {
+            "a margin that was changed after the study began (see Deviations)"
+        } else {
+            "the preregistered margin"
+        };
+        text.push(format!(
+            "Equivalence with the reference was tested by two one-sided t tests with {margin}."
+        ));
+    }
+    if let (Some(margin), true) = (
+        a.values.number("equivalence/r/margin"),
+        defined("equivalence/r/p"),
+    ) {
+        text.push(format!(
+            "Whether the correlation with VAF lies within ± {} was tested by two one-sided tests of Fisher's \
+             z (Goertzen & Cribbie, 2010).",
+            apa::share(margin, 2)
+        ));
+    }
+    text
+}

@@ -1,0 +1,297 @@
+//! The preregistration as a document.
+
+use super::html::declared_test;
+use super::{apa, part_answers, sentences};
+use serde_json::json;
+use study_analysis::analyze::Analysis;
+use study_analysis::analyze::psychophysics::PartAnalysis;
+use study_analysis::preregister::Preregistration;
+use study_base::text::{Untrusted, capital, counted};
+use study_plan::protocol::parts::{IntervalOrder, Part, Presentations, Task};
+use study_plan::protocol::{
+    Assign, Order, Protocol, Question, Role, Scale, SessionPlan, Unfinished,
+};
+
+/// What the document says besides its facts.
+#[derive(Debug, Clone)]
+pub struct Content<'a> {
+    /// The facts.
+    pub document: &'a Preregistration,
+    /// The protocol, with the planned participants of the document.
+    pub protocol: &'a Protocol,
+    /// The analysis of a complete study, whose tests are declared.
+    pub analysis: &'a Analysis,
+    /// Those of its parts.
+    pub parts: &'a [PartAnalysis],
+    /// What each track compares, and how. Untrusted.
+    pub tracks: Vec<String>,
+    /// Sentences on power and sensitivity.
+    pub power: Vec<String>,
+}
+
+/// The document in Markdown.
+pub fn markdown(c: &Content<'_>) -> String {
+    let (d, p) = (c.document, c.protocol);
+    let mut out = format!("# Preregistration: {}\n\n", text(&p.study.title));
+    let list = |out: &mut String, title: &str, lines: &[String]| {
+        *out += &format!("## {title}\n\n");
+        for line in lines {
+            *out += &format!("* {line}\n");
+        }
+        out.push('\n');
+    };
+    let mut about = vec![
+        format!(
+            "Study `{}`, written on {} with study {}.",
+            d.study, d.date, d.tool_version
+        ),
+        format!(
+            "SHA-256 of the facts in `preregistration.json`: `{}`.",
+            d.sha256
+        ),
+    ];
+    if !p.study.authors.is_empty() {
+        about.push(format!("Authors: {}.", text(&p.study.authors.join(", "))));
+    }
+    list(&mut out, "Document", &about);
+    list(&mut out, "Design", &design(c));
+    list(&mut out, "Questions", &questions(p));
+    list(&mut out, "Exclusions", &exclusions(p));
+    let mut tests = vec![format!(
+        "Level of significance α = {}, two-sided: an answer is yes for p at or below its level. Nothing else \
+         decides.",
+        sentences::level(p.analysis.alpha())
+    )];
+    tests.extend(c.analysis.findings.iter().filter_map(|f| {
+        let (what, test) = declared_test(c.analysis, f)?;
+        Some(format!("{what}: {test}."))
+    }));
+    for part in c.parts {
+        let own = part.findings.iter();
+        tests.extend(own.map(|f| part_answers::declared(part, f)));
+    }
+    if tests.len() == 1 {
+        tests.push(
+            "The primary question is no rating of realizations: thresholds, preferences and magnitudes are \
+             estimated, and no test decides."
+                .to_owned(),
+        );
+    }
+    if let Some(from) = p.analysis.realistic_from {
+        tests.push(format!("A rating of {from} or higher counts as realistic."));
+    }
+    if let Some(margin) = p.analysis.equivalence_margin {
+        tests.push(format!(
+            "Equivalence means a difference of less than {margin} points."
+        ));
+    }
+    tests.push(
+        "These are the tests of a complete study of this design; if ratings are missing, the rule of \
+         `study analyze` can choose another one, and its report says so."
+            .to_owned(),
+    );
+    list(&mut out, "Deciding tests", &tests);
+    list(&mut out, "Power", &c.power);
+    list(
+        &mut out,
+        "Fingerprints",
+        &[
+            format!("stimulus `{}`", d.fingerprints.stimulus),
+            format!("wording `{}`", d.fingerprints.wording),
+            format!("analysis `{}`", d.fingerprints.analysis),
+        ],
+    );
+    out.truncate(out.trim_end().len());
+    out.push('\n');
+    out
+}
+
+/// Text from a protocol in Markdown.
+fn text(raw: &str) -> String {
+    let mut out = String::new();
+    for c in Untrusted(raw).to_string().chars() {
+        if "\\`*_[]<>#|&$".contains(c) {
+            out.push('\\');
+        }
+        out.push(c);
+    }
+    out
+}
+
+fn design(c: &Content<'_>) -> Vec<String> {
+    let (d, p) = (c.document, c.protocol);
+    let people = counted(d.participants as usize, "participant", "participants");
+    let mut lines = vec![match p.parts.is_empty() {
+        true => format!(
+            "{people}, {} of each realization.",
+            counted(p.design.repetitions as usize, "repetition", "repetitions")
+        ),
+        false => format!("{people}."),
+    }];
+    lines.extend(groups(p));
+    let session = |s: &SessionPlan| {
+        let gap = match s.min_gap_h > 0.0 {
+            true => format!(" (at least {} h after the one before)", s.min_gap_h),
+            false => String::new(),
+        };
+        let parts = s.parts.iter().flatten().map(|id| format!("`{id}`"));
+        let parts: Vec<String> = parts.collect();
+        let only = match parts.is_empty() {
+            true => String::new(),
+            false => format!(" with {}", parts.join(", ")),
+        };
+        format!("`{}`{only}{gap}", s.id)
+    };
+    let sessions: Vec<String> = p.sessions.iter().map(session).collect();
+    if !sessions.is_empty() {
+        lines.push(format!(
+            "Sessions of each participant: {}.",
+            sessions.join(", ")
+        ));
+    }
+    let named = |m: &study_plan::protocol::ModelEntry| match m.vaf {
+        Some(vaf) => format!("`{}` (VAF {})", m.id, apa::share(vaf, 4)),
+        None => format!("`{}`", m.id),
+    };
+    let tested =
+        |m: &&study_plan::protocol::ModelEntry| m.role == Role::Test && m.duplicate_of.is_none();
+    let all: Vec<String> = p.models.iter().filter(tested).map(named).collect();
+    if !all.is_empty() {
+        lines.push(format!("Tested realizations: {}.", all.join(", ")));
+    }
+    for m in p.models.iter().filter(|m| !tested(m)) {
+        lines.push(match &m.duplicate_of {
+            Some(of) => format!("`{}`: hidden duplicate of `{of}`.", m.id),
+            None => format!("`{}`: {}.", m.id, m.role.as_str().replace('-', " ")),
+        });
+    }
+    for part in &p.parts {
+        lines.push(format!("Part `{}`: {}.", part.id, trials(p, part)));
+    }
+    lines.extend(c.tracks.iter().map(|track| text(track)));
+    let seed = p.study.seed;
+    lines.push(match p.parts.is_empty() {
+        true => format!(
+            "Order of the trials: {}; all orders follow from the seed {seed} (`study schedule`).",
+            order(&p.design.order)
+        ),
+        false => format!("All orders follow from the seed {seed} (`study schedule`)."),
+    });
+    lines
+}
+
+fn order(order: &Order) -> String {
+    match order {
+        Order::File(_) => "a prepared file".to_owned(),
+        order => json!(order).as_str().unwrap_or_default().to_owned(),
+    }
+}
+
+/// The groups, with what distinguishes them.
+fn groups(p: &Protocol) -> Option<String> {
+    let groups = p.groups.as_ref()?;
+    let one = |g: &study_plan::protocol::GroupRules| {
+        let ids = |ids: Vec<&str>| match ids.is_empty() {
+            true => String::new(),
+            false => format!(" with `{}`", ids.join("`, `")),
+        };
+        let parts = g.parts.iter().flatten().map(|id| id.as_str());
+        let models = g.models.iter().flatten().map(|id| id.as_str());
+        let only = ids(parts.chain(models).collect());
+        format!("`{}`{only} (share {})", g.id, g.share)
+    };
+    let all: Vec<String> = groups.list.iter().map(one).collect();
+    let assigned = match groups.assign {
+        Assign::Row => "assigned by row in permuted blocks",
+        Assign::Given => "given by the experimenter",
+    };
+    Some(format!("Groups: {}; {assigned}.", all.join(", ")))
+}
+
+/// What the trials of a part are.
+fn trials(p: &Protocol, part: &Part) -> String {
+    let each = |own: &Presentations, what: &str| {
+        format!(
+            "{what} of {}, {} each, order {}",
+            match own.models.iter().all(|m| p.level_of(m).is_some()) {
+                true => counted(own.models.len(), "level", "levels"),
+                false => counted(own.models.len(), "realization", "realizations"),
+            },
+            counted(own.repetitions as usize, "trial", "trials"),
+            order(&own.order)
+        )
+    };
+    match &part.task {
+        Task::Rating(own) => each(own, "rating"),
+        Task::Magnitude(own) => each(own, "magnitude estimation"),
+        Task::Mushra(own) => each(&own.presentations, "rating beside a reference"),
+        Task::Pairs(pairs) => format!(
+            "{}, {} each, {}, {}",
+            counted(
+                pairs.pairs.len(),
+                "pair of realizations",
+                "pairs of realizations"
+            ),
+            counted(pairs.repetitions as usize, "trial", "trials"),
+            match pairs.interval_order {
+                IntervalOrder::Balanced => "in both orders in turn",
+                IntervalOrder::Random => "their order drawn for each trial",
+            },
+            if pairs.tie {
+                "“no difference” is an answer"
+            } else {
+                "no ties"
+            }
+        ),
+        Task::Discrimination { tracks } => {
+            let ids: Vec<String> = tracks.iter().map(|id| format!("`{id}`")).collect();
+            format!(
+                "{} {}",
+                if ids.len() == 1 { "track" } else { "tracks" },
+                ids.join(", ")
+            )
+        }
+    }
+}
+
+fn questions(p: &Protocol) -> Vec<String> {
+    let one = |q: &Question| {
+        let scale = match q.kind.scale() {
+            Scale::Levels { from, to, .. } => format!("rating from {from} to {to}"),
+            Scale::Interval { from, to, .. } => format!("slider from {from} to {to}"),
+            Scale::Names { options, .. } => format!("choice of {}", options.len()),
+            Scale::Open { .. } => "number".to_owned(),
+            Scale::Free => "text".to_owned(),
+        };
+        let primary = if q.id == p.analysis.primary {
+            ", primary"
+        } else {
+            ""
+        };
+        format!("`{}`: “{}” ({scale}{primary})", q.id, text(&q.prompt))
+    };
+    p.questions.iter().map(one).collect()
+}
+
+fn exclusions(p: &Protocol) -> Vec<String> {
+    let mut lines: Vec<String> = (p.analysis.exclude.iter())
+        .map(|rule| format!("Excluded: {} (`{rule}`).", rule.words()))
+        .collect();
+    if lines.is_empty() {
+        lines.push("No exclusion rule.".to_owned());
+    }
+    lines.push(match p.analysis.unfinished {
+        Unfinished::Include => "Ratings of unfinished sessions are included.".to_owned(),
+        Unfinished::Exclude => "Unfinished sessions are excluded.".to_owned(),
+    });
+    lines
+}
+
+/// Power of the planned design, in sentences.
+pub fn power(report: &super::power::Report) -> Vec<String> {
+    let mut lines = vec![report.ceiling_sentence(), super::power::paragraph(report)];
+    let finds = super::power::sensitivity_sentences(report).into_iter();
+    lines.extend(finds.map(|line| format!("This design {line}.")));
+    lines.extend(report.warnings().iter().map(|w| format!("{}.", capital(w))));
+    lines
+}

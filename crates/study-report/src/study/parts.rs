@@ -1,0 +1,136 @@
+//! What a report says of the parts of a study besides their analyses.
+
+use crate::figures::of_part;
+use crate::html::PartReport;
+use study_analysis::analyze::psychophysics::PartAnalysis;
+use study_base::text::counted;
+use study_plan::procedure::Rule;
+use study_plan::protocol::Protocol;
+use study_plan::protocol::parts::{Compared, IntervalOrder, Part, Task, TrackRules};
+
+/// Figures and sentences on the trials of each part.
+pub(super) fn part_reports(protocol: &Protocol, parts: &[PartAnalysis]) -> Vec<PartReport> {
+    let report = |(i, analysis): (usize, &PartAnalysis)| PartReport {
+        trials: protocol
+            .part(&analysis.part)
+            .map_or_else(String::new, |part| trials(protocol, part)),
+        figures: of_part(i + 1, analysis),
+    };
+    parts.iter().enumerate().map(report).collect()
+}
+
+/// Sentences on the trials of a part, for the methods.
+fn trials(protocol: &Protocol, part: &Part) -> String {
+    let mut text = Vec::new();
+    match &part.task {
+        Task::Rating(_) => {}
+        Task::Magnitude(own) => {
+            let levels = own.models.iter().any(|m| protocol.level_of(m).is_some());
+            let (one, many) = match levels {
+                true => ("level", "levels"),
+                false => ("realization", "realizations"),
+            };
+            text.push(format!(
+                "In each trial one of {} was felt and given a number above 0, each {one} in {}.",
+                counted(own.models.len(), one, many),
+                counted(own.repetitions as usize, "trial", "trials")
+            ));
+        }
+        Task::Mushra(own) => {
+            let presented = &own.presentations;
+            let reference = match &own.reference {
+                Some(id) => format!("after {id} as the reference"),
+                None => "beside a real reference".to_owned(),
+            };
+            text.push(format!(
+                "In each trial one of {} was rated from 0 to 100 {reference}, each in {}; a hidden reference was among them \
+                 (after ITU-R BS.1534-3, one at a time).",
+                counted(presented.models.len(), "realization", "realizations"),
+                counted(presented.repetitions as usize, "trial", "trials")
+            ));
+        }
+        Task::Pairs(pairs) => {
+            let order = match pairs.interval_order {
+                IntervalOrder::Balanced => "each pair in both orders in turn",
+                IntervalOrder::Random => "the order of a pair was drawn for each trial",
+            };
+            let tie = if pairs.tie {
+                "“no difference” was an answer"
+            } else {
+                "there was no tie"
+            };
+            text.push(format!(
+                "In each trial two realizations were felt one after the other and one was chosen: {}, {} each; \
+                 {order}; {tie}.",
+                counted(pairs.pairs.len(), "pair", "pairs"),
+                counted(pairs.repetitions as usize, "trial", "trials")
+            ));
+        }
+        Task::Discrimination { tracks } => {
+            let tracks = tracks.iter().filter_map(|id| protocol.track(id));
+            text.extend(tracks.map(|track| track_in_words(protocol, track)));
+        }
+    }
+    let exposure = &part.exposure;
+    let mut felt = match part.gap_s > 0.0 {
+        true => format!("Intervals were {} s apart.", part.gap_s),
+        false => String::new(),
+    };
+    match (exposure.min_s > 0.0, exposure.max_s) {
+        (true, Some(most)) => {
+            felt += &format!(" Each was felt for {} to {most} s.", exposure.min_s);
+        }
+        (true, None) => felt += &format!(" Each was felt for at least {} s.", exposure.min_s),
+        (false, Some(most)) => felt += &format!(" Each was felt for at most {most} s."),
+        (false, None) => {}
+    }
+    felt += &match exposure.replays {
+        0 => " Nothing could be felt again.".to_owned(),
+        1 => " A trial could be felt again once.".to_owned(),
+        n => format!(
+            " A trial could be felt again {}.",
+            counted(n as usize, "time", "times")
+        ),
+    };
+    text.push(felt.trim_start().to_owned());
+    text.join(" ")
+}
+
+/// What a track compares, and by which rule.
+pub fn track_in_words(protocol: &Protocol, track: &TrackRules) -> String {
+    let compared = match &track.compared {
+        Compared::Models { models } => format!("{} against the standard {}", models[1], models[0]),
+        Compared::Levels { family, standard } => {
+            let levels = protocol.ladder(track);
+            let levels = levels.levels();
+            let unit = protocol.family(family).and_then(|f| f.unit.clone());
+            let unit = unit.map_or_else(String::new, |u| format!(" {u}"));
+            format!(
+                "{family} at {} from {} to {}{unit} against the standard {standard}{unit}",
+                counted(levels.len(), "level", "levels"),
+                levels.first().copied().unwrap_or_default(),
+                levels.last().copied().unwrap_or_default(),
+            )
+        }
+    };
+    let rule = match &track.rule {
+        Rule::Staircase(rule) => format!(
+            "a {}-up-{}-down staircase that stops after {} reversals, {} trials at most",
+            rule.up, rule.down, rule.stop.reversals, rule.stop.max_trials
+        ),
+        Rule::QuestPlus(rule) => format!("QUEST+ with {} trials", rule.trials),
+        Rule::Constant(rule) => format!("constant stimuli in {} trials", rule.trials()),
+    };
+    let share = |share: f64, what: &str| match share > 0.0 {
+        true => format!(", {:.0} % {what} trials", 100.0 * share),
+        false => String::new(),
+    };
+    format!(
+        "Track {} ({}): {compared}, by {rule}{}{}; {} feedback.",
+        track.id,
+        track.method.as_str(),
+        share(track.easy, "easy"),
+        share(track.catch, "catch"),
+        if track.feedback { "with" } else { "no" }
+    )
+}

@@ -1,0 +1,76 @@
+//! The page of thresholds, sensitivities and preferences.
+
+use super::Page;
+use super::layout::{Grid, Paint, wrap};
+use crate::apa::name;
+use crate::part_answers::{Answered, answered, answers, banner, caveats};
+use crate::table::Table;
+use crate::tables::parts::tables;
+use study_analysis::analyze::Values;
+use study_analysis::analyze::psychophysics::PartAnalysis;
+use study_base::text::{Untrusted, counted};
+
+/// The statistics of a table of trials.
+pub fn trials(title: &str, task: &str, rows: usize, values: &Values, page: Page) -> String {
+    let paint = Paint(page.color);
+    let mut out = paint.strong(&name(title));
+    out += &format!("\n{task}, {}\n\n", counted(rows, "row", "rows"));
+    out + &all_tables(values, page)
+}
+
+/// A part of a study: its tables, answers and caveats.
+pub fn part(title: &str, part: &PartAnalysis, page: Page) -> String {
+    let width = page.width.clamp(60, 100);
+    let paint = Paint(page.color);
+    let mut out = paint.strong(&name(title));
+    out += &format!(
+        "\n{}, {}, {}\n",
+        part.task,
+        answers(part),
+        counted(part.participants, "participant", "participants")
+    );
+    if let Some(text) = banner(part) {
+        out += &paint.warn(&format!("{text}\n"));
+    }
+    out.push('\n');
+    out += &all_tables(&part.values, page);
+    for Answered {
+        question,
+        short,
+        more,
+    } in answered(part)
+    {
+        out += &paint.strong(&Untrusted(&question).to_string());
+        out.push('\n');
+        for sentence in [short].iter().chain(&more) {
+            out += &wrap(&Untrusted(sentence).to_string(), width, "  ", "  ");
+        }
+        out.push('\n');
+    }
+    for text in caveats(part) {
+        let text = wrap(&Untrusted(&text).to_string(), width, "! ", "  ");
+        out += &paint.warn(&text);
+    }
+    out
+}
+
+fn all_tables(values: &Values, page: Page) -> String {
+    let width = page.width.clamp(60, 100);
+    let paint = Paint(page.color);
+    let tables = tables(values);
+    (tables.iter().map(|table| one(table, width, paint))).collect()
+}
+
+fn one(table: &Table, width: usize, paint: Paint) -> String {
+    let mut out = String::new();
+    if !table.is_empty() {
+        out = Grid::of(table, Some(1)).render(width, table.len(), paint);
+    }
+    for (i, note) in table.notes.iter().enumerate() {
+        out += &wrap(note, width, "", if i == 0 { "" } else { "  " });
+    }
+    if !table.notes.is_empty() {
+        out.push('\n');
+    }
+    out
+}

@@ -1,0 +1,185 @@
+//! The rows of the derived tables, from the history of a session.
+
+use super::trial::TrialHistory;
+use super::{GivenAnswer, History};
+use crate::outcome::event::{FormId, Start};
+use crate::outcome::rows::{ParticipantRow, RatingRow, Status};
+use std::collections::BTreeMap;
+use study_base::text::{ParticipantId, QuestionId};
+use study_plan::protocol::{Answer, Part, Protocol, Role, Stimuli, TrackRules, Trial};
+
+impl History {
+    /// One row for each planned trial, practice included; none if the session never
+    /// started, and none for trials after the end of their track. `protocol` gives roles, VAFs and covariates.
+    pub fn rating_rows(&self, protocol: &Protocol) -> Vec<RatingRow> {
+        let row = |start| move |trial| self.rating_row(start, trial, protocol);
+        let takes_place = |trial: &&Trial| self.takes_place(trial.trial);
+        (self.start().into_iter())
+            .flat_map(|start| start.schedule.iter().filter(takes_place).map(row(start)))
+            .collect()
+    }
+
+    /// The row of a participant whose last session this is.
+    pub fn participant_row(&self, id: &ParticipantId, session: u32) -> ParticipantRow {
+        let start = self.start();
+        ParticipantRow {
+            participant: id.clone(),
+            session,
+            state: self.standing.state,
+            reason: self.standing.reason.clone(),
+            row: start.and_then(|s| s.seat.row()),
+            pilot: start.is_some_and(|s| s.seat.is_pilot()),
+            simulated: start.is_some_and(|s| s.seat.is_simulated()),
+            erased: false,
+            consent_version: (self.consent.as_ref())
+                .filter(|c| c.accepted)
+                .map(|c| c.version.clone()),
+            protocol_version: start.map(|s| s.protocol_version),
+            trials_done: self.closed(false),
+            trials_planned: self.planned_total(false),
+            started_at: self.started_at().map(|at| at.wall),
+            answers: answers(self.answers.iter().filter(|g| !is_rating(g))),
+            group: start.and_then(|s| s.assigned.group.clone()),
+            session_id: start.and_then(|s| s.assigned.session_id.clone()),
+            gap_h: start.and_then(|s| s.assigned.gap_h),
+        }
+    }
+
+    fn rating_row(&self, start: &Start, trial: &Trial, protocol: &Protocol) -> RatingRow {
+        let unfelt = TrialHistory::default();
+        let felt = self.trials.get(&trial.trial).unwrap_or(&unfelt);
+        let counted = felt.counted();
+        // Of a trial that was given up the last attempt is shown, without answers.
+        let shown = counted.or(felt.attempts.last().filter(|_| felt.given_up));
+        let begun = shown.and_then(|a| a.start.as_ref());
+        let given: Vec<&GivenAnswer> = match counted.map(|a| a.number) {
+            Some(attempt) => self.answers_of(trial.trial, attempt).collect(),
+            None => Vec::new(),
+        };
+        let part = trial.part.as_ref().and_then(|id| protocol.part(id));
+        let primary = match part.and_then(|part| part.asks.first()) {
+            Some(first) if !asks(part, &protocol.analysis.primary) => first,
+            _ => &protocol.analysis.primary,
+        };
+        let primary = given.iter().find(|g| g.question == *primary);
+        let model = trial.model().or(match shown.map(|a| &a.models[..]) {
+            Some([only]) => Some(only),
+            _ => None,
+        });
+        let entry = model.and_then(|id| protocol.model(id));
+        let track = trial.track().and_then(|id| protocol.track(id));
+        let played = shown.and_then(|a| a.ended).map(|e| e.playback);
+        // Without telemetry nothing was counted.
+        let sampled = played.filter(|p| p.samples > 0);
+        let worst = shown.and_then(|a| a.rendering.iter().max_by_key(|r| r.verdict));
+        let finite = |x: f64| Some(x).filter(|x| x.is_finite());
+        let done = counted.and_then(|a| a.done);
+        let sitting = shown.map_or(&self.sitting, |a| &a.sitting);
+        RatingRow {
+            study: start.study.clone(),
+            participant: start.participant.clone(),
+            session: start.session,
+            row: start.seat.row(),
+            trial: trial.trial,
+            block: trial.block,
+            position: begun.map(|b| b.position),
+            planned_position: trial.position,
+            model: model.cloned(),
+            role: entry.map_or(Role::Test, |m| m.role),
+            repetition: trial.repetition,
+            previous_model: begun.and_then(|b| b.previous.clone()),
+            practice: trial.practice,
+            pilot: start.seat.is_pilot(),
+            simulated: start.seat.is_simulated(),
+            device_kind: entry
+                .and_then(|m| m.device)
+                .filter(|_| !start.seat.is_pilot() && !start.seat.is_simulated())
+                .unwrap_or(start.device_kind),
+            device_id: sitting.device_id.clone(),
+            operator: sitting.operator.clone(),
+            tool_version: sitting.tool_version.clone(),
+            protocol_version: start.protocol_version,
+            corrected: given.iter().any(|g| g.corrected),
+            declined: given.iter().any(|g| g.answer.is_declined()),
+            remarks: felt.remarks.join(" | "),
+            reference_s: begun.map(|b| b.reference_s),
+            exploration_s: played.and_then(|p| finite(p.exploration_s)),
+            response_s: done.map(|d| d.response_s),
+            strokes: sampled.map(|p| p.strokes),
+            least_energy_j: sampled.and_then(|p| finite(p.least_energy_j)),
+            switches_per_s: sampled.and_then(|p| finite(p.switches_per_s)),
+            clamp_count: sampled.map(|p| p.clamp_count),
+            started_at: begun.map(|b| b.at.wall),
+            rated_at: primary
+                .and_then(|g| g.answered_at)
+                .or(done.map(|d| d.at))
+                .map(|at| at.wall),
+            attempt: shown.map(|a| a.number),
+            status: match felt.given_up {
+                true => Status::Failed,
+                false => status_of(primary.map(|g| &g.answer)),
+            },
+            vaf: entry.and_then(|m| m.vaf),
+            covariates: entry.map(|m| m.covariates.clone()).unwrap_or_default(),
+            part: trial.part.clone(),
+            track: trial.track().cloned(),
+            level: (track.and_then(TrackRules::family))
+                .and_then(|_| shown?.level)
+                .map(|level| level.presented)
+                .or_else(|| protocol.level_of(shown.and(model)?)),
+            correct: correct(trial, track, part, &given),
+            replays: shown.map(|a| a.replays),
+            fidelity: worst.cloned(),
+            host_late_ms: played.and_then(|p| Some(p.host_late_ms?[1])),
+            input_channel: primary.and_then(|g| g.channel),
+            answers: answers(given.into_iter()),
+            group: start.assigned.group.clone(),
+            session_id: start.assigned.session_id.clone(),
+        }
+    }
+
+    fn answers_of(&self, trial: u32, attempt: u32) -> impl Iterator<Item = &GivenAnswer> {
+        let form = FormId::Trial { trial, attempt };
+        self.answers.iter().filter(move |g| g.form == form)
+    }
+}
+
+/// Whether the trials of a part ask a question; all of a study without parts do.
+fn asks(part: Option<&Part>, question: &QuestionId) -> bool {
+    part.is_none_or(|part| part.asks.contains(question))
+}
+
+/// Whether the answer to a trial of a track is correct.
+fn correct(
+    trial: &Trial,
+    track: Option<&TrackRules>,
+    part: Option<&Part>,
+    given: &[&GivenAnswer],
+) -> Option<bool> {
+    let Stimuli::Track { intervals, .. } = &trial.stimuli else {
+        return None;
+    };
+    let question = part?.asks.first()?;
+    let answer = given.iter().find(|g| g.question == *question)?;
+    track?.is_correct(intervals, &answer.answer)
+}
+
+fn is_rating(given: &GivenAnswer) -> bool {
+    matches!(given.form, FormId::Trial { .. })
+}
+
+fn answers<'a>(given: impl Iterator<Item = &'a GivenAnswer>) -> BTreeMap<QuestionId, Answer> {
+    given
+        .map(|g| (g.question.clone(), g.answer.clone()))
+        .collect()
+}
+
+fn status_of(primary: Option<&Answer>) -> Status {
+    match primary {
+        None => Status::Missing,
+        Some(Answer::Declined { .. }) => Status::Declined,
+        Some(Answer::Text(text)) if text.is_empty() => Status::Missing,
+        Some(Answer::Choice(chosen)) if chosen.is_empty() => Status::Missing,
+        Some(_) => Status::Ok,
+    }
+}

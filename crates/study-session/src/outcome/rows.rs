@@ -1,0 +1,187 @@
+//! The rows of the derived tables. Their fields are the columns of the same name,
+//! which `protocol::columns` declares.
+
+use super::event::{Author, Channel, Event, Failure, State};
+use super::fidelity::Fidelity;
+use chrono::{DateTime, FixedOffset};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use study_base::text::{ModelId, PartId, ParticipantId, QuestionId};
+use study_plan::protocol::{Answer, DeviceKind, Role};
+
+study_base::named! {
+    /// The outcome of a trial.
+    #[derive(Default, Serialize, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    Status {
+        /// Rated.
+        #[default]
+        Ok = "ok",
+        /// Abandoned after the last permitted attempt.
+        Failed = "failed",
+        /// The primary question was declined.
+        Declined = "declined",
+        /// Not reached, or the primary question was left empty.
+        Missing = "missing",
+    }
+}
+
+/// One row of `ratings.csv`: a planned trial with its last answers.
+#[derive(Debug, Clone, PartialEq)]
+#[allow(missing_docs, reason = "RatingColumn has the meanings")]
+pub struct RatingRow {
+    pub study: String,
+    pub participant: ParticipantId,
+    pub session: u32,
+    pub row: Option<u32>,
+    pub trial: u32,
+    pub block: u32,
+    pub position: Option<u32>,
+    pub planned_position: u32,
+    pub model: Option<ModelId>,
+    pub role: Role,
+    pub repetition: u32,
+    pub previous_model: Option<ModelId>,
+    pub practice: bool,
+    pub pilot: bool,
+    pub simulated: bool,
+    pub device_kind: DeviceKind,
+    pub device_id: String,
+    pub operator: String,
+    pub tool_version: String,
+    pub protocol_version: u32,
+    /// Last answers of the attempt that counts.
+    pub answers: BTreeMap<QuestionId, Answer>,
+    pub corrected: bool,
+    pub declined: bool,
+    pub remarks: String,
+    pub reference_s: Option<f64>,
+    pub exploration_s: Option<f64>,
+    pub response_s: Option<f64>,
+    pub strokes: Option<u32>,
+    pub least_energy_j: Option<f64>,
+    pub switches_per_s: Option<f64>,
+    pub clamp_count: Option<u64>,
+    pub started_at: Option<DateTime<FixedOffset>>,
+    pub rated_at: Option<DateTime<FixedOffset>>,
+    pub attempt: Option<u32>,
+    pub status: Status,
+    pub vaf: Option<f64>,
+    pub covariates: BTreeMap<String, f64>,
+    pub part: Option<PartId>,
+    pub track: Option<PartId>,
+    pub level: Option<f64>,
+    pub correct: Option<bool>,
+    pub replays: Option<u32>,
+    /// Of several playbacks the worst.
+    pub fidelity: Option<Fidelity>,
+    pub host_late_ms: Option<f64>,
+    pub input_channel: Option<Channel>,
+    pub group: Option<PartId>,
+    pub session_id: Option<PartId>,
+}
+
+/// One row of `intervals.csv`: a presentation.
+#[derive(Debug, Clone, PartialEq)]
+#[allow(missing_docs, reason = "IntervalColumn has the meanings")]
+pub struct IntervalRow {
+    pub study: String,
+    pub participant: ParticipantId,
+    pub session: u32,
+    pub part: Option<PartId>,
+    pub trial: u32,
+    pub attempt: u32,
+    pub interval: u32,
+    pub model: Option<ModelId>,
+    pub level: Option<f64>,
+    pub level_proposed: Option<f64>,
+    pub track: Option<PartId>,
+    pub track_trial: Option<u32>,
+    pub target: Option<bool>,
+    pub catch: Option<bool>,
+    pub gap_s: Option<f64>,
+    pub replays: u32,
+    pub exploration_s: Option<f64>,
+    pub strokes: Option<u32>,
+    pub fidelity: Option<Fidelity>,
+    pub host_late_ms: Option<f64>,
+}
+
+study_base::named! {
+    /// What a row of `attempts.csv` is about.
+    #[allow(missing_docs, reason = "AttemptColumn::What has the meanings")]
+    AttemptEvent {
+        Attempt = "attempt",
+        Answer = "answer",
+        Correction = "correction",
+        Failure = "failure",
+        Closed = "closed",
+        Remark = "remark",
+        Resume = "resume",
+        State = "state",
+        Reveal = "reveal",
+    }
+}
+
+impl AttemptEvent {
+    /// That of an event of the journal, if it has a row.
+    pub(super) fn of(event: &Event) -> Option<Self> {
+        Some(match event {
+            Event::AttemptStarted { .. } => Self::Attempt,
+            Event::Answered { .. } => Self::Answer,
+            Event::Corrected { .. } => Self::Correction,
+            Event::AttemptFailed { .. } => Self::Failure,
+            Event::TrialClosed { .. } => Self::Closed,
+            Event::Remark { .. } => Self::Remark,
+            Event::Reopened { .. } => Self::Resume,
+            Event::StateSet { .. } => Self::State,
+            Event::Revealed { .. } => Self::Reveal,
+            _ => return None,
+        })
+    }
+}
+
+/// One row of `attempts.csv`: an attempt, answer, correction, failure or remark.
+#[derive(Debug, Clone, PartialEq)]
+#[allow(missing_docs, reason = "AttemptColumn has the meanings")]
+pub struct AttemptRow {
+    pub participant: ParticipantId,
+    pub session: u32,
+    pub simulated: bool,
+    pub pilot: bool,
+    pub trial: Option<u32>,
+    pub attempt: Option<u32>,
+    pub model: Option<ModelId>,
+    pub what: AttemptEvent,
+    pub question: Option<QuestionId>,
+    pub from: Option<Answer>,
+    pub to: Option<Answer>,
+    pub failure: Option<Failure>,
+    pub by: Option<Author>,
+    pub text: String,
+    pub at: DateTime<FixedOffset>,
+    pub input_channel: Option<Channel>,
+}
+
+/// One row of `participants.csv`.
+#[derive(Debug, Clone, PartialEq)]
+#[allow(missing_docs, reason = "ParticipantColumn has the meanings")]
+pub struct ParticipantRow {
+    pub participant: ParticipantId,
+    pub session: u32,
+    pub state: State,
+    pub reason: String,
+    pub row: Option<u32>,
+    pub pilot: bool,
+    pub simulated: bool,
+    pub erased: bool,
+    pub consent_version: Option<String>,
+    pub protocol_version: Option<u32>,
+    pub trials_done: u32,
+    pub trials_planned: u32,
+    pub started_at: Option<DateTime<FixedOffset>>,
+    pub answers: BTreeMap<QuestionId, Answer>,
+    pub group: Option<PartId>,
+    pub session_id: Option<PartId>,
+    pub gap_h: Option<f64>,
+}
