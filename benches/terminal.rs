@@ -63,11 +63,11 @@ fn session(folder: &Path) {
     let mut saved = Vec::new();
     let mut memory_kib = 0;
     loop {
-        let screen = terminal.screen();
-        if screen.contains("Enter: close") {
+        let screen = terminal.shown();
+        if screen.text.contains("Enter: close") {
             break;
         }
-        if screen.contains("Tab: comment") {
+        if screen.text.contains("Tab: comment") {
             terminal.keys("5");
             until(&terminal, |s| {
                 s.contains("┃  5  ┃") && s.contains("Enter: ")
@@ -82,7 +82,7 @@ fn session(folder: &Path) {
             });
             saved.push(began.elapsed());
             memory_kib = memory_kib.max(terminal.resident_kib());
-        } else if play(&mut terminal, "P01") == Did::Waited {
+        } else if play(&mut terminal, "P01", &screen) == Did::Waited {
             std::thread::sleep(Duration::from_millis(1));
         }
     }
