@@ -10,7 +10,8 @@ use std::io::BufReader;
 use std::path::Path;
 use study_haptics::model::{Branch, Provenance, Realization, Trained, file};
 use study_haptics::recording;
-use study_wire::predict::{Direction, Lookup};
+use study_wire::predict::{Direction, Lookup, Motion};
+use study_wire::servo::{Law, Rendering, Servo, ServoSettings};
 
 const FOLDERS: [&str; 3] = ["turn-signal", "turn-signal-extended", "turn-signal-passive"];
 const VALIDATION: &str = "validation-1.5hz";
@@ -149,6 +150,68 @@ fn the_passive_realizations_are_certified_and_predict_best() {
         assert!(certificate.rendered_n_per_mm() < 100.0, "{id}");
     }
     assert!(vaf("passive") > 0.99 && vaf("mechanism") > 0.9994);
+}
+
+/// A stroke into an edge that is faster than those of the recordings: through the servo of a
+/// device, at rest at the edge and on the way back, the force stays within what the mechanism
+/// has in slow motion.
+#[test]
+fn a_fast_stroke_into_an_edge_meets_no_force_that_no_data_support() {
+    let all = shipped("turn-signal-passive");
+    let what = &all["mechanism"];
+    let mechanism = what.mechanism.as_ref().unwrap();
+    let [low, high] = what.trained.x_mm;
+    let rendering = Rendering {
+        law: Law::Mechanism(mechanism.view()),
+        range_mm: [low, high],
+        trained_mm_s: what.trained.v_mm_s,
+    };
+    let settings = ServoSettings::new();
+    // the stroke's speed, then, at rest at the edge and 5 mm from it, the force
+    let stroke = |from: f64, edge: f64, mm_s: f64| {
+        let mut servo = Servo::<f64>::new(settings);
+        servo.start();
+        let mut x_mm = from;
+        let mut forces = Vec::new();
+        let legs = [(from, 0.5, 1.0), (edge, 0.3, mm_s), (from, 0.0, 20.0)];
+        for (to, rest_s, speed) in legs {
+            let moving = ((to - x_mm).abs() / speed * settings.servo_hz) as usize;
+            let resting = (rest_s * settings.servo_hz) as usize;
+            let by = (to - x_mm) / moving.max(1) as f64;
+            for step in 0..moving + resting {
+                let moves = step < moving;
+                x_mm += if moves { by } else { 0.0 };
+                let v_mm_s = if moves { by * settings.servo_hz } else { 0.0 };
+                let motion = Motion {
+                    v_mm_s,
+                    ..Motion::at_rest(x_mm)
+                };
+                let force_n = servo.step(&rendering, motion);
+                // on the way in it has the impact of the follower as well
+                let counts = speed == 20.0 || (speed == mm_s && step > moving + resting / 2);
+                if counts {
+                    forces.push(force_n);
+                }
+            }
+        }
+        forces
+    };
+    for (from, edge) in [(20.0, low), (14.0, high)] {
+        let slow = stroke(from, edge, 20.0);
+        let most = slow.iter().fold(0.0, |most: f64, n| most.max(n.abs()));
+        for mm_s in [180.0, 200.0, 300.0] {
+            let fast = stroke(from, edge, mm_s);
+            let found = fast.iter().fold(0.0, |most: f64, n| most.max(n.abs()));
+            assert!(
+                found < 1.1 * most,
+                "{mm_s} mm/s to {edge}: {found} N, {most} N"
+            );
+            let apart = |i: usize| (fast[fast.len() - i] - slow[slow.len() - i]).abs();
+            // a few mm from the edge nothing is left of how it was reached
+            let back = (7.0 / 20.0 * settings.servo_hz) as usize;
+            assert!((1..back).all(|i| apart(i) < 0.3), "{mm_s} mm/s to {edge}");
+        }
+    }
 }
 
 /// Do not change this test or its file: a file that somebody has stays readable.

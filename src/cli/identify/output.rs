@@ -207,6 +207,11 @@ fn mechanism_in_detail(fitted: &Fitted) -> String {
             "recorded force not filtered; fitted below {hz} Hz, predicted without a filter"
         ),
     };
+    let [low, high] = fitted.reach_mm;
+    let _ = writeln!(
+        out,
+        "the follower was at {low:.2} to {high:.2} mm; beyond, detents and friction keep their last values"
+    );
     out += "starts, with their rms error on a part and on all of the training recordings:\n";
     for a in &fitted.attempts {
         let fitted_n = a

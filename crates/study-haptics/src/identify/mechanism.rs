@@ -10,6 +10,7 @@
 
 mod levenberg;
 mod objective;
+mod reach;
 mod sensitivity;
 mod start;
 #[cfg(test)]
@@ -92,6 +93,9 @@ pub struct Fitted {
     pub attempts: Vec<Attempt>,
     /// Steps of the fit that is reported.
     pub iterations: usize,
+    /// Where the follower was on the recordings, mm: beyond, detents and friction keep the
+    /// last value that the data support.
+    pub reach_mm: [f64; 2],
 }
 
 /// How many values D and F_c have, and where.
@@ -217,8 +221,11 @@ pub fn identify(
     let fitted: Vec<(usize, Fit)> = order[..2.min(order.len())]
         .par_iter()
         .filter_map(|i| {
-            let from = &begun[*i].as_ref()?.mechanism;
-            Some((*i, fit(from, &whole, PREDICTED_HZ, ITERATIONS[1])?))
+            let begun = &begun[*i].as_ref()?.mechanism;
+            let from = reach::held(begun, &reach::of(begun, recordings));
+            let mut fit = fit(&from, &whole, PREDICTED_HZ, ITERATIONS[1])?;
+            fit.mechanism = reach::bridged(fit.mechanism, &reach::of(&from, recordings));
+            Some((*i, fit))
         })
         .collect();
     for (i, fit) in &fitted {
@@ -228,6 +235,7 @@ pub fn identify(
         .min_by(|a, b| a.1.rms_n.total_cmp(&b.1.rms_n))
         .ok_or(IdentifyError::NoMechanism)?;
     Ok(Fitted {
+        reach_mm: reach::of(&best.mechanism, recordings).range_mm,
         filter,
         standard_errors: best.standard_errors,
         mechanism: Mechanism {
@@ -282,6 +290,17 @@ pub fn predict(
     samples: usize,
     least_hz: f64,
 ) -> Vec<f64> {
+    follow(mechanism, recording, samples, least_hz, |_| ())
+}
+
+/// The same; `visit` sees the state at each of the samples.
+fn follow(
+    mechanism: &MechanismView<'_>,
+    recording: &Recording,
+    samples: usize,
+    least_hz: f64,
+    mut visit: impl FnMut(&State),
+) -> Vec<f64> {
     let mut state = State::settled(mechanism, motion_between(recording, 0, 0.0));
     (0..samples)
         .map(|i| {
@@ -295,6 +314,7 @@ pub fn predict(
                 let motion = motion_between(recording, i, j as f64 / substeps);
                 force_n = state.step(mechanism, motion, span_s / substeps);
             }
+            visit(&state);
             force_n + mechanism.scalars.handle_kg * recording.a_m_s2[i]
         })
         .collect()

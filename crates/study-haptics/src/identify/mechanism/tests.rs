@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that fails says where")]
 
 use super::objective::Compared;
-use super::{Filter, Fitted, PARAMETERS, levenberg, predict};
+use super::{Filter, Fitted, PARAMETERS, levenberg, predict, reach};
 use crate::identify::Warning;
 use crate::identify::signal::LowPass;
 use crate::model::{Mechanism, Profile};
@@ -110,6 +110,43 @@ fn standard_errors_are_the_spread_of_repeated_recordings_under_correlated_noise(
     assert!((0.8..1.25).contains(&geometric), "{geometric}");
 }
 
+/// Detents end where the follower was, whatever their values are beyond, and are a line across
+/// what it left out.
+#[test]
+fn values_that_no_data_reached_are_held() {
+    let recording = recording();
+    let part = |samples: std::ops::Range<usize>, by: f64, plus_mm: f64| {
+        let mut part = recording.select(&samples.collect::<Vec<_>>());
+        part.x_mm.iter_mut().for_each(|x| *x = by * *x + plus_mm);
+        part.v_mm_s.iter_mut().for_each(|v| *v *= by);
+        part
+    };
+    let mut wild = truth();
+    for i in [0, 14] {
+        wild.detent.n[i] = 30.0;
+    }
+    // the handle is at −4.8 to 4.8 mm
+    let reach = reach::of(&truth(), &[&part(0..12_000, 0.8, 0.0)]);
+    assert!(reach.range_mm[0] > -6.0 && reach.range_mm[1] < 6.0);
+    let held = reach::held(&wild, &reach);
+    let [low, high] = reach.range_mm;
+    let ends = held.detent.x_mm().collect::<Vec<_>>();
+    assert!((ends[0] - low).abs() <= 1.0 && (ends[ends.len() - 1] - high).abs() <= 1.0);
+    assert!(held.detent.n.iter().all(|n| n.abs() < 5.0));
+    let same =
+        |x: f64| (held.friction.view().linear_n(x) - truth().friction.view().linear_n(x)).abs();
+    assert!(same(ends[0]) < 1e-9 && same(ends[ends.len() - 1]) < 1e-9);
+    // beyond the ends the force is that of the ends
+    assert_eq!(held.detent.view().spline_n(-9.0), held.detent.n[0]);
+
+    // two parts of the travel
+    let parts = [part(0..900, 0.2, -4.0), part(3000..3900, 0.2, 4.0)];
+    wild.detent.n[7] = 30.0;
+    let reach = reach::of(&truth(), &[&parts[0], &parts[1]]);
+    let bridged = reach::bridged(wild, &reach);
+    assert!(bridged.detent.n[7].abs() < 5.0, "{:?}", bridged.detent.n);
+}
+
 /// A standard error above half the value is told, except of a force, which may well be 0.
 #[test]
 fn what_the_recordings_do_not_determine_is_told() {
@@ -122,6 +159,7 @@ fn what_the_recordings_do_not_determine_is_told() {
             filter: Filter::Recorded(CORNER_HZ),
             attempts: Vec::new(),
             iterations: 1,
+            reach_mm: [-7.0, 7.0],
         };
         let name = |warning| match warning {
             Warning::NotDetermined { parameter, .. } => parameter,
