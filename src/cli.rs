@@ -13,6 +13,7 @@ mod device_selection;
 mod export;
 mod help;
 mod identify;
+mod import;
 mod new;
 mod participant;
 mod power;
@@ -73,6 +74,8 @@ enum Command {
     Trajectory(trajectory::Args),
     /// Move the probe along a trajectory and record the response
     Record(record::Args),
+    /// Turn measurements of another instrument into a recording
+    Import(import::Args),
     /// Identify realizations from a recording: model files and their VAF
     Identify(Box<identify::Args>),
     /// Write a commented protocol as a starting point
@@ -115,6 +118,7 @@ pub fn run(cli: Cli, console: &mut Console) -> Result<(), Failure> {
         Command::Verify(args) => verify::run(&args, console),
         Command::Trajectory(args) => trajectory::run(&args, console),
         Command::Record(args) => record::run(&args, console),
+        Command::Import(args) => import::run(&args, console),
         Command::Identify(args) => identify::run(&args, console),
         Command::New(args) => new::run(&args, console),
         Command::Schema(args) => schema::run(&args, console),

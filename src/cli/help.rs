@@ -192,6 +192,13 @@ pub(super) const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
         )],
     ),
     (
+        "import",
+        &[(
+            "study import force-curve switch-1.csv switch-2.csv switch-3.csv -o switch.csv",
+            "three repetitions of a press and release as one recording",
+        )],
+    ),
+    (
         "identify",
         &[(
             "study identify training.csv --validate validation-1.5hz.csv --out models",

@@ -304,6 +304,9 @@ fn read(
     for warning in &recording.warnings {
         console.say(format!("warning: {}: {warning}", path.display()));
     }
+    if let Some(how) = recording.quasi_static() {
+        console.say(format!("{}: {}", path.display(), Untrusted(how)));
+    }
     if args.robust {
         let replaced = recording.without_spikes();
         let plural = if replaced == 1 { "" } else { "s" };

@@ -7,6 +7,7 @@ mod estimators_tables;
 mod evidence;
 mod golden;
 mod grid;
+mod import;
 mod mechanism;
 mod metamorphic;
 mod record;

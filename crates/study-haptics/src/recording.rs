@@ -12,6 +12,7 @@
 mod column;
 mod differences;
 mod doubts;
+pub mod force_curve;
 mod motion;
 mod names;
 mod rows;
@@ -111,37 +112,55 @@ impl Recording {
         format!("{scale_mm:.0e}").parse().unwrap_or(scale_mm)
     }
 
+    /// How the time of a recording that was measured without one was made up: the text of the header
+    /// line `quasi-static: …`. `None` if it was measured.
+    pub fn quasi_static(&self) -> Option<&str> {
+        self.header_line("quasi-static:")
+    }
+
     /// The count of the encoder, mm, if at least half of the differences of x are whole
     /// multiples of one of them: a filtered position has none.
     pub fn resolution_mm(&self) -> Option<f64> {
-        let steps = || (self.x_mm.windows(2).map(|w| (w[1] - w[0]).abs())).filter(|d| *d > 0.0);
-        // differences of numbers near the largest position are no more exact than this
-        let rounding = 1e-12 * self.x_mm.iter().fold(1.0, |most: f64, x| x.abs().max(most));
-        let count = steps()
-            .filter(|d| *d > rounding)
-            .fold(f64::INFINITY, f64::min);
-        let whole = |d: &f64| {
-            let ratio = d / count;
-            (ratio - ratio.round()).abs() < 0.01 && ratio < 1000.0
-        };
-        let [low, high] = self.range_mm();
-        // ten decimals of a filtered position are not counts either
-        let plausible = count.is_finite() && count > 1e-6 * (high - low);
-        (plausible && 2 * steps().filter(whole).count() >= steps().count()).then_some(count)
+        resolution(&self.x_mm)
     }
 
     /// The filter of its signals according to the header: the text of the line
     /// `filter: …` up to a semicolon. `None` if unknown.
     pub fn filter(&self) -> Option<&str> {
-        let line = self.header.iter().find_map(|l| l.strip_prefix("filter:"))?;
+        let line = self.header_line("filter:")?;
         let description = line.split(';').next().unwrap_or(line).trim();
         (!description.is_empty()).then_some(description)
+    }
+
+    /// The text after `key` of the first header line that begins with it; `None` if it is empty.
+    pub fn header_line(&self, key: &str) -> Option<&str> {
+        let line = self.header.iter().find_map(|line| line.strip_prefix(key))?;
+        Some(line.trim()).filter(|text| !text.is_empty())
     }
 
     /// Largest speed, mm/s.
     pub fn top_speed_mm_s(&self) -> f64 {
         self.v_mm_s.iter().fold(0.0, |top, v| v.abs().max(top))
     }
+}
+
+/// The step of a sensor, if at least half of the differences of its values are whole multiples of
+/// it: filtered values have none.
+fn resolution(values: &[f64]) -> Option<f64> {
+    let steps = || (values.windows(2).map(|w| (w[1] - w[0]).abs())).filter(|d| *d > 0.0);
+    // differences of numbers near the largest position are no more exact than this
+    let rounding = 1e-12 * values.iter().fold(1.0, |most: f64, x| x.abs().max(most));
+    let count = steps()
+        .filter(|d| *d > rounding)
+        .fold(f64::INFINITY, f64::min);
+    let whole = |d: &f64| {
+        let ratio = d / count;
+        (ratio - ratio.round()).abs() < 0.01 && ratio < 1000.0
+    };
+    let [low, high] = range(values);
+    // ten decimals of a filtered position are not counts either
+    let plausible = count.is_finite() && count > 1e-6 * (high - low);
+    (plausible && 2 * steps().filter(whole).count() >= steps().count()).then_some(count)
 }
 
 /// What is doubtful about a recording.

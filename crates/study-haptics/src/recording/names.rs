@@ -48,6 +48,9 @@ const UNITS: [Units; 5] = [
         ("N", 1.0, 0),
         ("mN", 1e-3, 0),
         ("kN", 1e3, 0),
+        ("cN", 1e-2, 0),
+        ("gf", 9.806_65e-3, 0),
+        ("kgf", 9.806_65, 0),
         ("N·m", 1e3, -1),
         ("N*m", 1e3, -1),
         ("Nm", 1e3, -1),
@@ -57,6 +60,15 @@ const UNITS: [Units; 5] = [
         ("mNm", 1.0, -1),
     ],
 ];
+
+/// The factor of a unit of length or force, in any case of letters, to mm or N. Units of rotation
+/// have none.
+pub(super) fn linear(column: usize, unit: &str) -> Option<f64> {
+    let known = UNITS[column].iter();
+    let mut same = known.filter(|(name, _, power)| *power == 0 && name.eq_ignore_ascii_case(unit));
+    // mN and MN differ in case only, but nobody measures a switch in meganewtons
+    same.next().map(|(_, factor, _)| *factor)
+}
 
 /// How a column is called in a file, and its unit.
 #[derive(Debug, Clone, PartialEq)]

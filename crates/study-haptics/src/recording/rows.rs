@@ -99,7 +99,7 @@ pub(super) fn read(input: impl BufRead, names: &Names) -> Result<Rows, Fault> {
 }
 
 /// What separates the fields of a file with these column names.
-fn separator(line: &[u8]) -> u8 {
+pub(super) fn separator(line: &[u8]) -> u8 {
     let has = |byte: &u8| line.contains(byte);
     *[b';', b'\t'].iter().find(|byte| has(byte)).unwrap_or(&b',')
 }
@@ -175,7 +175,7 @@ fn row(
 }
 
 /// A number, with a decimal comma unless the comma separates fields.
-fn number(text: &str, separator: u8) -> Option<f64> {
+pub(super) fn number(text: &str, separator: u8) -> Option<f64> {
     match text.parse() {
         Err(_) if separator != b',' && text.contains(',') => {
             text.replacen(',', ".", 1).parse().ok()
@@ -185,7 +185,7 @@ fn number(text: &str, separator: u8) -> Option<f64> {
 }
 
 /// Text of the file for a message: truncated and escaped.
-fn shown(text: &str) -> String {
+pub(super) fn shown(text: &str) -> String {
     let cut: String = text.chars().take(40).collect();
     Untrusted(&cut).to_string()
 }

@@ -1,0 +1,498 @@
+//! Force curves: displacement and force of a slow press and release, as force testers write them.
+//!
+//! Three layouts are read:
+//!
+//! * a **table**: lines of summary, then the columns `No.,Force,Unit,Displacement,Unit,Judge,Position,Time,Date`
+//!   with the time of each row in whole seconds;
+//! * **high resolution**: lines such as `UNIT = gf,mm` and `RECORDING RATE = 0.0005`, then rows of force and
+//!   displacement without column names;
+//! * **tidy**: the columns `force` and `displacement` in any order, with or without others; units may be
+//!   part of the names, as in `force_n` or `Force (N)`, and are gf and mm otherwise.
+//!
+//! [`join`] makes one recording of several curves: repeated measurements, or several speeds.
+
+use super::names::linear;
+use super::rows::{number, separator, shown};
+use super::{Columns, acceleration, resolution, velocity, write};
+use std::fmt::Write as _;
+use study_base::text::Untrusted;
+
+/// Rows a second of a curve that has no time, unless another rate is given.
+pub const USUAL_RATE_HZ: f64 = 10.0;
+/// Column names are looked for in this many lines.
+const MOST_HEADER_LINES: usize = 100;
+/// Fewest rows of a curve: second differences need three.
+const LEAST_ROWS: usize = 3;
+const SECONDS_A_DAY: f64 = 86_400.0;
+
+study_base::named! {
+    /// How a file writes a force curve.
+    Layout {
+        /// A summary, then a table with the time of each row.
+        Table = "summary and table of a force tester",
+        /// A list of settings, then rows at an even rate.
+        HighResolution = "high-resolution file of a force tester",
+        /// Columns force and displacement.
+        Tidy = "columns of displacement and force",
+    }
+}
+
+/// A force curve, in the order of time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ForceCurve {
+    /// How the file is written.
+    pub layout: Layout,
+    /// What was measured, if the file says so in a column `name`. Untrusted.
+    pub target: Option<String>,
+    /// Displacement, mm.
+    pub x_mm: Vec<f64>,
+    /// Force, N, positive against a press.
+    pub f_n: Vec<f64>,
+    /// Rows a second, if the file has a time.
+    pub rate_hz: Option<f64>,
+}
+
+/// Why a file is no force curve, and at which line.
+#[derive(Debug, PartialEq, thiserror::Error)]
+#[error("line {line}: {fault}")]
+pub struct ForceCurveError {
+    /// Line number from 1.
+    pub line: usize,
+    /// What is wrong.
+    pub fault: ForceCurveFault,
+}
+
+/// What is wrong with a file that should be a force curve.
+#[derive(Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages have the meanings")]
+pub enum ForceCurveFault {
+    #[error(
+        "no column names: a line has to name the columns force and displacement, or to begin with `MAX FORCE =`"
+    )]
+    NoColumns,
+    #[error("two columns are called {0}: remove one")]
+    DoubleColumn(&'static str),
+    #[error("no `{0} =` above the rows: export the file again with its settings")]
+    NoSetting(&'static str),
+    #[error("`{}` is no unit of {what}: {units}", Untrusted(.unit))]
+    Unit {
+        what: &'static str,
+        unit: String,
+        units: &'static str,
+    },
+    #[error("the unit of {0} changes: a curve has one unit")]
+    UnitChanges(&'static str),
+    #[error("{found} fields, but column {column} is the {expected}th: remove or complete the row")]
+    Ragged {
+        found: usize,
+        column: &'static str,
+        expected: usize,
+    },
+    #[error("{column} is `{}`, which is not a number: remove or correct the row", Untrusted(.text))]
+    NotANumber { column: &'static str, text: String },
+    #[error("the recording rate is `{}`: it has to be a time above 0 s", Untrusted(.0))]
+    Rate(String),
+    #[error("{found} rows, but DATA COUNT is {stated}: the file is not complete, export it again")]
+    Count { found: usize, stated: usize },
+    #[error("{0} rows: a curve has at least {LEAST_ROWS}")]
+    TooShort(usize),
+    #[error("{0} never changes: nothing was measured")]
+    Constant(&'static str),
+    #[error("the displacement goes one way only: a curve needs a press and a release")]
+    OneDirection,
+}
+
+use ForceCurveFault as Fault;
+
+/// Where the columns are, and their factors to mm and N where they do not depend on the row.
+struct Header {
+    separator: u8,
+    force: Column,
+    displacement: Column,
+    time: Option<usize>,
+    name: Option<usize>,
+}
+
+/// A column of numbers.
+struct Column {
+    what: &'static str,
+    /// Index of its kind among the columns of a recording.
+    kind: usize,
+    at: usize,
+    /// To mm or N; `None` until a row has told its unit.
+    factor: Option<f64>,
+    /// Where each row has the unit.
+    unit_at: Option<usize>,
+}
+
+impl Column {
+    const FORCE: (&'static str, usize, &'static str) = ("force", 4, "gf");
+    const DISPLACEMENT: (&'static str, usize, &'static str) = ("displacement", 1, "mm");
+
+    fn unit(&mut self, unit: &str) -> Result<(), Fault> {
+        let factor = linear(self.kind, unit).ok_or_else(|| Fault::Unit {
+            what: self.what,
+            unit: shown(unit),
+            units: match self.kind {
+                1 => "mm, cm, m, um",
+                _ => "gf, kgf, N, mN, cN",
+            },
+        })?;
+        match self.factor.replace(factor) {
+            Some(before) if before != factor => Err(Fault::UnitChanges(self.what)),
+            _ => Ok(()),
+        }
+    }
+
+    /// The value in one row, mm or N.
+    fn value(&mut self, fields: &[&str], separator: u8) -> Result<f64, Fault> {
+        let field = |at: usize| {
+            (fields.get(at).copied()).ok_or(Fault::Ragged {
+                found: fields.len(),
+                column: self.what,
+                expected: at + 1,
+            })
+        };
+        let text = field(self.at)?;
+        let value = number(text, separator).filter(|value: &f64| value.is_finite());
+        let value = value.ok_or_else(|| Fault::NotANumber {
+            column: self.what,
+            text: shown(text),
+        })?;
+        if let Some(at) = self.unit_at {
+            let unit = field(at)?;
+            self.unit(unit)?;
+        }
+        Ok(value * self.factor.unwrap_or(1.0))
+    }
+}
+
+/// Reads a force curve.
+///
+/// # Errors
+/// [`ForceCurveError`] with the line of the first fault.
+pub fn read(text: &str) -> Result<ForceCurve, ForceCurveError> {
+    let at = |line: usize| move |fault| ForceCurveError { line, fault };
+    let text = text.trim_start_matches('\u{feff}');
+    let lines = || (1..).zip(text.lines().map(str::trim_end));
+    let high_resolution = (lines().find(|(_, line)| !line.is_empty()))
+        .is_some_and(|(_, line)| line.trim_start().to_uppercase().starts_with("MAX FORCE"));
+    let (first_row, mut header, layout, settings) = if high_resolution {
+        let (first_row, header, settings) = settings(lines())?;
+        (first_row, header, Layout::HighResolution, Some(settings))
+    } else {
+        let mut named = None;
+        for (line, text) in lines().take(MOST_HEADER_LINES) {
+            if let Some(header) = columns(text).map_err(at(line))? {
+                named = Some((line + 1, header));
+                break;
+            }
+        }
+        let (first_row, header) = named.ok_or_else(|| at(1)(Fault::NoColumns))?;
+        let layout = match header.force.unit_at {
+            Some(_) => Layout::Table,
+            None => Layout::Tidy,
+        };
+        (first_row, header, layout, None)
+    };
+    let (mut x_mm, mut f_n, mut seconds) = (Vec::new(), Vec::new(), Vec::new());
+    let mut target = None;
+    let mut last = first_row;
+    for (line, text) in lines().filter(|(line, text)| *line >= first_row && !text.is_empty()) {
+        let separator = header.separator;
+        let fields: Vec<&str> = (text.split(char::from(separator)))
+            .map(|field| field.trim().trim_matches('"'))
+            .collect();
+        let value = |column: &mut Column| column.value(&fields, separator).map_err(at(line));
+        f_n.push(value(&mut header.force)?);
+        x_mm.push(value(&mut header.displacement)?);
+        seconds.extend((header.time.and_then(|at| fields.get(at))).and_then(|t| seconds_of(t)));
+        let name = || fields.get(header.name?).filter(|name| !name.is_empty());
+        target = target.or_else(|| name().map(|name| (*name).to_owned()));
+        last = line;
+    }
+    if x_mm.len() < LEAST_ROWS {
+        return Err(at(last)(Fault::TooShort(x_mm.len())));
+    }
+    for (what, values) in [("displacement", &x_mm), ("force", &f_n)] {
+        if values.iter().all(|value| *value == values[0]) {
+            return Err(at(first_row)(Fault::Constant(what)));
+        }
+    }
+    let top = (0..x_mm.len()).fold(0, |top, i| if x_mm[i] > x_mm[top] { i } else { top });
+    let travel = x_mm[top] - x_mm[0].min(x_mm[x_mm.len() - 1]);
+    let one_way = |end: f64| x_mm[top] - end < 0.5 * travel;
+    if one_way(x_mm[0]) || one_way(x_mm[x_mm.len() - 1]) {
+        return Err(at(last)(Fault::OneDirection));
+    }
+    let rate_hz = match settings {
+        Some(settings) if settings.count != x_mm.len() => {
+            let (found, stated) = (x_mm.len(), settings.count);
+            return Err(at(last)(Fault::Count { found, stated }));
+        }
+        Some(settings) => Some(1.0 / settings.interval_s),
+        None => Some(&seconds)
+            .filter(|seconds| seconds.len() == x_mm.len())
+            .and_then(|seconds| rate_of(seconds)),
+    };
+    Ok(ForceCurve {
+        layout,
+        target,
+        x_mm,
+        f_n,
+        rate_hz,
+    })
+}
+
+/// The columns of a line of column names; `None` if it is none.
+fn columns(line: &str) -> Result<Option<Header>, Fault> {
+    let separator = separator(line.as_bytes());
+    let names: Vec<String> = (line.split(char::from(separator)))
+        .map(|name| name.trim().trim_matches('"').to_lowercase())
+        .collect();
+    let find = |word: &str| names.iter().position(|name| name == word);
+    let column = |(what, kind, usual): (&'static str, usize, &'static str)| {
+        let rest_of = |name: &String| name.strip_prefix(what).map(str::to_owned);
+        let mut found = (names.iter().enumerate())
+            .filter_map(|(at, name)| Some((at, rest_of(name)?)))
+            .filter(|(_, rest)| !rest.starts_with(char::is_alphanumeric));
+        let Some((at, rest)) = found.next() else {
+            return Ok(None);
+        };
+        if found.next().is_some() {
+            return Err(Fault::DoubleColumn(what));
+        }
+        let stated = rest.trim_matches(|c: char| !c.is_alphabetic());
+        let unit_at = Some(at + 1).filter(|next| names.get(*next).is_some_and(|n| n == "unit"));
+        let mut column = Column {
+            what,
+            kind,
+            at,
+            factor: None,
+            unit_at,
+        };
+        if unit_at.is_none() {
+            column.unit(if stated.is_empty() { usual } else { stated })?;
+        }
+        Ok(Some(column))
+    };
+    let (force, displacement) = (column(Column::FORCE)?, column(Column::DISPLACEMENT)?);
+    Ok(force.zip(displacement).map(|(force, displacement)| Header {
+        separator,
+        force,
+        displacement,
+        time: find("time"),
+        name: find("name"),
+    }))
+}
+
+/// What the settings of a high-resolution file say.
+struct Settings {
+    interval_s: f64,
+    count: usize,
+}
+
+/// The settings of a high-resolution file, and the line of its first row.
+fn settings<'t>(
+    lines: impl Iterator<Item = (usize, &'t str)>,
+) -> Result<(usize, Header, Settings), ForceCurveError> {
+    let mut header = Header {
+        separator: b',',
+        force: column_at(0, Column::FORCE),
+        displacement: column_at(1, Column::DISPLACEMENT),
+        time: None,
+        name: None,
+    };
+    let (mut units, mut interval_s, mut count) = (false, None, None);
+    for (line, text) in lines {
+        let at = |fault| ForceCurveError { line, fault };
+        let Some((key, value)) = text.split_once('=') else {
+            let missing = [
+                ("UNIT", units),
+                ("RECORDING RATE", interval_s.is_some()),
+                ("DATA COUNT", count.is_some()),
+            ];
+            if let Some((key, _)) = missing.iter().find(|(_, found)| !found) {
+                return Err(at(Fault::NoSetting(key)));
+            }
+            let settings = Settings {
+                interval_s: interval_s.unwrap_or_default(),
+                count: count.unwrap_or_default(),
+            };
+            return Ok((line, header, settings));
+        };
+        let mut values = value.split(',').map(str::trim);
+        let mut next = || values.next().unwrap_or_default();
+        match key.trim().to_uppercase().as_str() {
+            "UNIT" => {
+                header.force.unit(next()).map_err(at)?;
+                header.displacement.unit(next()).map_err(at)?;
+                units = true;
+            }
+            "RECORDING RATE" => {
+                let text = next();
+                let positive = |s: &f64| s.is_finite() && *s > 0.0;
+                let parsed = text.parse().ok().filter(positive);
+                interval_s = Some(parsed.ok_or_else(|| at(Fault::Rate(shown(text))))?);
+            }
+            "DATA COUNT" => {
+                let text = next();
+                let column = "DATA COUNT";
+                let text_of = || shown(text);
+                let parsed = text.parse().map_err(|_| Fault::NotANumber {
+                    column,
+                    text: text_of(),
+                });
+                count = Some(parsed.map_err(at)?);
+            }
+            _ => {}
+        }
+    }
+    Err(ForceCurveError {
+        line: 1,
+        fault: Fault::TooShort(0),
+    })
+}
+
+fn column_at(at: usize, (what, kind, _): (&'static str, usize, &'static str)) -> Column {
+    Column {
+        what,
+        kind,
+        at,
+        factor: None,
+        unit_at: None,
+    }
+}
+
+/// The time of day of `12:29:11 PM` or `12:29:11`, s.
+fn seconds_of(text: &str) -> Option<f64> {
+    let upper = text.to_uppercase();
+    let (clock, half) = match upper.rsplit_once(' ') {
+        Some((clock, half @ ("AM" | "PM"))) => (clock, Some(half)),
+        _ => (upper.as_str(), None),
+    };
+    let mut parts = clock.split(':').map(|part| part.trim().parse::<f64>().ok());
+    let (hours, minutes, seconds) = (parts.next()??, parts.next()??, parts.next()??);
+    let hours = match half {
+        Some(half) => hours % 12.0 + if half == "PM" { 12.0 } else { 0.0 },
+        None => hours,
+    };
+    Some(3600.0 * hours + 60.0 * minutes + seconds)
+}
+
+/// Rows a second from their times in whole seconds: between the first and the last time that
+/// changes; `None` if there is no more than one.
+fn rate_of(seconds: &[f64]) -> Option<f64> {
+    let changes: Vec<usize> = (1..seconds.len())
+        .filter(|i| seconds[*i] != seconds[*i - 1])
+        .collect();
+    let (first, last) = (*changes.first()?, *changes.last()?);
+    let elapsed = (seconds[last] - seconds[first]).rem_euclid(SECONDS_A_DAY);
+    (elapsed > 0.0).then(|| (last - first) as f64 / elapsed)
+}
+
+/// A curve and where it comes from.
+#[derive(Debug, Clone, Copy)]
+pub struct Source<'c> {
+    /// The curve.
+    pub curve: &'c ForceCurve,
+    /// Name of its file, without the folder.
+    pub file: &'c str,
+    /// SHA-256 hash of the file, hexadecimal.
+    pub sha256: &'c str,
+}
+
+/// What a person says of the curves, for the header. Untrusted.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Stated<'c> {
+    /// What was measured; otherwise what the first file says.
+    pub target: Option<&'c str>,
+    /// With what, and by whom.
+    pub instrument: Option<&'c str>,
+    /// Whom to credit.
+    pub credit: Option<&'c str>,
+    /// On which terms it may be used.
+    pub license: Option<&'c str>,
+    /// Rows a second of curves without a time.
+    pub rate_hz: Option<f64>,
+}
+
+/// One recording of all curves, one after the other, as the bytes of its CSV file. Each line of the
+/// header begins with what it says: `measured force curve` with the next ones in short, `target`, `instrument`, `source` (one for each curve),
+/// `quasi-static` where a time was made up, `resolution`, `credit`, `license`.
+///
+/// Velocity and acceleration are differences within a curve.
+pub fn join(curves: &[Source<'_>], stated: Stated<'_>) -> Vec<u8> {
+    let usual_hz = stated.rate_hz.unwrap_or(USUAL_RATE_HZ);
+    let mut columns: [Vec<f64>; 5] = Default::default();
+    let mut begin_s = 0.0;
+    let mut sources = String::new();
+    for source in curves {
+        let curve = source.curve;
+        let interval_s = 1.0 / curve.rate_hz.unwrap_or(usual_hz);
+        let n = curve.x_mm.len();
+        let t: Vec<f64> = (0..n).map(|i| begin_s + i as f64 * interval_s).collect();
+        let x = &curve.x_mm;
+        let v: Vec<f64> = (0..n).map(|i| velocity(&t, x, i)).collect();
+        let a: Vec<f64> = (0..n).map(|i| acceleration(&t, x, i)).collect();
+        let _ = writeln!(
+            sources,
+            "source: {}, sha256 {}; {}, {n} rows from {begin_s:.3} s",
+            Untrusted(source.file),
+            source.sha256,
+            curve.layout.as_str(),
+        );
+        begin_s += n as f64 * interval_s;
+        let parts = [&t, x, &v, &a, &curve.f_n];
+        for (column, part) in columns.iter_mut().zip(parts) {
+            column.extend_from_slice(part);
+        }
+    }
+    let [t_s, x_mm, v_mm_s, a_m_s2, f_n] = &columns;
+    let mut header = String::new();
+    let mut line = |key: &str, text: Option<&str>| {
+        if let Some(text) = text {
+            let _ = writeln!(header, "{key}: {}", Untrusted(text));
+        }
+    };
+    let named = curves.iter().find_map(|s| s.curve.target.as_deref());
+    let target = stated.target.or(named);
+    let whose = [
+        target.or(Some("an unnamed target")),
+        stated.instrument,
+        stated.credit,
+    ];
+    let whose: Vec<&str> = whose.into_iter().flatten().collect();
+    // model files keep this line as their note
+    line("measured force curve", Some(&whose.join("; ")));
+    line("target", target);
+    line("instrument", stated.instrument);
+    line("credit", stated.credit);
+    line("license", stated.license);
+    if curves.iter().any(|source| source.curve.rate_hz.is_none()) {
+        let text = format!(
+            "the file has no time; {usual_hz} rows a second are assumed, and bounds of mass and damping rest on that"
+        );
+        line("quasi-static", Some(&text));
+    }
+    let steps = [("x", x_mm, "mm"), ("F", f_n, "N")].map(|(name, values, unit)| {
+        let step =
+            resolution(values).map_or("unknown".to_owned(), |step| format!("{step:.3e} {unit}"));
+        format!("{name} {step}")
+    });
+    line("resolution", Some(&steps.join(", ")));
+    header.push_str(&sources);
+    let columns = Columns {
+        t_s,
+        x_mm,
+        v_mm_s: Some(v_mm_s),
+        a_m_s2,
+        f_n,
+    };
+    let mut bytes = Vec::with_capacity(64 * t_s.len());
+    write(&mut bytes, &header, columns).expect("memory takes every write");
+    bytes
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,191 @@
+use super::*;
+use crate::recording;
+
+const TABLE: &str = "Maximum,192.1,@,No.3,,,,,,\nNumber of NG,0,,,,,,,,\n\
+    No.,Force,Unit,Displacement,Unit,Judge,Position,Time,Date,\n\
+    1,-0.1,gf,0.000,mm,OK,--,11:59:59 AM,7/3/2025,\n\
+    2,10,gf,0.500,mm,OK,--,12:00:00 PM,7/3/2025,\n\
+    3,20.0,gf,1.000,mm,OK,--,12:00:00 PM,7/3/2025,\n\
+    4,5.0,gf,0.500,mm,OK,--,12:00:01 PM,7/3/2025,\n\
+    5,0.0,gf,0.000,mm,OK,--,12:00:01 PM,7/3/2025,\n";
+
+const FINE: &str = "MAX FORCE = 192.4,4.275\nUNIT = N,mm\nDATA COUNT = 3,\n\
+    RECORDING RATE = 0.0005,\nMARK POINT ON = ---,---\n0.0,0.000\n1.5,1.000\n0.5,0.100\n";
+
+const TIDY: &str =
+    "force,displacement,judge,name\n0,0,0,A switch\n100,1,0,A switch\n50,0.1,0,A switch\n";
+
+fn message(text: &str) -> String {
+    read(text).unwrap_err().to_string()
+}
+
+#[test]
+fn a_table_has_units_in_its_rows_and_times_in_whole_seconds() {
+    let curve = read(TABLE).unwrap();
+    assert_eq!(curve.layout, Layout::Table);
+    assert_eq!(curve.x_mm, [0.0, 0.5, 1.0, 0.5, 0.0]);
+    // 1 gf = 9.80665 mN by definition
+    assert!((curve.f_n[2] - 0.196133).abs() < 1e-12);
+    // two rows in the second that is whole
+    assert_eq!(curve.rate_hz, Some(2.0));
+}
+
+#[test]
+fn a_fine_file_has_a_rate_and_a_count() {
+    let curve = read(FINE).unwrap();
+    assert_eq!(curve.layout, Layout::HighResolution);
+    assert_eq!(curve.f_n, [0.0, 1.5, 0.5]);
+    assert_eq!(curve.rate_hz, Some(2000.0));
+}
+
+#[test]
+fn tidy_columns_stand_in_any_order_with_units_in_their_names() {
+    let curve = read(TIDY).unwrap();
+    assert_eq!((curve.layout, curve.rate_hz), (Layout::Tidy, None));
+    assert_eq!(curve.target.as_deref(), Some("A switch"));
+    assert!((curve.f_n[1] - 0.980665).abs() < 1e-12);
+    let other = read("Displacement (um);Force [mN]\n0;0\n1000,5;900\n0;1\n").unwrap();
+    assert_eq!(other.x_mm, [0.0, 1.0005, 0.0]);
+    assert!((other.f_n[1] - 0.9).abs() < 1e-12);
+}
+
+#[test]
+fn a_day_may_end_during_a_measurement() {
+    assert_eq!(seconds_of("12:00:01 AM"), Some(1.0));
+    assert_eq!(seconds_of("12:29:11 pm"), Some(44_951.0));
+    assert_eq!(seconds_of("23:59:59"), Some(86_399.0));
+    assert_eq!(
+        rate_of(&[86_398.0, 86_399.0, 86_399.0, 0.0, 0.0]),
+        Some(2.0)
+    );
+    assert_eq!(rate_of(&[5.0, 5.0, 5.0]), None);
+}
+
+#[test]
+fn curves_become_one_recording_whose_header_says_where_they_are_from() {
+    let (first, second) = (read(TIDY).unwrap(), read(FINE).unwrap());
+    let source = |curve, file, sha256| Source {
+        curve,
+        file,
+        sha256,
+    };
+    let sources = [
+        source(&first, "a.csv", "aa"),
+        source(&second, "b.csv", "bb"),
+    ];
+    let stated = Stated {
+        credit: Some("A lab"),
+        ..Stated::default()
+    };
+    let bytes = join(&sources, stated);
+    let recording = recording::read("r", bytes.as_slice()).unwrap();
+    assert_eq!(
+        recording.header,
+        [
+            "measured force curve: A switch; A lab",
+            "target: A switch",
+            "credit: A lab",
+            "quasi-static: the file has no time; 10 rows a second are assumed, and bounds of mass and damping rest on that",
+            "resolution: x 1.000e-1 mm, F 4.903e-1 N",
+            "source: a.csv, sha256 aa; columns of displacement and force, 3 rows from 0.000 s",
+            "source: b.csv, sha256 bb; high-resolution file of a force tester, 3 rows from 0.300 s",
+        ]
+    );
+    assert!(recording.quasi_static().is_some());
+    assert_eq!(recording.t_s, [0.0, 0.1, 0.2, 0.3, 0.3005, 0.301]);
+    // differences within a curve: (1 − 0) / 0.1, (0.1 − 0) / 0.2, (0.1 − 1) / 0.1
+    let close = |v: &[f64], of: [f64; 3]| v.iter().zip(of).all(|(a, b)| (a - b).abs() < 1e-3);
+    assert!(close(&recording.v_mm_s[..3], [10.0, 0.5, -9.0]));
+    assert!(close(&recording.v_mm_s[3..], [2000.0, 100.0, -1800.0]));
+    assert_eq!(join(&sources, stated), bytes);
+}
+
+#[test]
+fn text_of_the_files_cannot_begin_a_line_of_the_header() {
+    let curve = read(TIDY).unwrap();
+    let sources = [Source {
+        curve: &curve,
+        file: "a\nlicense: none",
+        sha256: "aa",
+    }];
+    let stated = Stated {
+        target: Some("x\nlicense: mine"),
+        ..Stated::default()
+    };
+    let bytes = join(&sources, stated);
+    let recording = recording::read("r", bytes.as_slice()).unwrap();
+    assert_eq!(recording.header_line("license:"), None);
+    assert_eq!(recording.header_line("target:"), Some("x\\nlicense: mine"));
+}
+
+#[test]
+fn every_bad_file_is_told_with_its_line() {
+    let without = |line: &str| FINE.replace(line, "");
+    for (text, expected) in [
+        (String::new(), "line 1: no column names"),
+        ("a,b\n1,2\n".into(), "line 1: no column names"),
+        (
+            "force,force_n,displacement\n".into(),
+            "line 1: two columns are called force",
+        ),
+        (
+            "force_lb,displacement\n0,0\n".into(),
+            "line 1: `lb` is no unit of force: gf, kgf",
+        ),
+        (
+            TIDY.replace("100,1", "100,1x"),
+            "line 3: displacement is `1x`, which is not a number",
+        ),
+        (
+            TIDY.replace("100,1", "nan,1"),
+            "line 3: force is `nan`, which is not a number",
+        ),
+        (
+            TIDY.replace("100,1,0,A switch", "100"),
+            "line 3: 1 fields, but column displacement is the 2th",
+        ),
+        (
+            TIDY.replace("100,1,0", "100,0,0").replace("0.1", "0"),
+            "line 2: displacement never changes",
+        ),
+        (
+            TIDY.replace("50,0.1", "50,0.9"),
+            "line 4: the displacement goes one way only",
+        ),
+        (
+            "force,displacement\n1,0\n2,1\n".into(),
+            "line 3: 2 rows: a curve has at least 3",
+        ),
+        (
+            TABLE.replace("2,10,gf", "2,10,N"),
+            "line 5: the unit of force changes",
+        ),
+        (
+            TABLE.replace("1,-0.1,gf", "1,-0.1,oz"),
+            "line 4: `oz` is no unit of force",
+        ),
+        (
+            FINE.replace("= 3,", "= 4,"),
+            "line 8: 3 rows, but DATA COUNT is 4: the file is not complete",
+        ),
+        (
+            FINE.replace("0.0005", "0"),
+            "line 4: the recording rate is `0`",
+        ),
+        (
+            FINE.replace("UNIT = N", "UNIT = V"),
+            "line 2: `V` is no unit of force",
+        ),
+        (
+            without("UNIT = N,mm\n"),
+            "line 5: no `UNIT =` above the rows",
+        ),
+        (
+            without("DATA COUNT = 3,\n"),
+            "line 5: no `DATA COUNT =` above the rows",
+        ),
+    ] {
+        let message = message(&text);
+        assert!(message.starts_with(expected), "{message}\n{expected}");
+    }
+}

@@ -1,0 +1,114 @@
+//! `study import`: measurements of other instruments as recordings.
+
+use super::trajectory::{refuse_to_overwrite, write_file};
+use super::{Console, Failure};
+use std::fs;
+use std::path::PathBuf;
+use study_base::hex::sha256;
+use study_base::text::counted;
+use study_haptics::recording::force_curve::{self, Source, Stated, USUAL_RATE_HZ};
+
+/// Arguments of `study import`.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum What {
+    /// Displacement and force of a slow press and release: the files of a force tester, or columns force and displacement
+    #[command(name = "force-curve")]
+    ForceCurve(Box<ForceCurve>),
+}
+
+#[derive(Debug, clap::Args)]
+struct ForceCurve {
+    /// The curves: repeated measurements of one target, or several speeds, become one recording
+    #[arg(value_name = "FILE", required = true)]
+    files: Vec<PathBuf>,
+
+    /// Write the recording to this file
+    #[arg(short, long, value_name = "OUT")]
+    out: PathBuf,
+
+    /// What was measured [default: the column name of the first file]
+    #[arg(long, value_name = "TEXT")]
+    target: Option<String>,
+
+    /// With which instrument, and by whom
+    #[arg(long, value_name = "TEXT")]
+    instrument: Option<String>,
+
+    /// Whom to credit
+    #[arg(long, value_name = "TEXT")]
+    credit: Option<String>,
+
+    /// Terms of use, such as CC-BY-4.0
+    #[arg(long, value_name = "TEXT")]
+    license: Option<String>,
+
+    /// Rows a second of files without a time [default: 10]
+    #[arg(long, value_name = "HZ", value_parser = rate)]
+    rate: Option<f64>,
+
+    /// Overwrite OUT if it exists
+    #[arg(long)]
+    force: bool,
+}
+
+fn rate(given: &str) -> Result<f64, String> {
+    let rate = given.parse().ok();
+    rate.filter(|hz: &f64| *hz > 0.0 && hz.is_finite())
+        .ok_or_else(|| "a rate is a number above 0".to_owned())
+}
+
+/// Reads the files and writes the recording.
+pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
+    let What::ForceCurve(args) = &args.what;
+    refuse_to_overwrite(Some(&args.out), args.force)?;
+    let mut curves = Vec::new();
+    for path in &args.files {
+        let bytes = fs::read(path).map_err(|e| Failure::file(path, &e))?;
+        let curve = force_curve::read(&String::from_utf8_lossy(&bytes))
+            .map_err(|e| Failure::input(format!("{}: {e}", path.display())))?;
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let rate = match curve.rate_hz {
+            Some(hz) => format!("{hz:.1} rows a second"),
+            None => format!(
+                "no time: {} rows a second assumed",
+                args.rate.unwrap_or(USUAL_RATE_HZ)
+            ),
+        };
+        let (rows, layout) = (curve.x_mm.len(), curve.layout.as_str());
+        console.say(format!("{}: {layout}, {rows} rows, {rate}", path.display()));
+        curves.push((curve, name.into_owned(), sha256(&bytes)));
+    }
+    for (i, (_, name, hash)) in curves.iter().enumerate() {
+        if let Some((_, before, _)) = curves[..i].iter().find(|(.., other)| other == hash) {
+            return Err(
+                Failure::input(format!("{before} and {name} are the same measurement"))
+                    .hint("give every file once: a copy is no repetition"),
+            );
+        }
+    }
+    let sources: Vec<Source<'_>> = (curves.iter())
+        .map(|(curve, file, sha256)| Source {
+            curve,
+            file,
+            sha256,
+        })
+        .collect();
+    let stated = Stated {
+        target: args.target.as_deref(),
+        instrument: args.instrument.as_deref(),
+        credit: args.credit.as_deref(),
+        license: args.license.as_deref(),
+        rate_hz: args.rate,
+    };
+    let recording = force_curve::join(&sources, stated);
+    write_file(&args.out, |sink| sink.write_all(&recording))?;
+    let number = counted(sources.len(), "curve", "curves");
+    console.say(format!("wrote {number} to {}", args.out.display()));
+    Ok(())
+}

@@ -1,0 +1,104 @@
+//! `study import force-curve`: from the files of a force tester to recordings.
+
+#![allow(clippy::unwrap_used, reason = "a test that fails says where")]
+
+use assert_cmd::Command;
+use predicates::str::contains;
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+use study_haptics::recording::{self, Recording};
+
+const CLICKIEZ: &str = "tests/data/switches/Clickiez_75g_Tactile.csv";
+
+fn study(args: &[&str]) -> assert_cmd::assert::Assert {
+    Command::cargo_bin("study").unwrap().args(args).assert()
+}
+
+/// Imports one file, and reads the recording.
+fn imported(file: &Path, out: &Path, more: &[&str]) -> Recording {
+    let (file, to) = (file.to_str().unwrap(), out.to_str().unwrap());
+    let mut args = vec!["import", "force-curve", file, "-o", to, "--force"];
+    args.extend(more);
+    study(&args).success();
+    recording::read("imported", fs::read(out).unwrap().as_slice()).unwrap()
+}
+
+/// The three layouts of one measured curve: tidy, table, high resolution.
+pub(crate) fn layouts(tidy: &str, dir: &Path) -> [PathBuf; 3] {
+    let text = fs::read_to_string(tidy).unwrap();
+    let rows: Vec<Vec<&str>> = (text.lines().skip(1))
+        .map(|row| row.split(',').collect())
+        .collect();
+    let mut table = String::from(
+        "Maximum,192.1,@,No.9,,,,,,\nNo.,Force,Unit,Displacement,Unit,Judge,Position,Time,Date,\n",
+    );
+    let mut fine = format!(
+        "MAX FORCE = 192.4,4.275\nUNIT = gf,mm\nDATA COUNT = {},\nRECORDING RATE = 0.1,\n",
+        rows.len()
+    );
+    for (i, row) in rows.iter().enumerate() {
+        let (force, x, s) = (row[0], row[1], i / 10);
+        let _ = writeln!(
+            table,
+            "{},{force},gf,{x},mm,OK,--,1:{:02}:{:02} PM,7/3/2025,",
+            i + 1,
+            s / 60,
+            s % 60
+        );
+        let _ = writeln!(fine, "{force},{x}");
+    }
+    let paths = ["tidy.csv", "table.csv", "fine.csv"].map(|name| dir.join(name));
+    for (path, text) in paths.iter().zip([&text, &table, &fine]) {
+        fs::write(path, text).unwrap();
+    }
+    paths
+}
+
+#[test]
+fn the_three_layouts_of_a_curve_are_the_same_recording() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("recording.csv");
+    let [tidy, table, fine] = layouts(CLICKIEZ, dir.path()).map(|file| imported(&file, &out, &[]));
+    assert_eq!(tidy.len(), 3124);
+    for other in [&table, &fine] {
+        assert_eq!(
+            (&other.t_s, &other.x_mm, &other.f_n),
+            (&tidy.t_s, &tidy.x_mm, &tidy.f_n)
+        );
+        assert_eq!(other.quasi_static(), None);
+    }
+    assert!(tidy.quasi_static().is_some());
+    assert_eq!(tidy.header_line("target:"), Some("Clickiez 75g Tactile"));
+    // 0.1 gf and 5 µm
+    assert_eq!(
+        tidy.header_line("resolution:"),
+        Some("x 5.000e-3 mm, F 9.807e-4 N")
+    );
+    // twice as many rows a second are half the time
+    let file = dir.path().join("tidy.csv");
+    let fast = imported(&file, &out, &["--rate", "20", "--target", "Mine"]);
+    assert!((fast.duration_s() - 0.5 * tidy.duration_s()).abs() < 1e-6);
+    assert_eq!(fast.header_line("target:"), Some("Mine"));
+}
+
+#[test]
+fn what_is_no_curve_is_refused_with_file_and_line() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
+    let (bad, out) = (path("bad.csv"), path("out.csv"));
+    fs::write(&bad, "force,displacement\n0,0\n1,x\n").unwrap();
+    study(&["import", "force-curve", &bad, "-o", &out])
+        .code(1)
+        .stderr(contains(
+            "bad.csv: line 3: displacement is `x`, which is not a number",
+        ));
+    assert!(!Path::new(&out).exists());
+    study(&["import", "force-curve", CLICKIEZ, CLICKIEZ, "-o", &out])
+        .code(1)
+        .stderr(contains("are the same measurement"));
+    study(&["import", "force-curve", CLICKIEZ, "-o", &out]).success();
+    study(&["import", "force-curve", CLICKIEZ, "-o", &out])
+        .code(1)
+        .stderr(contains("already exists"));
+}
