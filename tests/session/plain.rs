@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io::{Read as _, Write};
 use std::path::Path;
-use std::sync::mpsc::{Receiver, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
 /// `study` with its lines.
@@ -94,13 +94,11 @@ impl Lines {
                 }
             }
             assert!(begin.elapsed() < PATIENCE, "{starts:?}:\n{}", self.seen);
-            let interval = Duration::from_millis(100);
-            if let Ok(bytes) = self.output.recv_timeout(interval) {
-                self.seen.push_str(&String::from_utf8_lossy(&bytes));
-            } else if let Ok(Some(_)) = self.child.try_wait()
-                && !self.seen[self.read..].contains('\n')
-            {
-                return String::new();
+            // The output ends after its last bytes, and the program may end before them.
+            match self.output.recv_timeout(Duration::from_millis(100)) {
+                Ok(bytes) => self.seen.push_str(&String::from_utf8_lossy(&bytes)),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return String::new(),
             }
         }
     }
