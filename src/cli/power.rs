@@ -5,11 +5,9 @@ mod shards;
 mod slurm;
 
 use super::{Console, Failure};
-use indicatif::ProgressBar;
-use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use study_analysis::load;
-use study_analysis::power::{CHUNK, Cell, CellResult, Chunk, Plan, enough, merge, run_chunk};
+use study_analysis::power::{CHUNK, Plan, Progress};
 use study_base::text::Untrusted;
 use study_report::picture::png::Painter;
 use study_report::power::{Report, document, figure, head, results};
@@ -59,22 +57,6 @@ pub(super) struct Args {
     tasks: Option<u64>,
 }
 
-/// A cell and one of its chunks.
-pub(super) type Unit = (Cell, u64);
-
-/// All units of work, in order.
-fn units(plan: &Plan) -> Vec<Unit> {
-    units_of(plan, &plan.cells())
-}
-
-/// The units of some cells.
-pub(super) fn units_of(plan: &Plan, cells: &[Cell]) -> Vec<Unit> {
-    let chunks = plan.settings.chunks();
-    (cells.iter().copied())
-        .flat_map(|cell| (0..chunks).map(move |chunk| (cell, chunk)))
-        .collect()
-}
-
 /// What a unit of work is, for people.
 fn unit(plan: &Plan) -> &'static str {
     match plan.settings.chunk() {
@@ -83,88 +65,25 @@ fn unit(plan: &Plan) -> &'static str {
     }
 }
 
-/// Runs units on all threads, with a progress bar; the results are in their order.
-pub(super) fn simulate(
+/// Works on so many threads, or on all, with a progress bar of units.
+pub(super) fn on_threads<T: Send>(
     plan: &Plan,
-    units: &[Unit],
+    units: usize,
     threads: Option<u16>,
-) -> Result<Vec<Chunk>, Failure> {
-    let bar = super::console::progress(units.len() as u64, unit(plan));
-    let found = simulate_with(plan, units, threads, &bar);
-    bar.finish_and_clear();
-    found
-}
-
-fn simulate_with(
-    plan: &Plan,
-    units: &[Unit],
-    threads: Option<u16>,
-    bar: &ProgressBar,
-) -> Result<Vec<Chunk>, Failure> {
-    let work = || {
-        (units.par_iter().with_max_len(1))
-            .map(|(cell, chunk)| {
-                let found = run_chunk(&plan.settings, cell, *chunk);
-                bar.inc(1);
-                found
-            })
-            .collect()
-    };
+    work: impl FnOnce(Progress<'_>) -> T + Send,
+) -> Result<T, Failure> {
+    let bar = super::console::progress(units as u64, unit(plan));
+    let progress = || bar.inc(1);
     let found = match threads {
-        None => work(),
+        None => work(&progress),
         Some(threads) => rayon::ThreadPoolBuilder::new()
             .num_threads(usize::from(threads))
             .build()
             .map_err(Failure::input)?
-            .install(work),
+            .install(|| work(&progress)),
     };
-    Ok(found)
-}
-
-/// Simulates all cells, each until its interval is narrow enough or it has all its studies.
-/// The chunks of a unit that was not needed are missing. One chunk of each open cell is done
-/// at a time, so that threads decide nothing.
-fn simulate_until(
-    plan: &Plan,
-    units: &[Unit],
-    within: f64,
-    threads: Option<u16>,
-) -> Result<Vec<Option<Chunk>>, Failure> {
-    let bar = super::console::progress(units.len() as u64, unit(plan));
-    let mut found: Vec<Option<Chunk>> = vec![None; units.len()];
-    for index in 0..plan.settings.chunks() {
-        let mut places = Vec::new();
-        let mut start = 0;
-        for same in units.chunk_by(|a, b| a.0 == b.0) {
-            let done = found[start..start + same.len()].iter().flatten();
-            if !enough(done, within).1 {
-                places.push(start + index as usize);
-            }
-            start += same.len();
-        }
-        let open: Vec<Unit> = places.iter().map(|at| units[*at]).collect();
-        let chunks = simulate_with(plan, &open, threads, &bar)?;
-        for (at, chunk) in places.into_iter().zip(chunks) {
-            found[at] = Some(chunk);
-        }
-    }
     bar.finish_and_clear();
     Ok(found)
-}
-
-/// The results of the cells whose chunks are there.
-fn merged(plan: &Plan, units: &[Unit], chunks: &[Option<Chunk>]) -> Vec<CellResult> {
-    let mut found = Vec::new();
-    let mut start = 0;
-    for same in units.chunk_by(|a, b| a.0 == b.0) {
-        let own = chunks[start..start + same.len()].iter().flatten();
-        let needed = plan
-            .within
-            .map_or(usize::MAX, |within| enough(own.clone(), within).0);
-        found.extend(merge(&plan.settings, same[0].0, own.take(needed)));
-        start += same.len();
-    }
-    found
 }
 
 /// Runs `study power`.
@@ -195,7 +114,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         results: Vec::new(),
         missing_units: 0,
     };
-    let units = units(&report.plan);
+    let units = report.plan.units();
     if let (Some(of), Some(shard), Some(out)) = (args.shards, args.shard, &args.out) {
         return shards::run(
             &report.plan,
@@ -215,16 +134,12 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     if let Some(dir) = &args.merge {
         let chunks = shards::read(&report.plan, &units, dir, args.partial)?;
         report.missing_units = chunks.iter().filter(|c| c.is_none()).count();
-        report.results = merged(&report.plan, &units, &chunks);
+        report.results = report.plan.results(&units, &chunks);
     } else if !args.closed {
-        let chunks: Vec<Option<Chunk>> = match report.plan.within {
-            Some(within) => simulate_until(&report.plan, &units, within, args.threads)?,
-            None => {
-                let chunks = simulate(&report.plan, &units, args.threads)?;
-                chunks.into_iter().map(Some).collect()
-            }
-        };
-        report.results = merged(&report.plan, &units, &chunks);
+        let plan = &report.plan;
+        let work = |progress: Progress<'_>| plan.simulate_designs(&units, progress);
+        let chunks = on_threads(plan, units.len(), args.threads, work)?;
+        report.results = plan.results(&units, &chunks);
     }
     if let Some(out) = &args.out {
         write(out, &report)?;

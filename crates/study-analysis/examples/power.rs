@@ -2,7 +2,7 @@
 #![allow(clippy::print_stdout, reason = "an example prints")]
 
 use study_analysis::load::load;
-use study_analysis::power::{Overrides, Plan, merge, run_chunk};
+use study_analysis::power::{Overrides, Plan};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let given = std::env::args().nth(1);
@@ -10,13 +10,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut flags = Overrides::default();
     flags.plan.studies = Some(2000);
     let plan = Plan::of(&loaded.protocol, &flags)?;
-    let chunks: Vec<_> = (0..plan.settings.chunks())
-        .map(|chunk| run_chunk(&plan.settings, &plan.own, chunk))
-        .collect();
-    for result in merge(&plan.settings, plan.own, &chunks)
-        .iter()
-        .flat_map(|r| &r.tests)
-    {
+    let units = plan.units_of(&[plan.own]);
+    let chunks = plan.simulate_designs(&units, &|| ());
+    let results = plan.results(&units, &chunks);
+    for result in results.iter().flat_map(|r| &r.tests) {
         println!("{}: power {:.3}", result.test.as_str(), result.power);
     }
     Ok(())

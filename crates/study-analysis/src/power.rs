@@ -20,12 +20,14 @@ mod part_plan;
 mod parts;
 mod pilot;
 mod plan;
+mod simulate;
 mod tally;
 
 pub use expected::{Floor, Reach, Smallest, candidates, closed, design, floor, reach, smallest};
 pub use parts::{PairsWorld, PartWorld, TrackWorld, TracksWorld, Truth};
 pub use pilot::{Parameters, Pilot, PilotError};
 pub use plan::{LeftOut, Overrides, Pace, Plan, PlanError};
+pub use simulate::{Progress, Unit};
 pub use tally::{CellResult, Chunk, Tally, TestResult, enough, merge, run_chunk};
 
 pub use study_plan::protocol::power::{PowerLink as Link, PowerTest as Test, PowerVaf as Vaf};

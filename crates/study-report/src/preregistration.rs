@@ -1,36 +1,155 @@
 //! The preregistration as a document.
 
 use super::html::declared_test;
+use super::power::{Report, own_design};
+use super::study::track_in_words;
 use super::{apa, part_answers, sentences};
-use serde_json::json;
-use study_analysis::analyze::Analysis;
+use chrono::NaiveDate;
+use serde_json::{Value, json};
 use study_analysis::analyze::psychophysics::PartAnalysis;
-use study_analysis::preregister::Preregistration;
-use study_base::text::{Untrusted, capital, counted};
+use study_analysis::analyze::{Analysis, Include, Rules, analyze};
+use study_analysis::load::Loaded;
+use study_analysis::power::{Overrides, Plan, merge};
+use study_analysis::preregister::{
+    FILE, FORMAT, Preregistration, complete_parts, complete_study, deciding,
+};
+use study_analysis::study::{describe_realizations, is_rated};
+use study_base::text::{Untrusted, capital, counted, escaped_json};
 use study_plan::protocol::parts::{IntervalOrder, Part, Presentations, Task};
 use study_plan::protocol::{
     Assign, Order, Protocol, Question, Role, Scale, SessionPlan, Unfinished,
 };
 
-/// What the document says besides its facts.
+/// The document for people.
+const MARKDOWN: &str = "preregistration.md";
+
+/// What a document states besides its protocol.
 #[derive(Debug, Clone)]
-pub struct Content<'a> {
+pub struct Options {
+    /// Planned participants; `None`: those of the protocol.
+    pub participants: Option<u32>,
+    /// The day of the document.
+    pub date: NaiveDate,
+    /// Simulated studies for the power; `None`: those of the protocol.
+    pub studies: Option<u64>,
+}
+
+/// A document in its two forms.
+#[derive(Debug)]
+pub struct Document {
+    /// Names and contents: for people in Markdown, and for programs in JSON, with which
+    /// `study analyze` compares the study.
+    pub files: [(&'static str, String); 2],
+    /// The hash that the document has of itself.
+    pub sha256: String,
+}
+
+/// States what a study will do, before its first session: design, exclusions, the tests that a
+/// complete study of this design is decided by, and its power.
+///
+/// `progress` is called with the number of units of the simulation after each of them.
+///
+/// # Errors
+/// If the facts cannot be written as JSON.
+pub fn document(
+    mut loaded: Loaded,
+    options: &Options,
+    progress: &(dyn Fn(usize) + Sync),
+) -> Result<Document, serde_json::Error> {
+    let n = (options.participants).unwrap_or(loaded.protocol.design.participants);
+    loaded.protocol.design.participants = n;
+    loaded.parts.analysis["participants"] = json!(n);
+    let protocol = &loaded.protocol;
+    let question = protocol.analysis.primary.clone();
+    let mut ratings = complete_study(protocol, &question, n);
+    describe_realizations(&mut ratings, &loaded);
+    if !is_rated(protocol) {
+        ratings = ratings.keep(|_| false);
+    }
+    let rules = Rules::of(protocol, question.as_str(), Include::default());
+    let analysis = analyze(&ratings, &rules);
+    let parts = complete_parts(protocol, n);
+    let (power, sentences) = power(protocol, options.studies, progress);
+    let facts = Preregistration {
+        format: FORMAT.to_owned(),
+        tool_version: env!("CARGO_PKG_VERSION").to_owned(),
+        date: options.date,
+        study: protocol.study.id.clone(),
+        participants: n,
+        question,
+        tests: deciding(Some(&analysis), &parts),
+        power,
+        fingerprints: loaded.parts.fingerprints(),
+        protocol: loaded.parts.clone(),
+        sha256: String::new(),
+    }
+    .sealed();
+    let tracks = (protocol.tracks.iter())
+        .map(|track| track_in_words(protocol, track))
+        .collect();
+    let text = markdown(&Content {
+        document: &facts,
+        protocol,
+        analysis: &analysis,
+        parts: &parts,
+        tracks,
+        power: sentences,
+    });
+    let value = serde_json::to_value(&facts)?;
+    let facts_text = escaped_json(&format!("{value:#}\n")).to_string();
+    Ok(Document {
+        files: [(MARKDOWN, text), (FILE, facts_text)],
+        sha256: facts.sha256,
+    })
+}
+
+/// Power of the planned design, as facts and in sentences; why there is none otherwise.
+fn power(
+    protocol: &Protocol,
+    studies: Option<u64>,
+    progress: &(dyn Fn(usize) + Sync),
+) -> (Value, Vec<String>) {
+    let mut flags = Overrides::default();
+    flags.plan.studies = studies;
+    let mut plan = match Plan::of(protocol, &flags) {
+        Ok(plan) => plan,
+        Err(why) => {
+            let facts = json!({ "undefined_because": why.to_string() });
+            return (facts, vec![format!("Power was not computed: {why}.")]);
+        }
+    };
+    plan.grid = vec![plan.own];
+    let units = plan.units_of(&[plan.own]);
+    let chunks = plan.simulate(&units, &|| progress(units.len()));
+    let results = merge(&plan.settings, plan.own, &chunks);
+    let report = Report {
+        title: protocol.study.title.clone(),
+        study: protocol.study.id.clone(),
+        plan,
+        results: results.into_iter().collect(),
+        missing_units: 0,
+    };
+    (own_design(&report), power_sentences(&report))
+}
+
+/// What the document says besides its facts.
+struct Content<'a> {
     /// The facts.
-    pub document: &'a Preregistration,
+    document: &'a Preregistration,
     /// The protocol, with the planned participants of the document.
-    pub protocol: &'a Protocol,
+    protocol: &'a Protocol,
     /// The analysis of a complete study, whose tests are declared.
-    pub analysis: &'a Analysis,
+    analysis: &'a Analysis,
     /// Those of its parts.
-    pub parts: &'a [PartAnalysis],
+    parts: &'a [PartAnalysis],
     /// What each track compares, and how. Untrusted.
-    pub tracks: Vec<String>,
+    tracks: Vec<String>,
     /// Sentences on power and sensitivity.
-    pub power: Vec<String>,
+    power: Vec<String>,
 }
 
 /// The document in Markdown.
-pub fn markdown(c: &Content<'_>) -> String {
+fn markdown(c: &Content<'_>) -> String {
     let (d, p) = (c.document, c.protocol);
     let mut out = format!("# Preregistration: {}\n\n", text(&p.study.title));
     let list = |out: &mut String, title: &str, lines: &[String]| {
@@ -288,7 +407,7 @@ fn exclusions(p: &Protocol) -> Vec<String> {
 }
 
 /// Power of the planned design, in sentences.
-pub fn power(report: &super::power::Report) -> Vec<String> {
+fn power_sentences(report: &Report) -> Vec<String> {
     let mut lines = vec![report.ceiling_sentence(), super::power::paragraph(report)];
     let finds = super::power::sensitivity_sentences(report).into_iter();
     lines.extend(finds.map(|line| format!("This design {line}.")));

@@ -4,13 +4,13 @@
 //! the program's version and a digest of everything that the numbers depend on.
 
 use super::super::{Console, Failure};
-use super::{Args, Unit, replace, shown, simulate};
+use super::{Args, on_threads, replace, shown};
 use clap::Parser;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use study_analysis::power::{Chunk, Plan};
+use study_analysis::power::{Chunk, Plan, Progress, Unit};
 use study_base::text::counted;
 
 /// The format of a part.
@@ -85,7 +85,8 @@ pub(super) fn run(
         .filter(|(i, _)| *i as u64 % of == shard)
         .map(|(_, unit)| *unit)
         .collect();
-    let results = simulate(plan, &own, threads)?;
+    let work = |progress: Progress<'_>| plan.simulate(&own, progress);
+    let results = on_threads(plan, own.len(), threads, work)?;
     let done = Shard {
         format: FORMAT.to_owned(),
         version: env!("CARGO_PKG_VERSION").to_owned(),

@@ -2,11 +2,11 @@
 
 use super::super::console::shell_command;
 use super::super::{Console, Failure};
-use super::{Unit, replace, shards, shown};
+use super::{replace, shards, shown};
 use std::fs;
 use std::path::Path;
 use std::time::Instant;
-use study_analysis::power::{Plan, run_chunk};
+use study_analysis::power::{Plan, Unit, run_chunk};
 
 /// Clusters often allow an array of about a thousand tasks.
 const MOST_TASKS: u64 = 1000;

@@ -84,17 +84,15 @@ fn unused(over: &PowerPlan, pairs: bool, tracks: bool) -> Option<&'static str> {
 
 /// The plan of a part.
 fn plan(protocol: &Protocol, flags: &Overrides, part: &Part) -> Result<Plan, PlanError> {
-    let (base, over) = (&protocol.power, &flags.plan);
+    let stated = flags.plan.clone().or(&protocol.power);
     if flags.pilot.is_some() {
         return Err(PlanError::PilotOfPart(part.id.clone()));
     }
     let mut defaults = Defaults::default();
     let participants = protocol.design.participants as usize;
     let (world, spread, slope, own, repetitions) = match &part.task {
-        Task::Pairs(pairs) => of_pairs(protocol, (base, over), pairs, &mut defaults)?,
-        Task::Discrimination { tracks } => {
-            of_tracks(protocol, (base, over), tracks, &mut defaults)?
-        }
+        Task::Pairs(pairs) => of_pairs(protocol, &stated, pairs, &mut defaults)?,
+        Task::Discrimination { tracks } => of_tracks(protocol, &stated, tracks, &mut defaults)?,
         Task::Rating(_) | Task::Magnitude(_) | Task::Mushra(_) => {
             return Err(PlanError::NoPower(part.id.clone()));
         }
@@ -103,26 +101,23 @@ fn plan(protocol: &Protocol, flags: &Overrides, part: &Part) -> Result<Plan, Pla
         participants,
         ..own
     };
-    let given = |of: fn(&PowerPlan) -> &Vec<u32>| !of(over).is_empty() || !of(base).is_empty();
     let fixed = [
         (
             "realizations",
-            given(|p| &p.realizations),
-            numbers((base, over), |p| &p.realizations, vec![own.realizations])
-                != [own.realizations],
+            numbers(&stated.realizations, vec![own.realizations]) != [own.realizations],
         ),
         (
             "repetitions",
-            given(|p| &p.repetitions) && matches!(world, PartWorld::Tracks(_)),
-            numbers((base, over), |p| &p.repetitions, repetitions.clone()) != repetitions,
+            matches!(world, PartWorld::Tracks(_))
+                && numbers(&stated.repetitions, repetitions.clone()) != repetitions,
         ),
     ];
-    if let Some((what, ..)) = fixed.into_iter().find(|f| f.1 && f.2) {
+    if let Some((what, _)) = fixed.into_iter().find(|(_, other)| *other) {
         return Err(PlanError::Fixed(what, part.id.clone()));
     }
     let n = own.participants.max(2);
-    let participants = numbers((base, over), |p| &p.participants, vec![n, 2 * n, 4 * n]);
-    let repetitions = numbers((base, over), |p| &p.repetitions, repetitions);
+    let participants = numbers(&stated.participants, vec![n, 2 * n, 4 * n]);
+    let repetitions = numbers(&stated.repetitions, repetitions);
     let grid = (repetitions.iter())
         .flat_map(|&repetitions| {
             participants.iter().map(move |&participants| Cell {
@@ -132,8 +127,8 @@ fn plan(protocol: &Protocol, flags: &Overrides, part: &Part) -> Result<Plan, Pla
             })
         })
         .collect();
-    let tests = of_part(&world, tests((base, over)), &part.id)?;
-    let missing = over.missing.or(base.missing).unwrap_or(0.0);
+    let tests = of_part(&world, tests(&stated), &part.id)?;
+    let missing = stated.missing.unwrap_or(0.0);
     if missing > 0.0 && matches!(world, PartWorld::Tracks(_)) {
         return Err(PlanError::MissingOfTracks);
     }
@@ -150,7 +145,7 @@ fn plan(protocol: &Protocol, flags: &Overrides, part: &Part) -> Result<Plan, Pla
                 spread,
                 scale: Scale::Continuous,
                 vaf: Vaf::Listed,
-                dropout: over.dropout.or(base.dropout).unwrap_or(0.0),
+                dropout: stated.dropout.unwrap_or(0.0),
                 missing,
                 reference: 0.0,
             },
@@ -161,17 +156,17 @@ fn plan(protocol: &Protocol, flags: &Overrides, part: &Part) -> Result<Plan, Pla
             alpha: protocol.analysis.alpha.unwrap_or(ALPHA),
             margin: None,
             seed: flags.seed.unwrap_or(protocol.study.seed),
-            studies: over.studies.or(base.studies).unwrap_or(studies),
+            studies: stated.studies.unwrap_or(studies),
         },
         part: Some(part.id.clone()),
         own,
         grid,
-        targets: targets((base, over)),
+        targets: targets(&stated),
         defaults: defaults.0,
         exclusions: protocol.analysis.exclude.len(),
         left_out: LeftOut::of(protocol, Some(&part.id)),
-        within: over.within.or(base.within),
-        max_session_min: over.max_session_min.or(base.max_session_min),
+        within: stated.within,
+        max_session_min: stated.max_session_min,
         pace: Pace::of_part(protocol, part, own.realizations),
     })
 }
@@ -216,7 +211,7 @@ type Planned = (PartWorld, Spread, f64, Cell, Vec<usize>);
 
 fn of_pairs(
     protocol: &Protocol,
-    (base, over): (&PowerPlan, &PowerPlan),
+    stated: &PowerPlan,
     pairs: &Pairs,
     defaults: &mut Defaults,
 ) -> Result<Planned, PlanError> {
@@ -225,17 +220,16 @@ fn of_pairs(
     items.sort_by_key(|id| protocol.models.iter().position(|m| m.id == **id));
     items.dedup();
     let place = |id: &ModelId| items.iter().position(|item| **item == *id).unwrap_or(0);
-    let ties = over.ties.or(base.ties);
+    let ties = stated.ties;
     if ties.is_some_and(|share| share > 0.0) && !pairs.tie {
         return Err(PlanError::NoTies);
     }
-    let sd = |own: fn(&PowerPlan) -> Option<f64>| own(over).or(own(base));
     let spread = Spread {
-        realization: defaults.or("sd.realization", sd(|p| p.sd.realization), REALIZATION),
-        interaction: defaults.or("sd.interaction", sd(|p| p.sd.interaction), TASTE),
+        realization: defaults.or("sd.realization", stated.sd.realization, REALIZATION),
+        interaction: defaults.or("sd.interaction", stated.sd.interaction, TASTE),
         ..NOTHING
     };
-    let slope = slope((base, over), None, spread.realization)?;
+    let slope = slope(stated, spread.realization)?;
     let slope = defaults.or("slope", slope, SLOPE);
     let world = PairsWorld {
         vaf: (items.iter())
@@ -276,7 +270,7 @@ fn neat(x: f64) -> f64 {
 
 fn of_tracks(
     protocol: &Protocol,
-    (base, over): (&PowerPlan, &PowerPlan),
+    stated: &PowerPlan,
     ids: &[PartId],
     defaults: &mut Defaults,
 ) -> Result<Planned, PlanError> {
@@ -286,7 +280,6 @@ fn of_tracks(
     let ladders: Vec<Option<Ladder>> = (tracks.iter())
         .map(|track| track.family().map(|_| protocol.ladder(track)))
         .collect();
-    let key = |of: fn(&PowerTrack) -> Option<f64>| of(&over.track).or(of(&base.track));
     if let Some(track) = (tracks.iter().zip(&ladders))
         .find(|(track, ladder)| ladder.is_some() && track.method == Method::SameDifferent)
     {
@@ -306,14 +299,14 @@ fn of_tracks(
                 true => (low * high).sqrt(),
                 false => f64::midpoint(low, high),
             };
-            let threshold = defaults.or("track.threshold", key(|t| t.threshold), neat(middle));
+            let threshold = defaults.or("track.threshold", stated.track.threshold, neat(middle));
             let width = if ratios {
                 threshold
             } else {
                 neat((high - low) / 3.0)
             };
-            let width = defaults.or("track.width", key(|t| t.width), width);
-            let (ratio, difference) = (key(|t| t.ratio), key(|t| t.difference));
+            let width = defaults.or("track.width", stated.track.width, width);
+            let (ratio, difference) = (stated.track.ratio, stated.track.difference);
             if (ratio.is_some() && !ratios) || (difference.is_some() && ratios) {
                 return Err(PlanError::RatioOrDifference(ratios));
             }
@@ -324,7 +317,7 @@ fn of_tracks(
                     defaults.or("track.difference", difference, neat((high - low) / 5.0))
                 }
             };
-            let lapse = defaults.or("track.lapse", key(|t| t.lapse), 0.02);
+            let lapse = defaults.or("track.lapse", stated.track.lapse, 0.02);
             Some((threshold, width, change, lapse))
         }
     };
@@ -342,7 +335,7 @@ fn of_tracks(
                 let shift = if ratios { 0.0 } else { change * along };
                 let gamma = match track.method.guess_rate() {
                     Some(guess) => guess,
-                    None => defaults.or("track.guess", key(|t| t.guess), 0.1),
+                    None => defaults.or("track.guess", stated.track.guess, 0.1),
                 };
                 Truth::Function(Curve {
                     core: Core::Norm,
@@ -352,7 +345,7 @@ fn of_tracks(
                     lambda: lapse,
                 })
             }
-            _ => Truth::Sensitivity(defaults.or("track.d", key(|t| t.d), 1.0)),
+            _ => Truth::Sensitivity(defaults.or("track.d", stated.track.d, 1.0)),
         };
         truths.push(TrackWorld {
             rules: (*track).clone(),
@@ -366,10 +359,9 @@ fn of_tracks(
         (false, Some((low, high))) => (neat((high - low) / 10.0), neat((high - low) / 20.0)),
         (false, None) => (0.5, 0.25),
     };
-    let sd = |own: fn(&PowerPlan) -> Option<f64>| own(over).or(own(base));
     let spread = Spread {
-        subject: defaults.or("sd.participant", sd(|p| p.sd.participant), person),
-        interaction: defaults.or("sd.interaction", sd(|p| p.sd.interaction), both),
+        subject: defaults.or("sd.participant", stated.sd.participant, person),
+        interaction: defaults.or("sd.interaction", stated.sd.interaction, both),
         ..NOTHING
     };
     let own = Cell {

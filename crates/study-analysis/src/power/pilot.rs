@@ -14,6 +14,7 @@ use super::expected::LOGISTIC_SD;
 use super::{Assumptions, Link, Scale};
 use crate::analyze::Analysis;
 use study_base::rng::Stream;
+use study_plan::protocol::power::{PowerPlan, PowerSpread};
 use study_stats::clm::{CategoryCount, CategoryCounts, ClmError, Predictor};
 use study_stats::clmm::{CrossedClmm, CrossedParameters, clmm_crossed};
 use study_stats::lmm::{
@@ -79,6 +80,22 @@ impl Parameters {
             slope: world.spread.slope,
             ..self.spread
         };
+    }
+
+    /// As assumptions. Logits have their own residual.
+    pub(super) fn stated(&self, logit: bool) -> PowerPlan {
+        PowerPlan {
+            slope: Some(self.slope),
+            mean: Some(self.mean),
+            sd: PowerSpread {
+                participant: Some(self.spread.subject),
+                realization: Some(self.spread.realization),
+                interaction: Some(self.spread.interaction),
+                residual: (!logit).then_some(self.spread.residual),
+                slope: None,
+            },
+            ..PowerPlan::default()
+        }
     }
 }
 

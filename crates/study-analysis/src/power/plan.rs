@@ -217,10 +217,7 @@ impl Pace {
 impl Plan {
     /// The plan of the ratings of a protocol.
     pub(super) fn of_ratings(protocol: &Protocol, flags: &Overrides) -> Result<Self, PlanError> {
-        let (base, over) = (&protocol.power, &flags.plan);
         let mut defaults = Defaults::default();
-        let mut stated =
-            |key: &str, value: Option<f64>, default: f64| defaults.or(key, value, default);
         let primary = &protocol.analysis.primary;
         let rated = protocol.parts.iter().find_map(|part| match &part.task {
             Task::Rating(own) if part.asks.contains(primary) => Some(own),
@@ -240,7 +237,7 @@ impl Plan {
             return Err(PlanError::FewRealizations(listed.len()));
         }
         let pilot = flags.pilot.as_ref();
-        let asked = over.scale.as_ref().or(base.scale.as_ref());
+        let asked = flags.plan.scale.as_ref().or(protocol.power.scale.as_ref());
         let scale = match asked {
             Some(PowerScale::FromPilot) => {
                 let found = pilot.and_then(|p| p.estimate.scale.clone());
@@ -258,43 +255,25 @@ impl Plan {
         if logit && pilot.is_some_and(|p| p.estimate.scale.is_none()) {
             return Err(PlanError::PilotLogit);
         }
-        let of_pilot = |f: fn(&Spread) -> f64| pilot.map(|p| f(&p.estimate.spread));
-        let sd = |own: fn(&PowerPlan) -> Option<f64>, pilot: Option<f64>| {
-            own(over).or(pilot).or(own(base))
-        };
-        let residual = sd(
-            |p| p.sd.residual,
-            of_pilot(|s| s.residual).filter(|_| !logit),
-        );
-        if logit && residual.is_some() {
+        let of_pilot = pilot.map(|p| p.estimate.stated(logit)).unwrap_or_default();
+        let stated = flags.plan.clone().or(&of_pilot).or(&protocol.power);
+        if logit && stated.sd.residual.is_some() {
             return Err(PlanError::LogitResidual);
         }
+        let sd = stated.sd;
         let spread = Spread {
-            subject: stated(
-                "sd.participant",
-                sd(|p| p.sd.participant, of_pilot(|s| s.subject)),
-                SPREAD.subject,
-            ),
-            realization: stated(
-                "sd.realization",
-                sd(|p| p.sd.realization, of_pilot(|s| s.realization)),
-                SPREAD.realization,
-            ),
-            interaction: stated(
-                "sd.interaction",
-                sd(|p| p.sd.interaction, of_pilot(|s| s.interaction)),
-                SPREAD.interaction,
-            ),
+            subject: defaults.or("sd.participant", sd.participant, SPREAD.subject),
+            realization: defaults.or("sd.realization", sd.realization, SPREAD.realization),
+            interaction: defaults.or("sd.interaction", sd.interaction, SPREAD.interaction),
             residual: if logit {
                 0.0
             } else {
-                stated("sd.residual", residual, SPREAD.residual)
+                defaults.or("sd.residual", sd.residual, SPREAD.residual)
             },
-            slope: stated("sd.slope", sd(|p| p.sd.slope, None), SPREAD.slope),
+            slope: defaults.or("sd.slope", sd.slope, SPREAD.slope),
         };
-        let of_pilot = pilot.map(|p| p.estimate.slope);
-        let slope = slope((base, over), of_pilot, spread.realization)?;
-        let slope = stated("slope", slope, SLOPE);
+        let slope = slope(&stated, spread.realization)?;
+        let slope = defaults.or("slope", slope, SLOPE);
         let middle = match &scale {
             Scale::Ordinal { thresholds, .. } => {
                 thresholds.iter().sum::<f64>() / thresholds.len().max(1) as f64
@@ -302,15 +281,14 @@ impl Plan {
             _ => (protocol.primary().and_then(|q| q.kind.scale().ends()))
                 .map_or(0.0, |(low, high)| f64::midpoint(low, high)),
         };
-        let mean = over.mean.or(pilot.map(|p| p.estimate.mean)).or(base.mean);
-        let mean = stated("mean", mean, middle);
+        let mean = defaults.or("mean", stated.mean, middle);
         let own = Cell {
             realizations: listed.len(),
             repetitions: repetitions as usize,
             participants: protocol.design.participants as usize,
         };
         let n = own.participants.max(2);
-        let vaf = over.vaf.or(base.vaf);
+        let vaf = stated.vaf;
         let more: Vec<usize> = match vaf {
             Some(Vaf::Listed) => vec![own.realizations],
             _ => [own.realizations, 8, 12]
@@ -318,13 +296,9 @@ impl Plan {
                 .filter(|q| *q >= own.realizations)
                 .collect(),
         };
-        let participants = numbers((base, over), |p| &p.participants, vec![n, 2 * n, 4 * n]);
-        let realizations = numbers((base, over), |p| &p.realizations, more);
-        let repetitions = numbers(
-            (base, over),
-            |p| &p.repetitions,
-            vec![1, own.repetitions.max(1)],
-        );
+        let participants = numbers(&stated.participants, vec![n, 2 * n, 4 * n]);
+        let realizations = numbers(&stated.realizations, more);
+        let repetitions = numbers(&stated.repetitions, vec![1, own.repetitions.max(1)]);
         if vaf == Some(Vaf::Listed) && realizations != [own.realizations] {
             return Err(PlanError::Listed(own.realizations));
         }
@@ -338,7 +312,7 @@ impl Plan {
                 }));
             }
         }
-        let tests = tests((base, over)).unwrap_or_else(|| vec![Test::Verdict]);
+        let tests = tests(&stated).unwrap_or_else(|| vec![Test::Verdict]);
         if let Some(test) = tests.iter().find(|test| !test.is_of_ratings()) {
             return Err(PlanError::NotOfRatings(test.as_str()));
         }
@@ -356,19 +330,19 @@ impl Plan {
         if tests.contains(&Test::ReferenceEquivalence) && !has_reference {
             return Err(PlanError::NoReference);
         }
-        let targets = targets((base, over));
+        let targets = targets(&stated);
         Ok(Self {
             settings: Settings {
                 assumptions: Assumptions {
                     slope,
-                    smallest: over.smallest.or(base.smallest),
+                    smallest: stated.smallest,
                     mean,
                     spread,
                     scale,
                     vaf: vaf.unwrap_or(Vaf::Listed),
-                    dropout: over.dropout.or(base.dropout).unwrap_or(0.0),
-                    missing: over.missing.or(base.missing).unwrap_or(0.0),
-                    reference: over.reference.or(base.reference).unwrap_or(0.0),
+                    dropout: stated.dropout.unwrap_or(0.0),
+                    missing: stated.missing.unwrap_or(0.0),
+                    reference: stated.reference.unwrap_or(0.0),
                 },
                 part: None,
                 pilot: flags.pilot.clone(),
@@ -377,7 +351,7 @@ impl Plan {
                 alpha: protocol.analysis.alpha.unwrap_or(ALPHA),
                 margin,
                 seed: flags.seed.unwrap_or(protocol.study.seed),
-                studies: over.studies.or(base.studies).unwrap_or(STUDIES),
+                studies: stated.studies.unwrap_or(STUDIES),
             },
             part: None,
             own,
@@ -386,8 +360,8 @@ impl Plan {
             defaults: defaults.0,
             exclusions: protocol.analysis.exclude.len(),
             left_out: LeftOut::of(protocol, None),
-            within: over.within.or(base.within),
-            max_session_min: over.max_session_min.or(base.max_session_min),
+            within: stated.within,
+            max_session_min: stated.max_session_min,
             pace: Pace::of(protocol, own.realizations),
         })
     }
@@ -474,63 +448,44 @@ impl Defaults {
     }
 }
 
-/// `[power]`, and what flags state.
-type Stated<'p> = (&'p PowerPlan, &'p PowerPlan);
-
-/// The effect: the last that is stated, in `[power]`, by a pilot, or by a flag.
-pub(super) fn slope(
-    (base, over): Stated<'_>,
-    of_pilot: Option<f64>,
-    scatter: f64,
-) -> Result<Option<f64>, PlanError> {
-    let effect = |plan: &PowerPlan| {
-        (plan.slope.is_some() || plan.rho.is_some()).then_some((plan.slope, plan.rho))
-    };
-    let of_pilot = of_pilot.map(|slope| (Some(slope), None));
-    match effect(over).or(of_pilot).or_else(|| effect(base)) {
-        Some((Some(_), Some(_))) => Err(PlanError::SlopeAndRho),
-        Some((None, Some(_))) if scatter == 0.0 => Err(PlanError::RhoWithoutScatter),
-        Some((None, Some(rho))) => Ok(Some(scatter * rho / (1.0 - rho * rho).sqrt())),
-        Some((slope, _)) => Ok(slope),
-        None => Ok(None),
+/// The effect as rating points per standard deviation of VAF.
+pub(super) fn slope(stated: &PowerPlan, scatter: f64) -> Result<Option<f64>, PlanError> {
+    match (stated.slope, stated.rho) {
+        (Some(_), Some(_)) => Err(PlanError::SlopeAndRho),
+        (None, Some(_)) if scatter == 0.0 => Err(PlanError::RhoWithoutScatter),
+        (None, Some(rho)) => Ok(Some(scatter * rho / (1.0 - rho * rho).sqrt())),
+        (slope, None) => Ok(slope),
     }
 }
 
 /// Numbers of the grid, sorted.
-pub(super) fn numbers(
-    (base, over): Stated<'_>,
-    of: fn(&PowerPlan) -> &Vec<u32>,
-    default: Vec<usize>,
-) -> Vec<usize> {
-    let given = [of(over), of(base)]
-        .into_iter()
-        .find(|list| !list.is_empty());
-    let mut list = given.map_or(default, |list| list.iter().map(|n| *n as usize).collect());
+pub(super) fn numbers(stated: &[u32], default: Vec<usize>) -> Vec<usize> {
+    let mut list = match stated.is_empty() {
+        true => default,
+        false => stated.iter().map(|n| *n as usize).collect(),
+    };
     list.sort_unstable();
     list.dedup();
     list
 }
 
-/// The tests that are asked for, each once.
-pub(super) fn tests((base, over): Stated<'_>) -> Option<Vec<Test>> {
-    let given = [&over.tests, &base.tests]
-        .into_iter()
-        .find(|list| !list.is_empty())?;
+/// The tests that are asked for, each once; `None` if there are none.
+pub(super) fn tests(stated: &PowerPlan) -> Option<Vec<Test>> {
     let mut tests: Vec<Test> = Vec::new();
-    for test in given {
+    for test in &stated.tests {
         if !tests.contains(test) {
             tests.push(*test);
         }
     }
-    Some(tests)
+    (!tests.is_empty()).then_some(tests)
 }
 
 /// The power that is wanted, sorted.
-pub(super) fn targets((base, over): Stated<'_>) -> Vec<f64> {
-    let targets = [&over.targets, &base.targets]
-        .into_iter()
-        .find(|t| !t.is_empty());
-    let mut targets = targets.map_or(TARGETS.to_vec(), Clone::clone);
+pub(super) fn targets(stated: &PowerPlan) -> Vec<f64> {
+    let mut targets = match stated.targets.is_empty() {
+        true => TARGETS.to_vec(),
+        false => stated.targets.clone(),
+    };
     targets.sort_by(f64::total_cmp);
     targets.dedup();
     targets

@@ -180,3 +180,61 @@ pub struct PowerPlan {
     /// Numbers of repetitions to compare.
     pub repetitions: Vec<u32>,
 }
+
+impl PowerPlan {
+    /// What is stated here, and of the rest what `earlier` states. Slope and rho are one
+    /// statement.
+    pub fn or(self, earlier: &Self) -> Self {
+        let list = |own: Vec<u32>, earlier: &Vec<u32>| match own.is_empty() {
+            true => earlier.clone(),
+            false => own,
+        };
+        let (slope, rho) = match self.slope.is_some() || self.rho.is_some() {
+            true => (self.slope, self.rho),
+            false => (earlier.slope, earlier.rho),
+        };
+        let (sd, track) = (earlier.sd, earlier.track);
+        Self {
+            studies: self.studies.or(earlier.studies),
+            targets: match self.targets.is_empty() {
+                true => earlier.targets.clone(),
+                false => self.targets,
+            },
+            tests: match self.tests.is_empty() {
+                true => earlier.tests.clone(),
+                false => self.tests,
+            },
+            slope,
+            rho,
+            smallest: self.smallest.or(earlier.smallest),
+            mean: self.mean.or(earlier.mean),
+            sd: PowerSpread {
+                participant: self.sd.participant.or(sd.participant),
+                realization: self.sd.realization.or(sd.realization),
+                interaction: self.sd.interaction.or(sd.interaction),
+                residual: self.sd.residual.or(sd.residual),
+                slope: self.sd.slope.or(sd.slope),
+            },
+            scale: self.scale.or_else(|| earlier.scale.clone()),
+            vaf: self.vaf.or(earlier.vaf),
+            dropout: self.dropout.or(earlier.dropout),
+            missing: self.missing.or(earlier.missing),
+            reference: self.reference.or(earlier.reference),
+            ties: self.ties.or(earlier.ties),
+            track: PowerTrack {
+                threshold: self.track.threshold.or(track.threshold),
+                ratio: self.track.ratio.or(track.ratio),
+                difference: self.track.difference.or(track.difference),
+                width: self.track.width.or(track.width),
+                lapse: self.track.lapse.or(track.lapse),
+                guess: self.track.guess.or(track.guess),
+                d: self.track.d.or(track.d),
+            },
+            within: self.within.or(earlier.within),
+            max_session_min: self.max_session_min.or(earlier.max_session_min),
+            participants: list(self.participants, &earlier.participants),
+            realizations: list(self.realizations, &earlier.realizations),
+            repetitions: list(self.repetitions, &earlier.repetitions),
+        }
+    }
+}
