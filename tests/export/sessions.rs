@@ -76,6 +76,9 @@ fn several_sessions_have_folders_and_groups_have_a_column() {
         let about: serde_json::Value =
             serde_json::from_slice(&fs::read(out.join(name)).unwrap()).unwrap();
         assert!(about["clamp_count"].is_u64(), "{name}: {about}");
+        // Counted from the first trial of its own session: the other one is a day away.
+        let start_s = about["StartTime"].as_f64().unwrap();
+        assert!((0.0..3600.0).contains(&start_s), "{name}: {about}");
     }
 }
 

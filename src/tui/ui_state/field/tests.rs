@@ -89,6 +89,17 @@ fn arrows_start_at_an_end_and_stay_on_the_scale() {
     assert_eq!(after(&scale, &[Key::Home, Key::Left]), Some(1.0));
 }
 
+/// A tenth of a long scale; on a short one a single step.
+#[test]
+fn pages_move_by_a_tenth_of_the_scale() {
+    let (percent, seven) = (scale(0, 100), scale(1, 7));
+    assert_eq!(after(&percent, &[Key::Home, Key::PageUp]), Some(10.0));
+    assert_eq!(after(&percent, &[Key::End, Key::PageDown]), Some(90.0));
+    assert_eq!(after(&percent, &[Key::End, Key::PageUp]), Some(100.0));
+    assert_eq!(after(&seven, &[Key::Home, Key::PageUp]), Some(2.0));
+    assert_eq!(after(&seven, &[Key::End, Key::PageDown]), Some(6.0));
+}
+
 #[test]
 fn extreme_scales_do_not_overflow() {
     let scale = scale(i64::MIN, i64::MAX);
@@ -113,6 +124,8 @@ fn a_slider_has_no_mark_until_it_is_moved() {
         after(&slider, &[Key::Home, Key::Right, Key::Right, Key::Right]),
         Some(0.3)
     );
+    assert_eq!(after(&slider, &[Key::Home, Key::PageUp]), Some(1.0));
+    assert_eq!(after(&slider, &[Key::End, Key::PageDown]), Some(0.0));
     assert_eq!(after(&slider, &digits("0.75")), Some(0.75));
     assert_eq!(after(&slider, &digits("2")), None);
 }
