@@ -7,246 +7,17 @@ use clap_mangen::Man;
 use clap_mangen::roff::{Roff, roman};
 use std::path::Path;
 
-/// Examples of each command: the command line and what it does.
-pub(super) const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
-    (
-        "run",
-        &[
-            (
-                "study run protocols/turn-signal",
-                "asks who takes part, and begins or resumes",
-            ),
-            (
-                "study run my-study --participant P07 --operator LW",
-                "without the first page",
-            ),
-            (
-                "study run my-study --mirror /media/usb",
-                "every record on a second disk as well",
-            ),
-            (
-                "study run my-study --plain",
-                "lines only, for a screen reader",
-            ),
-            (
-                "study run my-study --screen=192.168.1.20",
-                "the participant's side on a tablet",
-            ),
-            (
-                "study run my-study --device simulated",
-                "a pilot on the simulated device",
-            ),
-        ],
-    ),
-    (
-        "rehearse",
-        &[(
-            "study rehearse my-study --participants 10",
-            "the whole study in seconds, in rehearsal/",
-        )],
-    ),
-    (
-        "analyze",
-        &[
-            (
-                "study analyze results",
-                "on the terminal, and files in results/…/analysis",
-            ),
-            (
-                "study analyze results --include pilot",
-                "pilots as well, under a banner",
-            ),
-            (
-                "study analyze --pool utah bern --out pooled",
-                "two sites of a study, with site as a factor",
-            ),
-            (
-                "study analyze ratings.csv --out report",
-                "any table with subject,model,rating",
-            ),
-            (
-                "study analyze trials.csv --task 2ifc",
-                "thresholds from a table of trials",
-            ),
-            (
-                "study analyze results --json",
-                "all values with their identifiers",
-            ),
-            (
-                "study analyze trials.csv --task 2ifc",
-                "thresholds of any table with participant,level,positive,trials",
-            ),
-        ],
-    ),
-    (
-        "check",
-        &[(
-            "study check my-study",
-            "all errors at once, with line and hint",
-        )],
-    ),
-    (
-        "power",
-        &[
-            (
-                "study power my-study --slope 0.5 --closed",
-                "the closed forms, at once",
-            ),
-            (
-                "study power my-study --participants 10,20,40 --out power",
-                "by simulation, with figures",
-            ),
-            (
-                "study power my-study --slurm jobs --studies 100000",
-                "scripts for a cluster",
-            ),
-        ],
-    ),
-    (
-        "export",
-        &[
-            (
-                "study export results --to bids --out dataset",
-                "for an archive; also psych-ds, frictionless",
-            ),
-            (
-                "study export results --to csv --out tables --bom --spreadsheet-safe",
-                "for a spreadsheet",
-            ),
-            (
-                "study export results --to r --out r --without-comments",
-                "tables, an R script and a Quarto document",
-            ),
-            (
-                "study export rehearsal --to wide --include simulated --out wide",
-                "one row for each simulated participant",
-            ),
-        ],
-    ),
-    (
-        "preregister",
-        &[
-            (
-                "study preregister my-study",
-                "preregistration.md and .json beside the protocol",
-            ),
-            (
-                "study preregister my-study --participants 20 --date 2026-03-01",
-                "another number of participants, a stated day",
-            ),
-        ],
-    ),
-    (
-        "schedule",
-        &[
-            (
-                "study schedule my-study --rows 1-10 --csv",
-                "the orders of the first ten participants",
-            ),
-            (
-                "study schedule my-threshold --answers answers.csv --json",
-                "what the tracks present if they are answered so",
-            ),
-        ],
-    ),
-    (
-        "status",
-        &[("study status results", "who is done, unfinished, next")],
-    ),
-    (
-        "participant",
-        &[
-            (
-                "study participant results P03 --state dropped-out --reason \"felt unwell\"",
-                "the answers are kept",
-            ),
-            (
-                "study participant results P03 --state withdrawn --reason \"asked for it\" --erase",
-                "removes what the person gave, after a confirmation",
-            ),
-        ],
-    ),
-    (
-        "amend",
-        &[(
-            "study amend results my-study --reason \"typo in the instructions\"",
-            "a new version of the wording",
-        )],
-    ),
-    (
-        "verify",
-        &[("study verify results", "checksums, chains, derived tables")],
-    ),
-    (
-        "trajectory",
-        &[(
-            "study trajectory protocols/turn-signal/training.toml",
-            "checked against the limits of probe and target",
-        )],
-    ),
-    (
-        "record",
-        &[(
-            "study record protocols/turn-signal/training.toml --plant b --rate 10000 --out training.csv",
-            "from the simulated switch",
-        )],
-    ),
-    (
-        "import",
-        &[(
-            "study import force-curve switch-1.csv switch-2.csv switch-3.csv -o switch.csv",
-            "three repetitions of a press and release as one recording",
-        )],
-    ),
-    (
-        "identify",
-        &[(
-            "study identify training.csv --validate validation-1.5hz.csv --out models",
-            "model files and their VAF",
-        )],
-    ),
-    (
-        "new",
-        &[(
-            "study new my-study --kind questplus",
-            "a commented protocol of a threshold",
-        )],
-    ),
-    (
-        "schema",
-        &[("study schema", "for the editor's completion and checks")],
-    ),
-    (
-        "device",
-        &[
-            ("study device list", "serial ports"),
-            (
-                "study device check --port /dev/ttyACM0",
-                "does it conform to docs/wire.md?",
-            ),
-            (
-                "study device check --port /dev/ttyACM0 --rendering --save",
-                "and is its force that of its tables?",
-            ),
-            (
-                "study device commission --port /dev/ttyACM0",
-                "a weight, a ruler, the emergency stop",
-            ),
-            ("study device simulate", "a device on a pseudo-terminal"),
-        ],
-    ),
-    (
-        "completions",
-        &[("study completions bash", "source the output in ~/.bashrc")],
-    ),
-    (
-        "man",
-        &[(
-            "study man /usr/local/share/man/man1",
-            "one page for each command",
-        )],
-    ),
-];
+/// Examples of all commands: a command line, and below it what it does.
+const EXAMPLES: &str = include_str!("examples.txt");
+
+/// The examples of a command.
+fn examples(command: &str) -> impl Iterator<Item = (&'static str, &'static str)> {
+    let own = format!("study {command} ");
+    let lines = EXAMPLES.lines().zip(EXAMPLES.lines().skip(1)).step_by(2);
+    lines
+        .filter(move |(line, _)| format!("{line} ").starts_with(&own))
+        .map(|(line, what)| (line, what.trim_start()))
+}
 
 /// Exit codes: those of [`super::Kind`].
 const EXIT: &[(&str, &str)] = &[
@@ -282,22 +53,17 @@ const FILES: &[(&str, &str)] = &[
 
 /// The command line with its examples.
 pub(super) fn command() -> Command {
-    EXAMPLES
-        .iter()
-        .fold(Cli::command(), |all, (name, examples)| {
-            all.mut_subcommand(name, |command| {
-                let own = command.get_after_help().map(|own| format!("{own}\n\n"));
-                let help = own.unwrap_or_default() + &in_lines(examples);
-                command.after_help(help)
-            })
-        })
-}
-
-fn in_lines(examples: &[(&str, &str)]) -> String {
-    let lines = examples
-        .iter()
-        .map(|(line, what)| format!("  {line}\n      {what}\n"));
-    format!("Examples:\n{}", lines.collect::<String>().trim_end())
+    Cli::command().mut_subcommands(|command| {
+        let own = command.get_after_help().map(|own| format!("{own}\n\n"));
+        let lines =
+            examples(command.get_name()).map(|(line, what)| format!("\n  {line}\n      {what}"));
+        let help = format!(
+            "{}Examples:{}",
+            own.unwrap_or_default(),
+            lines.collect::<String>()
+        );
+        command.after_help(help)
+    })
 }
 
 /// Writes a manual page for the program and for each command.
@@ -372,10 +138,9 @@ mod tests {
     fn every_command_has_examples_and_each_can_be_typed() {
         for sub in Cli::command().get_subcommands() {
             let name = sub.get_name();
-            let (_, examples) = EXAMPLES.iter().find(|(of, _)| *of == name).expect(name);
-            for (line, what) in *examples {
-                assert!(line.starts_with(&format!("study {name}")), "{line}");
-                assert!(!what.is_empty());
+            assert!(examples(name).next().is_some(), "{name}");
+            for (line, what) in examples(name) {
+                assert!(!what.is_empty() && !what.starts_with("study "), "{what}");
                 let words = line
                     .replace("\"felt unwell\"", "x")
                     .replace("\"asked for it\"", "x");
