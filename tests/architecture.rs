@@ -15,67 +15,21 @@ const MAX_LINES: usize = 600;
 /// main.rs parses, runs, reports.
 const MAX_MAIN_LINES: usize = 30;
 
-/// Crate → the crates of this workspace that it may depend on, then those that only
-/// its tests may.
-const CRATES: &[(&str, &[&str], &[&str])] = &[
-    ("study-base", &[], &[]),
-    ("study-wire", &[], &[]),
-    ("study-stats", &[], &[]),
-    ("study-haptics", &["study-base", "study-wire"], &[]),
-    ("study-plan", &["study-base", "study-stats"], &[]),
-    (
-        "study-session",
-        &["study-base", "study-plan", "study-wire"],
-        &[],
-    ),
-    (
-        "study-analysis",
-        &[
-            "study-base",
-            "study-haptics",
-            "study-plan",
-            "study-session",
-            "study-stats",
-            "study-wire",
-        ],
-        &[],
-    ),
-    (
-        "study-report",
-        &[
-            "study-analysis",
-            "study-base",
-            "study-haptics",
-            "study-plan",
-            "study-session",
-            "study-stats",
-            "study-wire",
-        ],
-        &[],
-    ),
-    (
-        "study-device",
-        &["study-base", "study-haptics", "study-session", "study-wire"],
-        &[],
-    ),
-    (
-        "study",
-        &[
-            "study-analysis",
-            "study-base",
-            "study-device",
-            "study-haptics",
-            "study-plan",
-            "study-report",
-            "study-session",
-            "study-stats",
-            "study-wire",
-        ],
-        &[],
-    ),
-    ("study-firmware", &["study-wire"], &[]),
-    ("study-firmware-c", &["study-wire"], &[]),
-];
+/// Crate: the crates of this workspace that it may depend on.
+const CRATES: &str = "\
+study-base:
+study-wire:
+study-stats:
+study-haptics: study-base study-wire
+study-plan: study-base study-stats
+study-session: study-base study-plan study-wire
+study-analysis: study-base study-haptics study-plan study-session study-stats study-wire
+study-report: study-analysis study-base study-haptics study-plan study-session study-stats study-wire
+study-device: study-base study-haptics study-session study-wire
+study: study-analysis study-base study-device study-haptics study-plan study-report study-session study-stats study-wire
+study-firmware: study-wire
+study-firmware-c: study-wire
+";
 
 /// Crates that count as one module of the import table, under this name.
 const ONE_MODULE: [(&str, &str); 3] = [
@@ -83,159 +37,49 @@ const ONE_MODULE: [(&str, &str); 3] = [
     ("study-report", "report"),
     ("study-device", "device"),
 ];
-/// Module → the modules that it may import. `study-base` is open to all who depend
-/// on it; the crates of [`ONE_MODULE`] and `study-wire` count as one module each.
-const IMPORTS: &[(&str, &[&str])] = &[
-    ("diagnostic", &["text"]),
-    ("procedure", &["stats"]),
-    ("protocol", &["procedure", "stats"]),
-    ("schedule", &["protocol"]),
-    ("outcome", &["procedure", "protocol"]),
-    ("session", &["procedure", "protocol", "schedule", "outcome"]),
-    ("page", &["protocol", "session"]),
-    ("store", &["procedure", "protocol", "outcome"]),
-    ("rendering", &["protocol", "outcome", "wire"]),
-    ("analyze", &["protocol", "procedure", "outcome", "stats"]),
-    (
-        "power",
-        &["protocol", "procedure", "outcome", "analyze", "stats"],
-    ),
-    ("export", &["protocol", "outcome", "analyze"]),
-    ("preregister", &["protocol", "outcome", "analyze"]),
-    (
-        "load",
-        &[
-            "family",
-            "identify",
-            "model",
-            "preregister",
-            "protocol",
-            "recording",
-            "schedule",
-            "store",
-            "wire",
-        ],
-    ),
-    (
-        "study",
-        &[
-            "analyze",
-            "load",
-            "outcome",
-            "preregister",
-            "protocol",
-            "store",
-        ],
-    ),
-    ("model", &["wire"]),
-    ("family", &["model", "wire"]),
-    ("trajectory", &["wire"]),
-    ("plant", &["trajectory", "wire"]),
-    ("identify", &["model", "recording", "wire"]),
-    ("device", &["outcome", "model", "plant", "wire"]),
-    ("rater", &["protocol", "model", "plant", "wire"]),
-    (
-        "rehearsal",
-        &[
-            "analyze", "device", "load", "protocol", "rater", "runner", "store",
-        ],
-    ),
-    (
-        "runner",
-        &[
-            "session",
-            "device",
-            "store",
-            "identify",
-            "outcome",
-            "protocol",
-            "rendering",
-            "model",
-            "rater",
-            "wire",
-        ],
-    ),
-    (
-        "report",
-        &[
-            "analyze",
-            "stats",
-            "identify",
-            "load",
-            "model",
-            "outcome",
-            "power",
-            "preregister",
-            "procedure",
-            "protocol",
-            "recording",
-            "store",
-            "study",
-        ],
-    ),
-    ("tui", &["runner", "page", "session", "outcome", "protocol"]),
-    (
-        "plain",
-        &["runner", "page", "session", "outcome", "protocol", "tui"],
-    ),
-    (
-        "screen",
-        &["runner", "page", "session", "outcome", "protocol"],
-    ),
-    (
-        "cli",
-        &[
-            "analyze",
-            "device",
-            "export",
-            "identify",
-            "load",
-            "model",
-            "outcome",
-            "plain",
-            "plant",
-            "power",
-            "procedure",
-            "protocol",
-            "rater",
-            "recording",
-            "rehearsal",
-            "rendering",
-            "report",
-            "runner",
-            "schedule",
-            "screen",
-            "session",
-            "stats",
-            "store",
-            "study",
-            "trajectory",
-            "tui",
-            "wire",
-        ],
-    ),
-    ("main", &["cli"]),
-    // between the modules of study-wire
-    ("certificate", &["predict"]),
-    ("predict", &["real"]),
-    ("estimate", &["predict", "real"]),
-    ("message", &["frame", "mechanism", "predict", "real"]),
-    ("servo", &["mechanism", "predict", "real"]),
-    ("mechanism", &["certificate", "predict", "real"]),
-    (
-        "handler",
-        &[
-            "certificate",
-            "frame",
-            "mechanism",
-            "message",
-            "predict",
-            "real",
-            "servo",
-        ],
-    ),
-    ("stats", &[]),
-];
+/// Module: the modules that it may import. `study-base` is open to all who depend on it; the
+/// crates of [`ONE_MODULE`] and `study-wire` count as one module each. The last ones are between
+/// the modules of study-wire.
+const IMPORTS: &str = "\
+diagnostic: text
+procedure: stats
+protocol: procedure stats
+schedule: protocol
+outcome: procedure protocol
+session: procedure protocol schedule outcome
+page: protocol session
+store: procedure protocol outcome
+rendering: protocol outcome wire
+analyze: protocol procedure outcome stats
+power: protocol procedure outcome analyze stats
+export: protocol outcome analyze
+preregister: protocol outcome analyze
+load: family identify model preregister protocol recording schedule store wire
+study: analyze load outcome preregister protocol store
+model: wire
+family: model wire
+trajectory: wire
+plant: trajectory wire
+identify: model recording wire
+device: outcome model plant wire
+rater: protocol model plant wire
+rehearsal: analyze device load protocol rater runner store
+runner: session device store identify outcome protocol rendering model rater wire
+report: analyze stats identify load model outcome power preregister procedure protocol recording store study
+tui: runner page session outcome protocol
+plain: runner page session outcome protocol tui
+screen: runner page session outcome protocol
+cli: analyze device export identify load model outcome plain plant power procedure protocol rater recording rehearsal rendering report runner schedule screen session stats store study trajectory tui wire
+main: cli
+certificate: predict
+predict: real
+estimate: predict real
+message: frame mechanism predict real
+servo: mechanism predict real
+mechanism: certificate predict real
+handler: certificate frame mechanism message predict real servo
+stats:
+";
 
 /// Modules that may touch files, clocks, terminals, processes or the network.
 const WITH_IO: &[&str] = &[
@@ -399,7 +243,7 @@ fn folder(package: &str) -> PathBuf {
 
 fn sources() -> Vec<Source> {
     let mut files = Vec::new();
-    for (package, _, _) in CRATES.iter().copied() {
+    for package in table(CRATES).into_keys() {
         let src = folder(package).join("src");
         let mut folders = vec![src.clone()];
         while let Some(folder) = folders.pop() {
@@ -444,16 +288,17 @@ fn imported<'a>(from: &'a Source, path: &'a [String]) -> Option<&'a str> {
     (module != from.module()).then_some(module)
 }
 
-fn imports() -> BTreeMap<&'static str, BTreeSet<&'static str>> {
-    IMPORTS
-        .iter()
-        .map(|(module, may)| (*module, may.iter().copied().collect()))
+/// The lines of a table: a name, and the names after its colon.
+fn table(text: &'static str) -> BTreeMap<&'static str, BTreeSet<&'static str>> {
+    let lines = text.lines().map(|line| line.split_once(':').unwrap());
+    lines
+        .map(|(name, others)| (name, others.split_whitespace().collect()))
         .collect()
 }
 
 /// What is wrong with single files.
 fn violations(files: &[Source]) -> Vec<String> {
-    let allowed = imports();
+    let allowed = table(IMPORTS);
     let known: BTreeSet<&str> = files.iter().map(Source::module).chain(["wire"]).collect();
     let mut wrong = Vec::new();
     for source in files {
@@ -499,7 +344,7 @@ fn violations(files: &[Source]) -> Vec<String> {
 
 /// What the tables permit and nobody needs.
 fn unused(files: &[Source]) -> Vec<String> {
-    let mut left = imports();
+    let mut left = table(IMPORTS);
     let mut io: BTreeSet<&str> = WITH_IO.iter().copied().collect();
     for source in files.iter().filter(|s| !s.is_test()) {
         for path in source.paths() {
@@ -604,18 +449,13 @@ fn dependencies(manifest: &toml::Table, section: &str) -> BTreeSet<String> {
 
 #[test]
 fn crates_depend_on_what_the_table_says() {
-    for (package, normal, in_tests) in CRATES.iter().copied() {
+    for (package, allowed) in table(CRATES) {
         let text = fs::read_to_string(folder(package).join("Cargo.toml")).unwrap();
         let manifest: toml::Table = text.parse().unwrap();
-        let expected = |names: &[&str]| names.iter().map(|s| (*s).to_owned()).collect();
-        let normal: BTreeSet<String> = expected(normal);
-        assert_eq!(dependencies(&manifest, "dependencies"), normal, "{package}");
-        let in_tests: BTreeSet<String> = expected(in_tests);
-        assert_eq!(
-            dependencies(&manifest, "dev-dependencies"),
-            in_tests,
-            "{package}"
-        );
+        let used = dependencies(&manifest, "dependencies");
+        assert!(used.iter().eq(allowed), "{package}: {used:?}");
+        let of_tests = dependencies(&manifest, "dev-dependencies");
+        assert!(of_tests.is_empty(), "{package}: {of_tests:?}");
     }
 }
 
