@@ -10,6 +10,7 @@
 //! participants. Tests over participants hold for these realizations only.
 
 mod adjusted;
+mod agreement;
 mod better;
 mod cells;
 mod checks;
@@ -32,6 +33,7 @@ mod ordinal;
 mod overflow;
 mod pairs;
 pub mod psychophysics;
+mod question;
 mod range;
 mod record;
 mod reference;
@@ -61,8 +63,7 @@ pub use warning::Warning;
 
 use adjusted::Adjusted;
 use cells::Cells;
-use rayon::prelude::*;
-use results::{Correlation, Evidence, Field as _, LmmVafCrossed, Results};
+use results::{Correlation, Evidence, LmmVafCrossed, Results};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -303,30 +304,23 @@ pub fn analyze_with_progress(ratings: &Ratings, rules: &Rules, progress: &Progre
     let used = rows(ratings, |i| decisions[i].is_none());
     let (cells, rows_decided) =
         rayon::join(|| Cells::of(&used), || row_decisions(ratings, &decisions));
-    let ((mut results, mut values), counts) = rayon::join(
+    let (mut results, counts) = rayon::join(
         || statistics(&cells, rules, progress),
         || Counts::of(ratings, &used, &decisions, rules),
     );
-    overflow::explain(&used, &mut results, &mut values);
+    overflow::explain(&used, &mut results);
     if exclusions.iter().any(|e| e.rows > 0) {
         let all = rows(ratings, |i| {
             let reason = decisions[i].as_deref();
             matches!(reason, None | Some(Reason::Rule(_)))
         });
-        let (_, all) = statistics(&Cells::of(&all), rules, progress);
-        headline::without_exclusions(&all, &mut values);
+        let all = statistics(&Cells::of(&all), rules, progress);
+        results.before_exclusion = Some(Box::new(all.before_exclusion()));
     }
     let design = Design::of(&cells);
     let (findings, pairs) = findings::findings(&cells, design, rules, &results.evidence);
-    findings::put(&findings, &mut values);
-    let warnings = warnings::warnings(
-        &cells,
-        &counts,
-        rules,
-        &exclusions,
-        (&results, &values),
-        &findings,
-    );
+    results.finding = findings::numbers(&findings);
+    let warnings = warnings::warnings(&cells, &counts, rules, &exclusions, &results, &findings);
     let warnings = range::before(warnings, &used, rules);
     Analysis {
         question: ratings.question.clone(),
@@ -361,8 +355,8 @@ pub fn analyze_with_progress(ratings: &Ratings, rules: &Rules, progress: &Progre
         findings,
         pairs,
         parts: Vec::new(),
+        values: results.values(),
         results,
-        values,
         warnings,
         counts,
     }
@@ -384,66 +378,49 @@ struct Inputs<'a> {
     rules: &'a Rules,
 }
 
-/// Computes a group of statistics.
-type Group = fn(&Inputs<'_>, &mut Values);
+impl Progress {
+    /// Computes a group of statistics, and counts it.
+    fn counted<T>(&self, group: impl FnOnce() -> T) -> T {
+        let computed = group();
+        self.done.fetch_add(1, Ordering::Relaxed);
+        computed
+    }
+}
 
-/// Independent groups of statistics, the slowest ones first.
-const GROUPS: [Group; 7] = [
-    |i, values| vaf::over_participants(i.cells, i.rules, values),
-    |i, values| ordinal::ordinal(i.cells, values),
-    |i, values| effects::agree(i.cells, values),
-    |i, values| describe::describe(i.cells, values),
-    |i, values| subjects::subjects(i.cells, values),
-    |i, values| effects::pairs(i.cells, values),
-    |i, values| checks::checks(i.cells, i.rules, values),
-];
+/// Groups of statistics that are computed beside each other.
+const GROUPS: u64 = 9;
 
 /// All statistics. Each group runs on one thread, so the number of threads changes
 /// no bit of the result.
-fn statistics(cells: &Cells<'_>, rules: &Rules, progress: &Progress) -> (Results, Values) {
-    progress
-        .groups
-        .fetch_add(GROUPS.len() as u64, Ordering::Relaxed);
+fn statistics(cells: &Cells<'_>, rules: &Rules, progress: &Progress) -> Results {
+    progress.groups.fetch_add(GROUPS, Ordering::Relaxed);
     let adjusted = &Adjusted::of(cells);
     let inputs = Inputs {
         cells,
         adjusted,
         rules,
     };
-    let ((fitted, (corr, corr_adjusted)), mut parts) = rayon::join(
-        || {
-            let correlations = || vaf::correlations(cells, adjusted, rules);
-            rayon::join(|| mixed::mixed(cells), correlations)
-        },
-        || -> Vec<(usize, Values)> {
-            (GROUPS.iter().enumerate())
-                .par_bridge()
-                .map(|(index, group)| {
-                    let mut values = Values::default();
-                    group(&inputs, &mut values);
-                    progress.done.fetch_add(1, Ordering::Relaxed);
-                    (index, values)
-                })
-                .collect()
-        },
-    );
-    parts.sort_by_key(|(index, _)| *index);
-    let mut values = Values::default();
-    for (_, part) in parts {
-        values.extend(part);
-    }
-    let results = results(&inputs, fitted, corr, corr_adjusted);
-    results.put("", &mut values);
-    (results, values)
-}
-
-fn results(
-    inputs: &Inputs<'_>,
-    fitted: mixed::Fitted,
-    mut corr: Correlation,
-    mut corr_adjusted: Correlation,
-) -> Results {
-    let (cells, rules) = (inputs.cells, inputs.rules);
+    let mixed = || progress.counted(|| mixed::mixed(cells));
+    let correlations = || progress.counted(|| vaf::correlations(cells, adjusted, rules));
+    let over_participants = || progress.counted(|| vaf::over_participants(cells, rules));
+    let ordinal = || progress.counted(|| ordinal::ordinal(cells));
+    let agreement = || progress.counted(|| agreement::agreement(cells));
+    let describe = || progress.counted(|| describe::describe(cells));
+    let subjects = || progress.counted(|| subjects::subjects(cells));
+    let posthoc = || progress.counted(|| effects::posthoc(cells));
+    let checks =
+        || progress.counted(|| (checks::ends(cells, rules.scale), checks::residuals(cells)));
+    let slow = || rayon::join(over_participants, ordinal);
+    let others = || rayon::join(|| rayon::join(subjects, posthoc), checks);
+    let fast = || rayon::join(|| rayon::join(agreement, describe), others);
+    let models = || rayon::join(mixed, correlations);
+    let (
+        (fitted, (mut corr, mut corr_adjusted)),
+        (
+            (over_participants, ordinal),
+            ((agreement, descriptives), ((screening, posthoc), (ends, residuals))),
+        ),
+    ) = rayon::join(models, || rayon::join(slow, fast));
     headline::explain(&mut corr, rules.alpha);
     headline::explain(&mut corr_adjusted, rules.alpha);
     if let Some(share) = &mut corr.share {
@@ -456,8 +433,18 @@ fn results(
         sensitivity: headline::sensitivity(Design::of(cells), &corr_adjusted, rules.alpha),
         evidence: Evidence {
             lmm_variance: Some(fitted.variance),
-            ..evidence(inputs, corr, corr_adjusted, fitted.crossed)
+            ..evidence(&inputs, corr, corr_adjusted, fitted.crossed)
         },
+        descriptives,
+        screening,
+        posthoc,
+        agreement,
+        over_participants,
+        ordinal,
+        ends,
+        residuals,
+        finding: BTreeMap::new(),
+        before_exclusion: None,
     }
 }
 

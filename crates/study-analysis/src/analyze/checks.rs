@@ -1,17 +1,33 @@
 //! Checks of what the tests assume: `ends/*` (ratings at the ends of the scale) and
 //! `residuals/*` (the shape of what participants and realizations leave unexplained).
 
-use super::Rules;
 use super::cells::Cells;
-use super::identifiers::group_id;
-use super::values::Values;
+use super::record::{RealizationName, Stat, statistics};
+use std::collections::BTreeMap;
 use study_stats::describe::{Sum, mean, shape};
 
-pub(super) fn checks(cells: &Cells<'_>, rules: &Rules, values: &mut Values) {
-    if let Some(scale) = rules.scale {
-        ends(cells, scale, values);
+statistics! {
+    /// Ratings of a realization at the ends of the stated scale. A warning names realizations with more than half of their ratings at one end.
+    pub struct Ends {
+        /// share at the lowest end
+        share_low: Stat,
+        /// share at the highest end
+        share_high: Stat,
+        /// of the mean from the lowest end
+        distance_low: Stat,
+        /// of the mean from the highest end
+        distance_high: Stat,
     }
-    residuals(cells, values);
+
+    /// The shape of the residuals of the complete table: cell mean less the means of its row and column plus the grand mean; mᵣ are their central moments.
+    pub struct Residuals {
+        /// m₃/m₂^1.5
+        skewness: Stat,
+        /// m₄/m₂² − 3
+        excess_kurtosis: Stat,
+        /// the largest in units of √m₂
+        largest: Stat,
+    }
 }
 
 /// The ratings of a realization.
@@ -23,7 +39,14 @@ struct Rated {
     sum: Sum,
 }
 
-fn ends(cells: &Cells<'_>, (low, high): (f64, f64), values: &mut Values) {
+/// By realization; empty without a scale.
+pub(super) fn ends(
+    cells: &Cells<'_>,
+    scale: Option<(f64, f64)>,
+) -> BTreeMap<RealizationName, Ends> {
+    let Some((low, high)) = scale else {
+        return BTreeMap::new();
+    };
     let r = cells.ratings;
     let mut rated = vec![Rated::default(); r.models.len()];
     for &i in &cells.order {
@@ -35,19 +58,23 @@ fn ends(cells: &Cells<'_>, (low, high): (f64, f64), values: &mut Values) {
             own.sum.add(rating);
         }
     }
-    for (m, own) in rated.iter().enumerate() {
+    let ends = rated.iter().enumerate().map(|(m, own)| {
+        let or = |x: Option<f64>| Stat::or(x, "no ratings");
         let of = |x: f64| (own.n > 0.0).then(|| x / own.n);
-        let mut g = values.group(group_id("ends", &[cells.model_name(m)]), "no ratings");
-        g.maybe("share_low", of(own.low));
-        g.maybe("share_high", of(own.high));
         let mean = of(own.sum.get());
-        g.maybe("distance_low", mean.map(|mean| mean - low));
-        g.maybe("distance_high", mean.map(|mean| high - mean));
-    }
+        let ends = Ends {
+            share_low: or(of(own.low)),
+            share_high: or(of(own.high)),
+            distance_low: or(mean.map(|mean| mean - low)),
+            distance_high: or(mean.map(|mean| high - mean)),
+        };
+        (cells.model_name(m).into(), ends)
+    });
+    ends.collect()
 }
 
 /// The residuals of the complete table: cell mean less the means of its row and column.
-fn residuals(cells: &Cells<'_>, values: &mut Values) {
+pub(super) fn residuals(cells: &Cells<'_>) -> Residuals {
     let table = cells.table(&cells.tested());
     let columns: Vec<f64> = (0..table.models.len())
         .filter_map(|j| mean(&table.column(j)))
@@ -65,8 +92,9 @@ fn residuals(cells: &Cells<'_>, values: &mut Values) {
     let varies = table.rows.len() > 1 && table.models.len() > 1 && size > 1e-12;
     let found = shape(&residuals).filter(|_| varies);
     let why = "fewer than two complete participants or realizations, or no residuals";
-    let mut g = values.group("residuals", why);
-    g.maybe("skewness", found.map(|f| f.skewness));
-    g.maybe("excess_kurtosis", found.map(|f| f.excess_kurtosis));
-    g.maybe("largest", found.map(|f| f.largest));
+    Residuals {
+        skewness: Stat::or(found.map(|f| f.skewness), why),
+        excess_kurtosis: Stat::or(found.map(|f| f.excess_kurtosis), why),
+        largest: Stat::or(found.map(|f| f.largest), why),
+    }
 }

@@ -1,8 +1,8 @@
 //! `desc/*`, `desc_all/*`, `design/*`, `univariate/*`, `regression/*`.
 
 use super::cells::{Cells, CompleteTable, within};
-use super::identifiers::group_id;
-use super::values::Values;
+use super::record::{Interval, List, RealizationName, Stat, statistics};
+use std::collections::BTreeMap;
 use study_stats::describe::{counts, lag1_autocorrelation, mean, quantile, sd, sorted};
 use study_stats::distribution::t_quantile;
 use study_stats::regression::line;
@@ -14,14 +14,155 @@ pub(super) const ONE: &str = "fewer than two ratings";
 const ONE_SUBJECT: &str = "fewer than two subjects";
 pub(super) const NO_REPETITION: &str = "no cell has two ratings";
 
-pub(super) fn describe(cells: &Cells<'_>, values: &mut Values) {
+statistics! {
+    /// Counts over all realizations.
+    pub struct Sizes {
+        /// ratings
+        n_ratings: Stat,
+        /// trials without a rating
+        n_missing_ratings: Stat,
+        /// participants
+        n_subjects: Stat,
+        /// realizations
+        n_models: Stat,
+        /// participants and realizations with a rating
+        n_cells: Stat,
+        /// participants with every test realization
+        n_subjects_complete: Stat,
+        /// 1 if every cell holds the same number of ratings and none is missing
+        balanced: Stat,
+    }
+
+    /// All ratings.
+    pub struct DescribedAll {
+        /// their mean
+        mean: Stat,
+        /// their standard deviation (n − 1)
+        sd: Stat,
+        /// degrees of freedom within cells
+        within_cell_df: Stat,
+        /// √(Σ within-cell squares/df)
+        within_cell_sd: Stat,
+        /// 1.96·√2·`within_cell_sd`
+        repeatability_coefficient: Stat,
+        /// the lowest rating; only if all are whole numbers
+        hist_from: Option<Stat>,
+        /// counts of the whole numbers from `hist_from` on
+        hist: Option<List>,
+    }
+
+    /// The cells of a realization. If they hold unequal numbers of ratings, their mean differs from that of the ratings, and a warning says so.
+    pub struct SubjectMean {
+        /// participants who rated it
+        n: Stat,
+        /// mean over the cells
+        mean: Stat,
+        /// over the cells
+        sd: Stat,
+        /// `sd`/√`n`
+        sem: Stat,
+        /// t interval of the mean
+        ci95: Interval,
+    }
+
+    /// Within-participant intervals of a tested realization: cells minus the mean of their row plus the grand mean (Cousineau 2005).
+    pub struct CousineauMorey {
+        /// SEM × √(M/(M−1)) (Morey 2008)
+        sem: Stat,
+        /// `sem` times t(.975, S−1)
+        ci95_half: Stat,
+    }
+
+    /// The ratings of a realization.
+    pub struct Described {
+        /// their number
+        n: Stat,
+        /// over all ratings
+        mean: Stat,
+        /// n − 1, over all ratings, as in the paper
+        sd: Stat,
+        /// type 7 of Hyndman & Fan (1996), as the quartiles
+        median: Stat,
+        /// first quartile
+        q1: Stat,
+        /// third quartile
+        q3: Stat,
+        /// the lowest
+        min: Stat,
+        /// the highest
+        max: Stat,
+        /// counts of the whole numbers from `desc_all/hist_from` on
+        hist: Option<List>,
+        /// over participants
+        subject_mean: SubjectMean,
+        /// within participants
+        cousineau_morey: Option<CousineauMorey>,
+    }
+
+    /// A table of one subject and one realization, such as NIST's StRD sets.
+    pub struct Univariate {
+        /// numbers
+        n: Stat,
+        /// their mean
+        mean: Stat,
+        /// n − 1
+        sd: Stat,
+        /// of each number with the next
+        lag1_autocorrelation: Stat,
+    }
+
+    /// Least squares of the numbers of one subject on VAF, such as NIST's StRD sets.
+    pub struct Regression {
+        /// at a VAF of 0
+        intercept: Stat,
+        /// per VAF
+        slope: Stat,
+        /// standard error of `intercept`
+        intercept_se: Stat,
+        /// standard error of `slope`
+        slope_se: Stat,
+        /// √(residual squares/(n − 2))
+        residual_sd: Stat,
+        /// share of the variance that the line explains
+        r2: Stat,
+        /// of the line
+        f: Stat as "F",
+        /// the correlation
+        pearson_r: Stat,
+    }
+
+    /// What the ratings are.
+    pub struct Descriptives {
+        /// how many there are
+        design: Sizes,
+        /// together
+        desc_all: DescribedAll,
+        /// by realization
+        desc: BTreeMap<RealizationName, Described>,
+        /// of one subject
+        univariate: Option<Univariate>,
+        /// of one subject
+        regression: Option<Regression>,
+    }
+}
+
+pub(super) fn describe(cells: &Cells<'_>) -> Descriptives {
     let table = cells.table(&cells.tested());
     let bins = whole_scale(cells);
-    design(cells, &table, values);
-    all(cells, bins, values);
-    by_model(cells, bins, values);
-    cousineau_morey(cells, &table, values);
-    alone(cells, values);
+    let mut desc = by_model(cells, bins);
+    cousineau_morey(&table, &mut desc);
+    let (univariate, regression) = alone(cells);
+    Descriptives {
+        design: design(cells, &table),
+        desc_all: all(cells, bins),
+        desc: desc
+            .into_iter()
+            .enumerate()
+            .map(|(m, own)| (cells.model_name(m).into(), own))
+            .collect(),
+        univariate,
+        regression,
+    }
 }
 
 /// Smallest and largest rating, if all are whole and the range is not too wide.
@@ -54,7 +195,7 @@ fn rated(cells: &Cells<'_>) -> Vec<f64> {
     cells.ratings.rating.iter().copied().flatten().collect()
 }
 
-fn design(cells: &Cells<'_>, table: &CompleteTable, values: &mut Values) {
+fn design(cells: &Cells<'_>, table: &CompleteTable) -> Sizes {
     let r = cells.ratings;
     let rated = rated(cells).len();
     let (s, m) = (r.subjects.len(), r.models.len());
@@ -63,34 +204,35 @@ fn design(cells: &Cells<'_>, table: &CompleteTable, values: &mut Values) {
         && rated == r.len()
         && cells.cells.len() == s * m
         && cells.cells.iter().all(|c| c.rows.len() == per_cell);
-    let mut g = values.group("design", "");
-    g.put("n_ratings", rated as f64);
-    g.put("n_missing_ratings", (r.len() - rated) as f64);
-    g.put("n_subjects", s as f64);
-    g.put("n_models", m as f64);
-    g.put("n_cells", cells.cells.len() as f64);
-    g.put("n_subjects_complete", table.subjects.len() as f64);
-    g.put("balanced", f64::from(u8::from(balanced)));
-}
-
-fn all(cells: &Cells<'_>, bins: Option<(f64, f64)>, values: &mut Values) {
-    let rated = rated(cells);
-    let mut g = values.group("desc_all", "no ratings");
-    g.maybe("mean", mean(&rated));
-    g.put_or("sd", sd(&rated), ONE);
-    let (ss, df) = within(&cells.cells);
-    let within_sd = (df > 0).then(|| (ss / df as f64).sqrt());
-    g.put("within_cell_df", df as f64);
-    g.put_or("within_cell_sd", within_sd, NO_REPETITION);
-    let coefficient = within_sd.map(|s| 1.96 * std::f64::consts::SQRT_2 * s);
-    g.put_or("repeatability_coefficient", coefficient, NO_REPETITION);
-    if let Some((low, high)) = bins {
-        g.put("hist_from", low);
-        g.list("hist", counts(&rated, low, high));
+    Sizes {
+        n_ratings: Stat::count(rated),
+        n_missing_ratings: Stat::count(r.len() - rated),
+        n_subjects: Stat::count(s),
+        n_models: Stat::count(m),
+        n_cells: Stat::count(cells.cells.len()),
+        n_subjects_complete: Stat::count(table.subjects.len()),
+        balanced: Stat::flag(balanced),
     }
 }
 
-fn by_model(cells: &Cells<'_>, bins: Option<(f64, f64)>, values: &mut Values) {
+fn all(cells: &Cells<'_>, bins: Option<(f64, f64)>) -> DescribedAll {
+    let rated = rated(cells);
+    let (ss, df) = within(&cells.cells);
+    let within_sd = (df > 0).then(|| (ss / df as f64).sqrt());
+    let coefficient = within_sd.map(|s| 1.96 * std::f64::consts::SQRT_2 * s);
+    DescribedAll {
+        mean: Stat::or(mean(&rated), "no ratings"),
+        sd: Stat::or(sd(&rated), ONE),
+        within_cell_df: Stat::count(df),
+        within_cell_sd: Stat::or(within_sd, NO_REPETITION),
+        repeatability_coefficient: Stat::or(coefficient, NO_REPETITION),
+        hist_from: bins.map(|(low, _)| Stat::of(low)),
+        hist: bins.map(|(low, high)| List::of(counts(&rated, low, high))),
+    }
+}
+
+/// The ratings of each realization.
+fn by_model(cells: &Cells<'_>, bins: Option<(f64, f64)>) -> Vec<Described> {
     let r = cells.ratings;
     let mut by_model: Vec<Vec<f64>> = vec![Vec::new(); r.models.len()];
     for &i in &cells.order {
@@ -99,40 +241,45 @@ fn by_model(cells: &Cells<'_>, bins: Option<(f64, f64)>, values: &mut Values) {
         }
     }
     let subject_means = cells.subject_means();
-    for (m, x) in by_model.iter().enumerate() {
-        let id = group_id("desc", &[cells.model_name(m)]);
-        let s = ascending(x, bins);
-        let mut g = values.group(id.clone(), "no ratings");
-        g.put("n", x.len() as f64);
-        g.maybe("mean", mean(x));
-        g.put_or("sd", sd(x), ONE);
-        g.maybe("median", quantile(&s, 0.5));
-        g.maybe("q1", quantile(&s, 0.25));
-        g.maybe("q3", quantile(&s, 0.75));
-        g.maybe("min", s.first().copied());
-        g.maybe("max", s.last().copied());
-        if let Some((low, high)) = bins {
-            g.list("hist", counts(x, low, high));
-        }
-        let x: &[f64] = &subject_means[m];
-        let mut g = values.group(format!("{id}/subject_mean"), ONE_SUBJECT);
-        let center = mean(x);
-        let spread = sd(x);
-        let sem = spread.map(|s| s / (x.len() as f64).sqrt());
-        let half = sem.and_then(|s| Some(s * t_quantile(0.975, x.len() as f64 - 1.0)?));
-        let center = center.map(|c| c + cells.offset);
-        g.put("n", x.len() as f64);
-        g.put_or("mean", center, "no ratings");
-        g.maybe("sd", spread);
-        g.maybe("sem", sem);
-        let ends = center.zip(half).map(|(c, h)| (c - h, c + h));
-        g.interval("ci95", ends);
+    (by_model.iter().zip(&subject_means))
+        .map(|(x, means)| {
+            let s = ascending(x, bins);
+            let or = |x: Option<f64>| Stat::or(x, "no ratings");
+            Described {
+                n: Stat::count(x.len()),
+                mean: or(mean(x)),
+                sd: Stat::or(sd(x), ONE),
+                median: or(quantile(&s, 0.5)),
+                q1: or(quantile(&s, 0.25)),
+                q3: or(quantile(&s, 0.75)),
+                min: or(s.first().copied()),
+                max: or(s.last().copied()),
+                hist: bins.map(|(low, high)| List::of(counts(x, low, high))),
+                subject_mean: subject_mean(means, cells.offset),
+                cousineau_morey: None,
+            }
+        })
+        .collect()
+}
+
+fn subject_mean(x: &[f64], offset: f64) -> SubjectMean {
+    let center = mean(x).map(|c| c + offset);
+    let spread = sd(x);
+    let sem = spread.map(|s| s / (x.len() as f64).sqrt());
+    let half = sem.and_then(|s| Some(s * t_quantile(0.975, x.len() as f64 - 1.0)?));
+    let ends = center.zip(half).map(|(c, h)| (c - h, c + h));
+    SubjectMean {
+        n: Stat::count(x.len()),
+        mean: Stat::or(center, "no ratings"),
+        sd: Stat::or(spread, ONE_SUBJECT),
+        sem: Stat::or(sem, ONE_SUBJECT),
+        ci95: Interval::or(ends, ONE_SUBJECT),
     }
 }
 
 /// Within-subject intervals: ratings less the subject's mean (Cousineau 2005), SEM
 /// times √(M/(M − 1)) (Morey 2008).
-fn cousineau_morey(cells: &Cells<'_>, table: &CompleteTable, values: &mut Values) {
+fn cousineau_morey(table: &CompleteTable, desc: &mut [Described]) {
     let (s, m) = (table.rows.len(), table.models.len());
     let why = if m < 2 {
         "fewer than two realizations"
@@ -155,43 +302,42 @@ fn cousineau_morey(cells: &Cells<'_>, table: &CompleteTable, values: &mut Values
         let sem = sd(&column)
             .filter(|_| m >= 2)
             .map(|v| v / (s as f64).sqrt() * correction);
-        let id = group_id("desc", &[cells.model_name(model)]);
-        let mut g = values.group(format!("{id}/cousineau_morey"), why);
-        g.maybe("sem", sem);
-        g.maybe("ci95_half", sem.zip(t).map(|(a, b)| a * b));
+        desc[model].cousineau_morey = Some(CousineauMorey {
+            sem: Stat::or(sem, why),
+            ci95_half: Stat::or(sem.zip(t).map(|(a, b)| a * b), why),
+        });
     }
 }
 
 /// A table of one subject: univariate data, or a regression on VAF.
-fn alone(cells: &Cells<'_>, values: &mut Values) {
+fn alone(cells: &Cells<'_>) -> (Option<Univariate>, Option<Regression>) {
     let r = cells.ratings;
     if r.subjects.len() != 1 {
-        return;
+        return (None, None);
     }
     let x = rated(cells);
-    if r.models.len() <= 1 {
-        let mut g = values.group("univariate", "all numbers are equal");
-        g.put("n", x.len() as f64);
-        g.maybe("mean", mean(&x));
-        g.put_or("sd", sd(&x), ONE);
-        g.maybe("lag1_autocorrelation", lag1_autocorrelation(&x));
-    }
+    let equal = "all numbers are equal";
+    let univariate = (r.models.len() <= 1).then(|| Univariate {
+        n: Stat::count(x.len()),
+        mean: Stat::or(mean(&x), equal),
+        sd: Stat::or(sd(&x), ONE),
+        lag1_autocorrelation: Stat::or(lag1_autocorrelation(&x), equal),
+    });
     let once = cells.cells.iter().all(|c| c.rows.len() == 1) || r.model.iter().all(Option::is_none);
     let rows = (0..r.len()).filter(|&i| r.rating[i].is_some());
     let vaf: Option<Vec<f64>> = rows.map(|i| r.vaf[i]).collect();
-    let Some(l) = vaf
+    let found = vaf
         .filter(|v| once && v.len() >= 3)
-        .and_then(|vaf| line(&vaf, &x))
-    else {
-        return;
-    };
-    let mut g = values.group("regression", "the line fits without a residual");
-    g.put("intercept", l.intercept);
-    g.put("slope", l.slope);
-    g.put("intercept_se", l.intercept_se);
-    g.put("slope_se", l.slope_se);
-    g.put("residual_sd", l.residual_sd);
-    g.put("r2", l.r2);
-    g.maybe("F", l.f);
-    g.put("pearson_r", l.r);
+        .and_then(|vaf| line(&vaf, &x));
+    let regression = found.map(|l| Regression {
+        intercept: Stat::of(l.intercept),
+        slope: Stat::of(l.slope),
+        intercept_se: Stat::of(l.intercept_se),
+        slope_se: Stat::of(l.slope_se),
+        residual_sd: Stat::of(l.residual_sd),
+        r2: Stat::of(l.r2),
+        f: Stat::or(l.f, "the line fits without a residual"),
+        pearson_r: Stat::of(l.r),
+    });
+    (univariate, regression)
 }

@@ -1,12 +1,9 @@
-//! Differences between realizations and agreement: `friedman/*`, `rmanova/*`,
-//! `rmanova2/*`, `posthoc/*`, `icc_*`, `krippendorff_*`. All over the tested
-//! realizations.
+//! Differences between realizations: `friedman/*`, `rmanova/*`, `rmanova2/*`, `posthoc/*`. All
+//! over the tested realizations.
 
 use super::cells::{Cell, Cells, CompleteTable};
-use super::identifiers::pair_id;
-use super::record::{List, Stat, statistics};
-use super::values::Values;
-use study_stats::agreement::{Alpha, Coefficient, Icc, icc, krippendorff};
+use super::record::{List, PairName, Stat, statistics};
+use std::collections::BTreeMap;
 use study_stats::anova::{Effect, one_way, two_way};
 use study_stats::friedman::friedman;
 use study_stats::paired::{holm, paired};
@@ -17,12 +14,8 @@ pub(super) const MAX_COLUMNS: usize = 300;
 /// Largest number of realizations that are compared pair by pair.
 pub const MAX_PAIRED: usize = 8;
 
-/// Largest number of distinct repetitions for agreement.
-const MAX_LABELS: usize = 10_000;
-
-const FEW: &str = "fewer than two complete subjects or realizations";
-const NO_END: &str = "the interval of ICC2 ends where Spearman–Brown's formula has its pole";
-const NO_ERROR: &str = "the ratings leave no variance of error";
+pub(super) const FEW: &str = "fewer than two complete subjects or realizations";
+pub(super) const NO_ERROR: &str = "the ratings leave no variance of error";
 
 statistics! {
     /// Friedman's test: mid-ranks within each subject's row, χ² = (k−1) Σ(Rⱼ − n(k+1)/2)²/(Σr² − nk(k+1)²/4).
@@ -113,6 +106,34 @@ statistics! {
         inter: TwoWayEffect,
     }
 
+    /// The cell means of two realizations, a minus b, over the complete participants; up to eight realizations. Ranks, zeros and ties are those of the differences rounded to 10⁻¹⁰ (of the size of the ratings, if that is below 1); `mean_diff` and t are not rounded.
+    pub struct Posthoc {
+        /// mean difference
+        mean_diff: Stat,
+        /// paired
+        t: Stat,
+        /// of `t`
+        p_t: Stat,
+        /// by Holm (1979) over all pairs that have a p
+        p_t_holm: Stat,
+        /// mean difference over the standard deviation of the differences
+        dz: Stat,
+        /// mean difference over the mean of the two standard deviations
+        d_av: Stat,
+        /// differences in Wilcoxon's signed-rank test, without zeros
+        wilcoxon_n: Stat,
+        /// W₊, the sum of the ranks of positive differences
+        wilcoxon_w_plus: Stat as "wilcoxon_Wplus",
+        /// (W₊ − W₋)/(W₊ + W₋)
+        rank_biserial: Stat,
+        /// with continuity and tie corrections
+        p_wilcoxon_normal: Stat,
+        /// conditional on the ties, min(1, 2·tail), up to 500 differences
+        p_wilcoxon_exact: Stat,
+        /// by Holm (1979) over all pairs that have a p
+        p_wilcoxon_exact_holm: Stat,
+    }
+
     /// Whether realizations differ.
     pub struct Differences {
         /// by ranks
@@ -131,16 +152,6 @@ pub(super) fn ranks_and_anova(cells: &Cells<'_>) -> Differences {
         rmanova: anova(&table),
         rmanova2: anova_with_repetitions(cells, &table),
     }
-}
-
-pub(super) fn pairs(cells: &Cells<'_>, values: &mut Values) {
-    posthoc(cells, &cells.table(&cells.tested()), values);
-}
-
-pub(super) fn agree(cells: &Cells<'_>, values: &mut Values) {
-    let models = cells.tested();
-    agreement(cells, &cells.table(&models), values);
-    repetitions(cells, &models, values);
 }
 
 fn ranks(table: &CompleteTable) -> Friedman {
@@ -251,10 +262,12 @@ fn balanced(cells: &Cells<'_>, table: &CompleteTable) -> Option<(Vec<Vec<f64>>, 
     (rows.len() >= 2 && table.models.len() >= 2).then_some((rows, n))
 }
 
-fn posthoc(cells: &Cells<'_>, table: &CompleteTable, values: &mut Values) {
+/// Paired tests of up to eight realizations.
+pub(super) fn posthoc(cells: &Cells<'_>) -> BTreeMap<PairName, Posthoc> {
+    let table = cells.table(&cells.tested());
     let m = table.models.len();
     if !(2..=MAX_PAIRED).contains(&m) || table.rows.len() < 2 {
-        return;
+        return BTreeMap::new();
     }
     let columns: Vec<Vec<f64>> = (0..m).map(|j| table.column(j)).collect();
     let mut pairs = Vec::new();
@@ -262,136 +275,32 @@ fn posthoc(cells: &Cells<'_>, table: &CompleteTable, values: &mut Values) {
         for b in a + 1..m {
             if let Some(p) = paired(&columns[a], &columns[b]) {
                 let name = |j: usize| cells.model_name(table.models[j]);
-                pairs.push((pair_id("posthoc", name(a), name(b)), p));
+                pairs.push((PairName::of(name(a), name(b)), p));
             }
         }
     }
     let t_holm = holm(&pairs.iter().map(|(_, p)| p.p_t).collect::<Vec<_>>());
     let w_holm = holm(&pairs.iter().map(|(_, p)| p.p_exact).collect::<Vec<_>>());
-    for (i, (id, p)) in pairs.iter().enumerate() {
-        let mut g = values.group(id.clone(), "all differences are equal");
-        g.put("mean_diff", p.mean_diff);
-        g.maybe("t", p.t);
-        g.maybe("p_t", p.p_t);
-        g.maybe("p_t_holm", t_holm[i]);
-        g.maybe("dz", p.dz);
-        g.put_or("d_av", p.d_av, "neither realization's ratings vary");
-        g.put("wilcoxon_n", p.wilcoxon_n as f64);
-        let why = "no difference other than zero";
-        g.put_or("wilcoxon_Wplus", p.w_plus, why);
-        g.put_or("rank_biserial", p.rank_biserial, why);
-        g.put_or("p_wilcoxon_normal", p.p_normal, why);
-        let why = "no difference other than zero, or more than 500";
-        g.put_or("p_wilcoxon_exact", p.p_exact, why);
-        g.put_or("p_wilcoxon_exact_holm", w_holm[i], why);
-    }
-}
-
-fn agreement(cells: &Cells<'_>, table: &CompleteTable, values: &mut Values) {
-    let transposed: Vec<Vec<f64>> = (0..table.models.len()).map(|j| table.column(j)).collect();
-    put_icc(icc(&transposed).as_ref(), "icc_subjects", FEW, values);
-    let r = cells.ratings;
-    let labels = labels(cells, &table.models);
-    // A unit is one repetition of one realization.
-    let columns = cells.columns(&table.models);
-    let mut units = vec![Vec::new(); table.models.len() * labels.len()];
-    for (&i, &v) in cells.order.iter().zip(&cells.sorted) {
-        let column = r.model[i].and_then(|m| columns[m as usize]);
-        if let (Ok(k), Some(j)) = (labels.binary_search(&r.repetition[i]), column) {
-            units[j * labels.len() + k].push(v);
-        }
-    }
-    put_alpha(krippendorff(&units), "krippendorff_subjects", values);
-}
-
-/// The distinct repetition numbers of some realizations, sorted.
-fn labels(cells: &Cells<'_>, models: &[usize]) -> Vec<u32> {
-    let r = cells.ratings;
-    let mut labels: Vec<u32> = Vec::new();
-    for cell in &cells.cells {
-        if models.binary_search(&cell.model).is_err() {
-            continue;
-        }
-        for &i in &cells.order[cell.rows.clone()] {
-            if let Err(at) = labels.binary_search(&r.repetition[i]) {
-                labels.insert(at, r.repetition[i]);
-            }
-        }
-        // In a table that numbers all rows these are no repetitions.
-        if labels.len() > MAX_LABELS {
-            return Vec::new();
-        }
-    }
-    labels
-}
-
-/// Intraclass correlation of the repetitions, over the cells that have all of them.
-fn repetitions(cells: &Cells<'_>, models: &[usize], values: &mut Values) {
-    let labels = labels(cells, models);
-    let units: Vec<&[f64]> = (cells.cells.iter())
-        .filter(|c| models.binary_search(&c.model).is_ok())
-        .map(|c| cells.of_cell(c))
-        .collect();
-    let complete: Vec<&[f64]> = (units.iter().copied())
-        .filter(|u| u.len() == labels.len())
-        .collect();
-    let found = icc(&complete);
-    let why = "fewer than two cells with two repetitions or more";
-    put_icc(found.as_ref(), "icc_repetitions", why, values);
-    let mut g = values.group("icc_repetitions", why);
-    g.put(
-        "n_cells",
-        if labels.len() > 1 {
-            complete.len() as f64
-        } else {
-            0.0
-        },
-    );
-    let sem = found.map(|i| i.ms_error.max(0.0).sqrt());
-    g.maybe("sem", sem);
-    let change = sem.map(|s| 1.96 * std::f64::consts::SQRT_2 * s);
-    g.maybe("smallest_detectable_change", change);
-    put_alpha(krippendorff(&units), "krippendorff_repetitions", values);
-}
-
-fn put_icc(found: Option<&Icc>, prefix: &str, few: &str, values: &mut Values) {
-    let Some(i) = found else {
-        let names = ["ICC1", "ICC2", "ICC3", "ICC1k", "ICC2k", "ICC3k"];
-        values.group(prefix, few).none(&names);
-        return;
-    };
-    let mut g = values.group(prefix, NO_ERROR);
-    g.put("ms_targets", i.ms_targets);
-    g.put("ms_raters", i.ms_raters);
-    g.put("ms_error", i.ms_error);
-    g.maybe("F_1", i.f_1);
-    g.maybe("p_1", i.p_1);
-    g.maybe("F_3", i.f_3);
-    g.maybe("p_3", i.p_3);
-    g.maybe("ICC1k", i.icc1k);
-    let coefficients: [(&str, Option<Coefficient>); 5] = [
-        ("ICC1", i.icc1),
-        ("ICC2", i.icc2),
-        ("ICC3", i.icc3),
-        ("ICC2k", i.icc2k),
-        ("ICC3k", i.icc3k),
-    ];
-    for (name, c) in coefficients {
-        g.maybe(name, c.map(|c| c.value));
-        let ends = c.and_then(|c| c.ci95);
-        for (end, value) in [("lo", ends.map(|e| e.0)), ("hi", ends.map(|e| e.1))] {
-            match value {
-                Some(None) => g.put_or(&format!("{name}/{end}"), None, NO_END),
-                value => g.maybe(&format!("{name}/{end}"), value.flatten()),
-            }
-        }
-    }
-}
-
-fn put_alpha(alpha: Alpha, prefix: &str, values: &mut Values) {
-    let why = "no unit has two ratings, or all are equal, or more than 1000 differ";
-    let mut g = values.group(prefix, why);
-    g.maybe("nominal", alpha.nominal);
-    g.maybe("ordinal", alpha.ordinal);
-    g.maybe("interval", alpha.interval);
+    let tests = pairs.into_iter().zip(t_holm.into_iter().zip(w_holm));
+    let tests = tests.map(|((name, p), (t_holm, w_holm))| {
+        let or = |x: Option<f64>| Stat::or(x, "all differences are equal");
+        let ranked = |x: Option<f64>| Stat::or(x, "no difference other than zero");
+        let exact = |x| Stat::or(x, "no difference other than zero, or more than 500");
+        let posthoc = Posthoc {
+            mean_diff: Stat::of(p.mean_diff),
+            t: or(p.t),
+            p_t: or(p.p_t),
+            p_t_holm: or(t_holm),
+            dz: or(p.dz),
+            d_av: Stat::or(p.d_av, "neither realization's ratings vary"),
+            wilcoxon_n: Stat::count(p.wilcoxon_n),
+            wilcoxon_w_plus: ranked(p.w_plus),
+            rank_biserial: ranked(p.rank_biserial),
+            p_wilcoxon_normal: ranked(p.p_normal),
+            p_wilcoxon_exact: exact(p.p_exact),
+            p_wilcoxon_exact_holm: exact(w_holm),
+        };
+        (name, posthoc)
+    });
+    tests.collect()
 }

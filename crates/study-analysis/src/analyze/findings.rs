@@ -14,74 +14,17 @@ mod vaf;
 use super::Rules;
 use super::cells::Cells;
 use super::design::Design;
-use super::identifiers::group_id;
-use super::record::{Field as _, Interval, Stat, Why, statistics};
+use super::question::FindingNumbers;
+use super::record::{Interval, Stat, Why};
 use super::results::Evidence;
-use super::values::Values;
 use super::verdicts;
 use super::warning::Warning;
+use std::collections::BTreeMap;
 use study_stats::level;
 
+pub use super::question::Question;
 pub use pairs::Pair;
 pub(super) use vaf::{AboutVaf, vaf as of_vaf};
-
-/// A question of the study.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Question {
-    /// Does VAF predict the rating?
-    Vaf,
-    /// Does the VAF of what was delivered predict the rating?
-    Delivered,
-    /// Does the memory of the identification (the forgetting factor) matter?
-    Memory,
-    /// Does the best-rated realization differ from the second best?
-    Best,
-    /// Do the realizations differ?
-    Differ,
-    /// Which pairs of realizations differ?
-    Pairs,
-    /// Do participants differ in how they rate the realizations?
-    Disagreement,
-    /// Do ratings drift over the session?
-    Order,
-    /// Does a rating depend on the one before it?
-    CarryOver,
-    /// Does the best-rated realization differ from this reference?
-    Reference(String),
-    /// Is it equivalent to this reference, within the stated margin?
-    Equivalence(String),
-    /// Does this hidden duplicate differ from its original?
-    Repeat(String),
-    /// Do the differences between realizations depend on the site?
-    SiteRealizations,
-    /// Does the effect of VAF depend on the site?
-    SiteVaf,
-    /// Do the sites differ in their mean rating?
-    SiteLevel,
-}
-
-impl Question {
-    /// The identifier in `--json` and of its statistics, `finding/ID/*`.
-    pub fn id(&self) -> String {
-        match self {
-            Self::Vaf => "vaf".to_owned(),
-            Self::Delivered => "delivered".to_owned(),
-            Self::Memory => "memory".to_owned(),
-            Self::Best => "best".to_owned(),
-            Self::Differ => "differ".to_owned(),
-            Self::Pairs => "pairs".to_owned(),
-            Self::Disagreement => "disagreement".to_owned(),
-            Self::Order => "order".to_owned(),
-            Self::CarryOver => "carry-over".to_owned(),
-            Self::Reference(name) => group_id("reference", &[name]),
-            Self::Equivalence(name) => group_id("equivalence", &[name]),
-            Self::Repeat(name) => group_id("repeat", &[name]),
-            Self::SiteRealizations => "site-realizations".to_owned(),
-            Self::SiteVaf => "site-vaf".to_owned(),
-            Self::SiteLevel => "site-level".to_owned(),
-        }
-    }
-}
 
 /// The answer to a question.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -419,43 +362,13 @@ pub(super) fn findings(
     (found, facts.pairs)
 }
 
-/// The numbers of all findings, as `finding/ID/*`.
-pub(super) fn put(findings: &[Finding], values: &mut Values) {
-    for finding in findings {
-        let id = format!("finding/{}", finding.question.id());
-        numbers(finding).put(&id, values);
-    }
+/// The numbers of all findings.
+pub(super) fn numbers(findings: &[Finding]) -> BTreeMap<Question, FindingNumbers> {
+    let of = |f: &Finding| (f.question.clone(), numbers_of(f));
+    findings.iter().map(of).collect()
 }
 
-statistics! {
-    /// The answer to a question of the report.
-    pub struct FindingNumbers {
-        /// 1 (yes) or 0 (not shown)
-        verdict: Stat,
-        /// corrected for the number of comparisons and held against `level`
-        p: Stat,
-        /// the level of significance of the test
-        level: Stat,
-        /// of the test that decides ([report.md](report.md))
-        statistic: Stat,
-        /// first degrees of freedom
-        df1: Stat,
-        /// second degrees of freedom
-        df2: Stat,
-        /// main estimate
-        estimate: Stat,
-        /// its interval
-        ci95: Interval,
-        /// standardized effect size
-        effect: Stat,
-        /// participants on whom it rests
-        n_participants: Stat,
-        /// realizations on which it rests
-        n_realizations: Stat,
-    }
-}
-
-fn numbers(f: &Finding) -> FindingNumbers {
+fn numbers_of(f: &Finding) -> FindingNumbers {
     let why = Why::from(
         f.reason()
             .unwrap_or("the question has no such number")

@@ -8,7 +8,6 @@ use super::correlation::{Correlation, Share};
 use super::design::Design;
 use super::mixed::{Coefficients, LmmVafCrossed};
 use super::record::{Interval, Number as _, RealizationName, Stat, statistics};
-use super::values::Values;
 use std::collections::BTreeMap;
 use study_stats::anova::one_way;
 use study_stats::correlation::equivalence;
@@ -250,37 +249,5 @@ pub(super) fn components(cells: &Cells<'_>) -> Variance {
             interaction: of_part(interaction),
             noise: of_part(noise),
         }),
-    }
-}
-
-/// The statistics that are compared with and without the exclusions.
-const BOTH: [&str; 17] = [
-    "adjusted/",
-    "corr/n_models",
-    "corr/pearson/",
-    "corr/spearman/",
-    "corr/kendall/",
-    "corr/share/",
-    "corr_adjusted/pearson/",
-    "desc/",
-    "design/",
-    "friedman/",
-    "lmm_cells/",
-    "lmm_vaf_crossed/",
-    "posthoc/",
-    "realistic/",
-    "reference/",
-    "rmanova/",
-    "variance/",
-];
-
-/// Adds the main results of `all`, computed without the exclusion rules.
-pub(super) fn without_exclusions(all: &Values, values: &mut Values) {
-    let ids: Vec<&str> = (all.iter())
-        .map(|(id, _)| id)
-        .filter(|id| BOTH.iter().any(|b| id.starts_with(b)))
-        .collect();
-    for id in ids {
-        values.copy(all, id, format!("before_exclusion/{id}"));
     }
 }

@@ -7,9 +7,9 @@
 //! probability and no threshold.
 
 use super::cells::Cells;
-use super::identifiers::group_id;
-use super::values::{self, Values};
-use rayon::prelude::*;
+use super::record::{Field, Key, RealizationName, Stat, statistics};
+use std::borrow::Cow;
+use std::collections::BTreeMap;
 use study_stats::clm::{
     CategoryCount, CategoryCounts, ClmError, ClmFit, Predictor, ProportionalOdds, clm,
     proportional_odds,
@@ -61,26 +61,160 @@ enum NotFitted {
     Estimation(#[from] ClmError),
 }
 
-pub(super) fn ordinal(cells: &Cells<'_>, values: &mut Values) {
+/// Two neighboring categories, as in `threshold/4|5`.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct ThresholdName(String);
+
+impl Key for ThresholdName {
+    const PLACEHOLDER: &'static str = "j|k";
+
+    fn part(&self) -> Cow<'_, str> {
+        Cow::Borrowed(&self.0)
+    }
+}
+
+statistics! {
+    /// A cumulative logit model with an effect of each tested realization relative to the first.
+    pub struct ByModel {
+        /// log likelihood
+        loglik: Stat,
+        /// log odds ratio of a realization and the first
+        beta: BTreeMap<RealizationName, Stat>,
+        /// its standard error
+        se: BTreeMap<RealizationName, Stat>,
+        /// between two neighboring categories
+        threshold: BTreeMap<ThresholdName, Stat>,
+    }
+
+    /// A cumulative logit model with a slope on VAF.
+    pub struct ByVaf {
+        /// log likelihood
+        loglik: Stat,
+        /// log odds ratio per unit of VAF
+        beta: Stat as "beta/vaf",
+        /// its standard error
+        se: Stat as "se/vaf",
+        /// between two neighboring categories
+        threshold: BTreeMap<ThresholdName, Stat>,
+    }
+
+    /// Whether one slope for all thresholds is enough: its likelihood ratio against a slope for each.
+    pub struct Proportional {
+        /// of the likelihood ratio
+        chi2: Stat,
+        /// thresholds less one
+        df: Stat,
+        /// of `chi2`
+        p: Stat,
+    }
+
+    /// All ratings taken as independent.
+    pub struct FixedByVaf {
+        /// the model
+        model: ByVaf as "",
+        /// are the odds proportional?
+        proportional_odds: Option<Proportional>,
+    }
+
+    /// With a random intercept of each subject.
+    pub struct MixedByModel {
+        /// fixed effects
+        model: ByModel as "",
+        /// of the random intercepts
+        sd_subject: Option<Stat>,
+        /// 1 if `sd_subject` is 0
+        boundary: Option<Stat>,
+    }
+
+    /// With a random intercept of each subject.
+    pub struct MixedByVaf {
+        /// fixed effects
+        model: ByVaf as "",
+        /// of the random intercepts
+        sd_subject: Option<Stat>,
+        /// 1 if `sd_subject` is 0
+        boundary: Option<Stat>,
+    }
+
+    /// The slope on VAF beside random effects of subjects and of realizations, by Laplace's method, tested by the likelihood ratio. Up to 100 subjects.
+    pub struct CrossedByVaf {
+        /// log odds ratio per unit of VAF
+        beta: Stat as "beta/vaf",
+        /// its standard error
+        se: Stat as "se/vaf",
+        /// log likelihood
+        loglik: Stat,
+        /// without VAF
+        null_loglik: Stat,
+        /// of the random intercepts of subjects
+        sd_subject: Stat,
+        /// of the random intercepts of realizations
+        sd_model: Stat,
+        /// likelihood ratio against no slope
+        lrt_chi2: Stat,
+        /// of `lrt_chi2` with one degree of freedom
+        lrt_p: Stat,
+        /// √((q − 2)(e^(Λ/q) − 1)) with the sign of the slope, of q realizations and Λ = `lrt_chi2`
+        t: Stat,
+        /// of `t` with q − 2 degrees of freedom
+        p: Stat,
+    }
+
+    /// Ordinal regression.
+    pub struct Ordinal {
+        /// all ratings taken as independent
+        clm_model: ByModel,
+        /// by Laplace's method
+        clmm_model_laplace: MixedByModel,
+        /// by adaptive Gauss–Hermite quadrature
+        clmm_model_quad: MixedByModel,
+        /// all ratings taken as independent
+        clm_vaf: FixedByVaf,
+        /// by Laplace's method
+        clmm_vaf_laplace: MixedByVaf,
+        /// by adaptive Gauss–Hermite quadrature
+        clmm_vaf_quad: MixedByVaf,
+        /// the one that generalizes to other realizations
+        clmm_vaf_crossed: CrossedByVaf,
+    }
+}
+
+pub(super) fn ordinal(cells: &Cells<'_>) -> Ordinal {
     let mut test = vec![false; cells.ratings.models.len()];
     for m in cells.tested() {
         test[m] = true;
     }
     let of_test = |i: &usize| cells.ratings.model[*i].is_some_and(|m| test[m as usize]);
     let rows: Vec<usize> = cells.order.iter().copied().filter(of_test).collect();
-    let both: [Group; 3] = [crossed, by_model, by_vaf];
-    let parts = both.par_iter().map(|group| {
-        let mut values = Values::default();
-        group(cells, &rows, &mut values);
-        values
-    });
-    for part in parts.collect::<Vec<Values>>() {
-        values.extend(part);
+    let (clmm_vaf_crossed, (of_model, of_vaf)) = rayon::join(
+        || crossed(cells, &rows),
+        || rayon::join(|| by_model(cells, &rows), || by_vaf(cells, &rows)),
+    );
+    let mixed = |fit: Mixed<ByModel>| MixedByModel {
+        model: fit.model,
+        sd_subject: fit.sd_subject,
+        boundary: fit.boundary,
+    };
+    let [clmm_model_laplace, clmm_model_quad] = of_model.mixed.map(mixed);
+    let mixed = |fit: Mixed<ByVaf>| MixedByVaf {
+        model: fit.model,
+        sd_subject: fit.sd_subject,
+        boundary: fit.boundary,
+    };
+    let [clmm_vaf_laplace, clmm_vaf_quad] = of_vaf.mixed.map(mixed);
+    Ordinal {
+        clm_model: of_model.fixed,
+        clmm_model_laplace,
+        clmm_model_quad,
+        clm_vaf: FixedByVaf {
+            model: of_vaf.fixed,
+            proportional_odds: of_vaf.odds.map(|odds| proportional(odds.as_ref())),
+        },
+        clmm_vaf_laplace,
+        clmm_vaf_quad,
+        clmm_vaf_crossed,
     }
 }
-
-/// Fits the models of one predictor.
-type Group = fn(&Cells<'_>, &[usize], &mut Values);
 
 /// Whether rows, sorted by subject, have more than `most` subjects.
 fn more_subjects(cells: &Cells<'_>, rows: &[usize], most: usize) -> bool {
@@ -95,7 +229,7 @@ fn many(cells: &Cells<'_>, rows: &[usize]) -> bool {
     more_subjects(cells, rows, MAX_SUBJECTS)
 }
 
-fn by_model(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
+fn by_model(cells: &Cells<'_>, rows: &[usize]) -> Fits<ByModel> {
     let model = |i: usize| cells.ratings.model[i];
     let mut present: Vec<u32> = rows.iter().filter_map(|&i| model(i)).collect();
     present.sort_unstable();
@@ -116,11 +250,6 @@ fn by_model(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
     for (g, &m) in (0u32..).zip(&present) {
         level[m as usize] = g;
     }
-    let scale = Scale {
-        names: &names,
-        unit: 1.0,
-        origin: 0.0,
-    };
     let made = if present.len() > MAX_MODELS {
         Err(NotFitted::TooManyRealizations)
     } else {
@@ -133,10 +262,21 @@ fn by_model(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
             (table, ratings)
         })
     };
-    put_all("model", made, many(cells, rows), &scale, values);
+    let named = |x: &[f64]| -> BTreeMap<RealizationName, Stat> {
+        let named = names.iter().zip(x);
+        named
+            .map(|(name, x)| ((*name).into(), Stat::of(*x)))
+            .collect()
+    };
+    fits(made, many(cells, rows), |fit, ratings| ByModel {
+        loglik: Stat::of(fit.loglik),
+        beta: named(&fit.beta),
+        se: named(&fit.se),
+        threshold: thresholds(fit, ratings, 0.0),
+    })
 }
 
-fn by_vaf(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
+fn by_vaf(cells: &Cells<'_>, rows: &[usize]) -> Fits<ByVaf> {
     let vaf = |i: usize| cells.ratings.vaf[i];
     let rows: Vec<usize> = (rows.iter().copied())
         .filter(|&i| vaf(i).is_some())
@@ -150,11 +290,6 @@ fn by_vaf(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
         _ => (0.0, 0.0),
     };
     let (origin, unit) = (0.5 * low + 0.5 * high, 0.5 * high - 0.5 * low);
-    let scale = Scale {
-        names: &["vaf"],
-        unit,
-        origin,
-    };
     let made = if rows.is_empty() {
         Err(NotFitted::NoVaf)
     } else if unit <= 0.0 {
@@ -179,7 +314,17 @@ fn by_vaf(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
             )
         })
     };
-    put_all("vaf", made, many(cells, &rows), &scale, values);
+    // On the scale of the data: β/unit, θ + β·origin/unit.
+    fits(made, many(cells, &rows), |fit, ratings| {
+        let of_data = |x: &[f64]| x.first().map(|x| x / unit);
+        let (beta, se) = (of_data(&fit.beta), of_data(&fit.se));
+        ByVaf {
+            loglik: Stat::of(fit.loglik),
+            beta: Stat::or(beta, ""),
+            se: Stat::or(se, ""),
+            threshold: thresholds(fit, ratings, beta.unwrap_or(0.0) * origin),
+        }
+    })
 }
 
 /// The distinct ratings, ascending.
@@ -251,84 +396,95 @@ fn counts(
     counts
 }
 
-/// Names of the coefficients, and the scaling of x = (value − origin)/unit.
-struct Scale<'a> {
-    names: &'a [&'a str],
-    unit: f64,
-    origin: f64,
+/// A fit with a random intercept of each subject.
+struct Mixed<T> {
+    model: T,
+    sd_subject: Option<Stat>,
+    boundary: Option<Stat>,
 }
 
-fn put_all(
-    what: &str,
+/// The fits of one predictor.
+struct Fits<T> {
+    fixed: T,
+    /// By Laplace's method and by quadrature.
+    mixed: [Mixed<T>; 2],
+    /// Whether the odds are proportional, if there is a fit.
+    odds: Option<Option<ProportionalOdds>>,
+}
+
+/// Fits the models of a table; `of` makes the record of a fit with these ratings.
+fn fits<T: Field>(
     made: Result<(CategoryCounts, Vec<f64>), NotFitted>,
     many: bool,
-    scale: &Scale<'_>,
-    values: &mut Values,
-) {
-    let ids = [
-        format!("clm_{what}"),
-        format!("clmm_{what}_laplace"),
-        format!("clmm_{what}_quad"),
-    ];
+    of: impl Fn(&ClmFit, &[f64]) -> T,
+) -> Fits<T> {
+    let without = |why: NotFitted| T::undefined(&why.to_string().into());
     let (table, ratings) = match made {
         Ok(made) => made,
         Err(why) => {
-            for id in ids {
-                none(&mut values.group(id, why.to_string()), what);
-            }
-            return;
+            let mixed = || Mixed {
+                model: without(why),
+                sd_subject: None,
+                boundary: None,
+            };
+            return Fits {
+                fixed: without(why),
+                mixed: [mixed(), mixed()],
+                odds: None,
+            };
         }
     };
-    let labels: Vec<String> = ratings
-        .windows(2)
-        .map(|w| format!("{}|{}", w[0], w[1]))
-        .collect();
     let fixed = clm(&table);
-    match &fixed {
-        Ok(fit) => {
-            put(fit, &labels, scale, &mut values.group(&ids[0], ""));
-            if what == "vaf" {
-                proportional(proportional_odds(&table, fit).as_ref(), values);
-            }
-        }
-        Err(cause) => none(&mut values.group(&ids[0], cause.to_string()), what),
-    }
     let mixed: [Result<ClmmFit, NotFitted>; 2] = if many {
         [(); 2].map(|()| Err(NotFitted::TooManySubjects))
     } else {
         let both = clmm(&table);
         [both.laplace, both.quadrature].map(|m| m.map_err(NotFitted::from))
     };
-    for (id, mixed) in ids[1..].iter().zip(mixed) {
-        match mixed {
-            Ok(mixed) => {
-                let mut g = values.group(id, "");
-                put(&mixed.fit, &labels, scale, &mut g);
-                g.put("sd_subject", mixed.sd);
-                g.put("boundary", f64::from(u8::from(mixed.boundary)));
-            }
-            Err(why) => {
-                let mut g = values.group(id, why.to_string());
-                none(&mut g, what);
-                g.none(&["sd_subject"]);
-            }
-        }
+    let with_intercepts = |fit: Result<ClmmFit, NotFitted>| match fit {
+        Ok(fit) => Mixed {
+            model: of(&fit.fit, &ratings),
+            sd_subject: Some(Stat::of(fit.sd)),
+            boundary: Some(Stat::flag(fit.boundary)),
+        },
+        Err(why) => Mixed {
+            model: without(why),
+            sd_subject: Some(Stat::missing(why.to_string())),
+            boundary: None,
+        },
+    };
+    Fits {
+        odds: (fixed.as_ref().ok()).map(|fit| proportional_odds(&table, fit)),
+        fixed: match &fixed {
+            Ok(fit) => of(fit, &ratings),
+            Err(why) => without((*why).into()),
+        },
+        mixed: mixed.map(with_intercepts),
     }
 }
 
-/// Whether one slope for all thresholds is enough.
-fn proportional(found: Option<&ProportionalOdds>, values: &mut Values) {
-    let why =
-        "fewer than three categories, or the model with a slope for each threshold has no fit";
-    let mut g = values.group("clm_vaf/proportional_odds", why);
-    g.maybe("chi2", found.map(|f| f.chi2));
-    g.maybe("df", found.map(|f| f.df));
-    g.maybe("p", found.and_then(|f| f.p));
+/// The thresholds between these ratings, plus a number.
+fn thresholds(fit: &ClmFit, ratings: &[f64], plus: f64) -> BTreeMap<ThresholdName, Stat> {
+    let names = ratings
+        .windows(2)
+        .map(|w| ThresholdName(format!("{}|{}", w[0], w[1])));
+    let thresholds = fit.thresholds.iter().map(|x| Stat::of(x + plus));
+    names.zip(thresholds).collect()
 }
 
-/// The slope on VAF beside random effects of subjects and of realizations, tested by the
-/// likelihood ratio: `clmm_vaf_crossed/*`.
-fn crossed(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
+/// Whether one slope for all thresholds is enough.
+fn proportional(found: Option<&ProportionalOdds>) -> Proportional {
+    let why =
+        "fewer than three categories, or the model with a slope for each threshold has no fit";
+    Proportional {
+        chi2: Stat::or(found.map(|f| f.chi2), why),
+        df: Stat::or(found.map(|f| f.df), why),
+        p: Stat::or(found.and_then(|f| f.p), why),
+    }
+}
+
+/// The slope on VAF beside random effects of subjects and of realizations.
+fn crossed(cells: &Cells<'_>, rows: &[usize]) -> CrossedByVaf {
     let model = |i: usize| cells.ratings.model[i].map(|m| m as usize);
     let vaf = |i: usize| model(i).and_then(|m| cells.vaf[m]);
     let rows: Vec<usize> = (rows.iter().copied())
@@ -364,47 +520,21 @@ fn crossed(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
         let table = CategoryCounts::new(predictors.collect(), 1, ratings.len(), &counts);
         Ok(clmm_crossed(&table)?)
     })();
-    let why = found
-        .as_ref()
-        .err()
-        .map_or_else(String::new, ToString::to_string);
-    let found = found.ok();
-    let mut g = values.group("clmm_vaf_crossed", why);
-    let scaled = |of: fn(&ClmFit) -> &Vec<f64>| {
-        let first = found.as_ref().and_then(|f| of(&f.fit).first());
-        first.map(|x| x / unit)
+    let found = match found {
+        Ok(found) => found,
+        Err(why) => return CrossedByVaf::undefined(why.to_string()),
     };
-    g.maybe("beta/vaf", scaled(|f| &f.beta));
-    g.maybe("se/vaf", scaled(|f| &f.se));
-    g.maybe("loglik", found.as_ref().map(|f| f.fit.loglik));
-    g.maybe("null_loglik", found.as_ref().map(|f| f.null_loglik));
-    g.maybe("sd_subject", found.as_ref().map(|f| f.sd_subject));
-    g.maybe("sd_model", found.as_ref().map(|f| f.sd_realization));
-    g.maybe("lrt_chi2", found.as_ref().map(|f| f.chi2));
-    g.maybe("lrt_p", found.as_ref().and_then(|f| f.p_chi2));
-    g.maybe("t", found.as_ref().map(|f| f.t));
-    g.maybe("p", found.as_ref().and_then(|f| f.p));
-}
-
-fn none(g: &mut values::Group<'_>, what: &str) {
-    g.none(&["loglik"]);
-    if what == "vaf" {
-        g.none(&["beta/vaf", "se/vaf"]);
-    }
-}
-
-/// Adds the estimates on the scale of the data: θ + β·origin/unit, β/unit.
-fn put(fit: &ClmFit, labels: &[String], scale: &Scale<'_>, g: &mut values::Group<'_>) {
-    g.put("loglik", fit.loglik);
-    for ((name, beta), se) in scale.names.iter().zip(&fit.beta).zip(&fit.se) {
-        g.put(&group_id("beta", &[name]), beta / scale.unit);
-        g.put(&group_id("se", &[name]), se / scale.unit);
-    }
-    let shift = match fit.beta.first() {
-        Some(beta) => beta / scale.unit * scale.origin,
-        None => 0.0,
-    };
-    for (label, threshold) in labels.iter().zip(&fit.thresholds) {
-        g.put(&format!("threshold/{label}"), threshold + shift);
+    let scaled = |x: &[f64]| Stat::or(x.first().map(|x| x / unit), "");
+    CrossedByVaf {
+        beta: scaled(&found.fit.beta),
+        se: scaled(&found.fit.se),
+        loglik: Stat::of(found.fit.loglik),
+        null_loglik: Stat::of(found.null_loglik),
+        sd_subject: Stat::of(found.sd_subject),
+        sd_model: Stat::of(found.sd_realization),
+        lrt_chi2: Stat::of(found.chi2),
+        lrt_p: Stat::or(found.p_chi2, ""),
+        t: Stat::of(found.t),
+        p: Stat::or(found.p, ""),
     }
 }

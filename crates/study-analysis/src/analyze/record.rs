@@ -270,6 +270,24 @@ impl<T: Field> Field for Option<T> {
     }
 }
 
+impl<T: Field> Field for Box<T> {
+    fn undefined(why: &Why) -> Self {
+        Self::new(T::undefined(why))
+    }
+
+    fn put(&self, id: &str, values: &mut Values) {
+        (**self).put(id, values);
+    }
+
+    fn explain(&mut self, why: &Why) {
+        (**self).explain(why);
+    }
+
+    fn declare(id: &str, doc: &'static str, all: &mut Vec<Declared>) {
+        T::declare(id, doc, all);
+    }
+}
+
 /// A name of the data by which records are kept.
 pub trait Key: Ord {
     /// What stands for it in a reference.

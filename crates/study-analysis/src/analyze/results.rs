@@ -1,11 +1,17 @@
 //! The statistics of an analysis as records.
 
 pub use super::adjusted::{AdjustedCells, AdjustedMean, CellModel};
+pub use super::agreement::{Agreement, Coefficient, Intraclass, Krippendorff, Repeatability};
+pub use super::checks::{Ends, Residuals};
 pub use super::correlation::{
     Correlation, Kendall, LeaveOneOut, Pearson, Permuted, Share, Spearman, Without,
 };
+pub use super::describe::{
+    CousineauMorey, Described, DescribedAll, Descriptives, Regression, Sizes, SubjectMean,
+    Univariate,
+};
 pub use super::disagreement::{Disagree, Interaction};
-pub use super::effects::{Anova, Differences, Friedman, TwoWay, TwoWayEffect};
+pub use super::effects::{Anova, Differences, Friedman, Posthoc, TwoWay, TwoWayEffect};
 pub use super::headline::{
     EquivalenceOfVaf, Realistic, Sensitivity, SmallCorrelation, SmallEffect, Variance,
     VarianceShares,
@@ -16,7 +22,13 @@ pub use super::mixed::{
     LmmVariance, MarginalMean, Mixed, SlopeVariance,
 };
 pub use super::order::{CarryOver, Drift, Order, RepetitionMean, Slope};
+pub use super::ordinal::{
+    ByModel, ByVaf, CrossedByVaf, FixedByVaf, MixedByModel, MixedByVaf, Ordinal, Proportional,
+    ThresholdName,
+};
 pub use super::pairs::{PairEquivalence, PairTest, PairTests};
+pub use super::question::FindingNumbers;
+use super::question::Question;
 use super::record::statistics;
 pub use super::record::{
     CovariateName, Declared, DuplicateName, Field, Interval, Key, List, Number, PairName,
@@ -26,6 +38,10 @@ pub use super::reference::{DuplicateTest, ReferenceEquivalence, ReferenceTest, R
 pub use super::rendering::{DeliveredVaf, Gain, Judged, Playbacks, RenderedVaf, Rendering};
 pub use super::sites::{
     SiteDifference, SiteLevels, SiteMean, SiteProfiles, SiteTest, Sites, VafOfSite, VafOfSites,
+};
+pub use super::subjects::{Screen, Screened, Screening};
+pub use super::vaf::{
+    Bootstrap, OfSubject, OverParticipants, Page, SubjectCorr, SubjectSlope, Within,
 };
 use super::values::Values;
 use std::collections::BTreeMap;
@@ -66,6 +82,42 @@ statistics! {
         lmm_variance: Option<LmmVariance>,
     }
 
+    /// Of the correlation with adjusted means what is compared.
+    pub struct Adjusted {
+        /// decides whether VAF predicts the rating
+        pearson: Pearson,
+    }
+
+    /// The main results without any exclusion.
+    pub struct BeforeExclusion {
+        /// adjusted means
+        adjusted: BTreeMap<RealizationName, AdjustedMean>,
+        /// their model
+        lmm_cells: CellModel,
+        /// of VAF with the means
+        corr: Correlation,
+        /// of VAF with the adjusted means
+        corr_adjusted: Adjusted,
+        /// ratings of each realization
+        desc: BTreeMap<RealizationName, Described>,
+        /// counts
+        design: Sizes,
+        /// differences by ranks
+        friedman: Friedman,
+        /// differences of cell means
+        rmanova: Anova,
+        /// the crossed mixed model with VAF
+        lmm_vaf_crossed: LmmVafCrossed,
+        /// pairs
+        posthoc: BTreeMap<PairName, Posthoc>,
+        /// shares of high ratings
+        realistic: BTreeMap<RealizationName, Realistic>,
+        /// differences from references
+        reference: BTreeMap<ReferenceName, BTreeMap<RealizationName, ReferenceTest>>,
+        /// components of the variance
+        variance: Variance,
+    }
+
     /// All statistics of ratings.
     pub struct Results {
         /// what the findings rest on
@@ -76,6 +128,26 @@ statistics! {
         realistic: BTreeMap<RealizationName, Realistic>,
         /// what the design can find
         sensitivity: Sensitivity,
+        /// the ratings
+        descriptives: Descriptives as "",
+        /// the participants
+        screening: Screening as "",
+        /// tests of pairs on which no verdict rests
+        posthoc: BTreeMap<PairName, Posthoc>,
+        /// of participants and of repetitions
+        agreement: Agreement as "",
+        /// what does not generalize to other realizations
+        over_participants: OverParticipants as "",
+        /// ordinal models
+        ordinal: Ordinal as "",
+        /// ratings at the ends of the scale
+        ends: BTreeMap<RealizationName, Ends>,
+        /// what participants and realizations leave unexplained
+        residuals: Residuals,
+        /// the answers to the questions of the report
+        finding: BTreeMap<Question, FindingNumbers>,
+        /// if a rule excluded anything
+        before_exclusion: Option<Box<BeforeExclusion>>,
     }
 }
 
@@ -89,6 +161,31 @@ impl Evidence {
 }
 
 impl Results {
+    /// What is compared with the results without the exclusion rules.
+    pub(super) fn before_exclusion(self) -> BeforeExclusion {
+        let evidence = self.evidence;
+        BeforeExclusion {
+            adjusted: evidence.cells.means,
+            lmm_cells: evidence.cells.model,
+            corr: Correlation {
+                leave_one_out: None,
+                ..evidence.corr
+            },
+            corr_adjusted: Adjusted {
+                pearson: evidence.corr_adjusted.pearson,
+            },
+            desc: self.descriptives.desc,
+            design: self.descriptives.design,
+            friedman: evidence.differences.friedman,
+            rmanova: evidence.differences.rmanova,
+            lmm_vaf_crossed: evidence.crossed,
+            posthoc: self.posthoc,
+            realistic: self.realistic,
+            reference: evidence.references.reference,
+            variance: evidence.variance,
+        }
+    }
+
     /// All statistics by identifier.
     pub fn values(&self) -> Values {
         let mut values = Values::default();

@@ -3,8 +3,8 @@
 use super::cells::{Cells, CompleteTable, within};
 use super::describe::{NO_REPETITION, ONE};
 use super::exclude::{pairs, trials};
-use super::identifiers::group_id;
-use super::values::Values;
+use super::record::{ParticipantName, Stat, statistics};
+use std::collections::BTreeMap;
 use study_plan::protocol::Role;
 use study_stats::correlation::pearson;
 use study_stats::describe::{mean, sd};
@@ -12,12 +12,57 @@ use study_stats::describe::{mean, sd};
 /// Largest number of participants that are listed one by one.
 pub(super) const MAX_LISTED: usize = 5000;
 
-pub(super) fn subjects(cells: &Cells<'_>, values: &mut Values) {
+statistics! {
+    /// The ratings of a participant. They flag participants; they never exclude them.
+    pub struct Screened {
+        /// their number
+        n: Stat,
+        /// their mean
+        mean: Stat,
+        /// n − 1
+        sd: Stat,
+        /// the longest run of equal ratings in the order of the trials
+        longest_run: Stat,
+        /// different ratings
+        distinct: Stat,
+        /// √(Σ within-cell squares/df)
+        within_cell_sd: Stat,
+        /// correlation of the cells with the mean of the others
+        leave_one_out_r: Stat,
+        /// mean of the cells of hidden references
+        hidden_reference_mean: Option<Stat>,
+        /// mean of the cells of low anchors
+        low_anchor_mean: Option<Stat>,
+        /// mean distance of the cells of hidden duplicates from those of their originals
+        repeat_distance: Option<Stat>,
+    }
+
+    /// Screening of all participants.
+    pub struct Screen {
+        /// 0: too many to list one by one
+        listed: Stat,
+        /// participants who always gave the same rating
+        n_constant: Stat,
+        /// participants whose mean of the hidden references is not above that of the anchors
+        n_reference_not_above_anchor: Option<Stat>,
+    }
+
+    /// Screening of participants.
+    pub struct Screening {
+        /// one by one
+        subject: BTreeMap<ParticipantName, Screened>,
+        /// together
+        screen: Screen,
+    }
+}
+
+pub(super) fn subjects(cells: &Cells<'_>) -> Screening {
     let r = cells.ratings;
     let n = r.subjects.len();
     let listed = n <= MAX_LISTED;
     let screens = Screens::of(cells);
-    let mut constant = 0.0;
+    let mut constant = 0;
+    let mut subject = BTreeMap::new();
     let table = cells.table(&cells.tested());
     let others = leave_one_out(&table);
     let mut own_cells = cells
@@ -34,44 +79,55 @@ pub(super) fn subjects(cells: &Cells<'_>, values: &mut Values) {
         x.clear();
         x.extend(rows.iter().filter_map(|&i| r.rating[i]));
         if x.len() > 1 && x.iter().all(|v| *v == x[0]) {
-            constant += 1.0;
+            constant += 1;
         }
         if !listed {
             continue;
         }
         let ordered = rows.iter().all(|&i| r.trial_index[i].is_some());
-        let mut g = values.group(group_id("subject", &[cells.subject_name(s)]), "no ratings");
-        g.put("n", x.len() as f64);
-        g.maybe("mean", mean(&x));
-        g.put_or("sd", sd(&x), ONE);
+        let (mean, sd) = (mean(&x), sd(&x));
         rows.sort_by_key(|&i| r.trial_index[i]);
         let run = rows
             .chunk_by(|&a, &b| r.rating[a] == r.rating[b])
             .map(<[usize]>::len)
             .max();
         let run = run.filter(|_| ordered).map(|n| n as f64);
-        g.put_or("longest_run", run, "the order of the trials is not known");
+        let n = Stat::count(x.len());
         x.sort_by(f64::total_cmp);
         x.dedup();
-        g.put("distinct", x.len() as f64);
         let (squares, df) = within(own);
         let within_sd = (df > 0).then(|| (squares / df as f64).sqrt());
-        g.put_or("within_cell_sd", within_sd, NO_REPETITION);
         let alone = table.subjects.binary_search(&s).ok();
         let why = "not all realizations rated, or a constant rater, or nobody else";
-        g.put_or("leave_one_out_r", alone.and_then(|i| others[i]), why);
-        for (name, by_subject) in screens.named() {
-            g.put_or(name, by_subject[s], "none of these was rated");
-        }
+        let of = |screen: &Option<Vec<Option<f64>>>| {
+            let by_subject = screen.as_ref()?;
+            Some(Stat::or(by_subject[s], "none of these was rated"))
+        };
+        let screened = Screened {
+            n,
+            mean: Stat::or(mean, "no ratings"),
+            sd: Stat::or(sd, ONE),
+            longest_run: Stat::or(run, "the order of the trials is not known"),
+            distinct: Stat::count(x.len()),
+            within_cell_sd: Stat::or(within_sd, NO_REPETITION),
+            leave_one_out_r: Stat::or(alone.and_then(|i| others[i]), why),
+            hidden_reference_mean: of(&screens.reference),
+            low_anchor_mean: of(&screens.anchor),
+            repeat_distance: of(&screens.repeat),
+        };
+        subject.insert(cells.subject_name(s).into(), screened);
     }
-    let mut g = values.group("screen", "");
-    g.put("listed", f64::from(u8::from(listed)));
-    g.put("n_constant", constant);
-    if let (Some(high), Some(low)) = (&screens.reference, &screens.anchor) {
+    let both = screens.reference.as_ref().zip(screens.anchor.as_ref());
+    let below = both.map(|(high, low)| {
         let both = high.iter().zip(low).filter_map(|(h, l)| h.zip(*l));
-        let below = both.filter(|(h, l)| h <= l).count();
-        g.put("n_reference_not_above_anchor", below as f64);
-    }
+        Stat::count(both.filter(|(h, l)| h <= l).count())
+    });
+    let screen = Screen {
+        listed: Stat::flag(listed),
+        n_constant: Stat::count(constant),
+        n_reference_not_above_anchor: below,
+    };
+    Screening { subject, screen }
 }
 
 /// Screening statistics of designs with hidden references, anchors or repeats, by subject.
@@ -93,16 +149,6 @@ impl Screens {
             anchor: role(Role::LowAnchor),
             repeat: (!pairs(r).is_empty()).then(|| trials(r, 0..r.len(), true).repeat_distances()),
         }
-    }
-
-    fn named(&self) -> impl Iterator<Item = (&'static str, &Vec<Option<f64>>)> {
-        [
-            ("hidden_reference_mean", &self.reference),
-            ("low_anchor_mean", &self.anchor),
-            ("repeat_distance", &self.repeat),
-        ]
-        .into_iter()
-        .filter_map(|(name, screen)| Some((name, screen.as_ref()?)))
     }
 }
 

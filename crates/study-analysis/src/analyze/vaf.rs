@@ -9,9 +9,9 @@ use super::adjusted::Adjusted;
 use super::cells::{Cells, CompleteTable};
 use super::correlation::{Correlation, FEW};
 use super::draws::Draws;
-use super::identifiers::group_id;
+use super::record::{Interval, ParticipantName, Stat, statistics};
 use super::subjects::MAX_LISTED;
-use super::values::Values;
+use std::collections::BTreeMap;
 use study_stats::bayes::jzs_bf10;
 use study_stats::bootstrap;
 use study_stats::correlation::{pearson, spearman, within_subjects};
@@ -21,6 +21,116 @@ use study_stats::lmm::LmmError;
 use study_stats::paired::one_sample;
 use study_stats::regression::slope;
 
+statistics! {
+    /// The cells of a complete participant on VAF.
+    pub struct OfSubject {
+        /// Pearson's correlation; constant raters have none
+        r: Stat,
+        /// of ranks
+        spearman: Stat,
+        /// least squares; 0 of constant raters
+        slope: Stat,
+    }
+
+    /// Correlations of the participants' cells with VAF; undefined if one of them is ±1.
+    pub struct SubjectCorr {
+        /// of each participant
+        by_subject: BTreeMap<ParticipantName, OfSubject> as "",
+        /// participants with a correlation
+        n_defined: Stat,
+        /// mean of z = atanh r over them
+        fisher_z_mean: Stat,
+        /// tanh of that mean
+        r_back: Stat,
+        /// one-sample t of z
+        t: Stat,
+        /// of `t`
+        p: Stat,
+        /// of `r_back`
+        r_ci95: Interval,
+    }
+
+    /// One-sample t test of the participants' slopes on VAF.
+    pub struct SubjectSlope {
+        /// of the slopes
+        mean: Stat,
+        /// of the slopes
+        sd: Stat,
+        /// against 0
+        t: Stat,
+        /// of `t`
+        p: Stat,
+        /// of the mean
+        ci95: Interval,
+        /// Rouder et al. (2009), scale 0.707
+        jzs_bf10: Stat,
+    }
+
+    /// Page's test of a trend in the order of VAF: scores are the ranks of VAF.
+    pub struct Page {
+        /// Σ score × rank
+        l: Stat as "L",
+        /// by the permutation variance, which accounts for ties
+        z: Stat,
+        /// one-sided
+        p_greater: Stat,
+        /// by Page's own variance (1963)
+        p_greater_no_tie_correction: Option<Stat>,
+    }
+
+    /// Bootstrap of `corr/pearson/r` over complete participants. Up to ten of them, all C(2S−1, S) compositions with their multinomial weights, hence without Monte Carlo error; above, 10,000 resamples. It does not generalize to other realizations.
+    pub struct Bootstrap {
+        /// of r
+        mean: Stat,
+        /// its standard deviation
+        se: Stat,
+        /// 95 %; a quantile is the smallest value with cdf ≥ p
+        percentile: Interval,
+        /// 95 % (Efron 1987)
+        bca: Interval,
+        /// share of resamples with r ≤ 0
+        p_le_zero: Option<Stat>,
+        /// share of resamples in which all realizations have the same mean: they have no r and are left out
+        undefined_probability: Option<Stat>,
+        /// 1: by all compositions
+        exact: Option<Stat>,
+        /// 1: above 500 participants (or 50,000 cells) the means of the resamples are drawn from their limiting normal distribution; with 500 participants and a skewness of 1 this shifts a quantile by .02 standard errors, less than the .027 of 10,000 draws
+        normal_limit: Option<Stat>,
+        /// of BCa; it counts ties half
+        z0: Option<Stat>,
+        /// of BCa
+        jackknife_acceleration: Option<Stat>,
+    }
+
+    /// Repeated-measures correlation (Bakdash & Marusich 2017).
+    pub struct Within {
+        /// the correlation
+        r: Stat,
+        /// N − S − 1
+        df: Stat,
+        /// of r
+        p: Stat,
+        /// by Fisher's z with df − 1
+        ci95: Interval,
+    }
+
+    /// What is estimated over participants, for these realizations only.
+    pub struct OverParticipants {
+        /// correlations
+        subject_corr: SubjectCorr,
+        /// slopes
+        subject_slope: SubjectSlope,
+        /// a trend
+        page: Page,
+        /// other participants
+        bootstrap: Bootstrap,
+        /// over cells
+        rmcorr_cells: Within,
+        /// over trials
+        rmcorr_trials: Within,
+    }
+}
+
 /// The tested realizations with a VAF.
 fn with_vaf(cells: &Cells<'_>) -> Vec<usize> {
     let mut models = cells.tested();
@@ -28,15 +138,20 @@ fn with_vaf(cells: &Cells<'_>) -> Vec<usize> {
     models
 }
 
-/// What is estimated over participants, for these realizations only.
-pub(super) fn over_participants(cells: &Cells<'_>, rules: &Rules, values: &mut Values) {
+pub(super) fn over_participants(cells: &Cells<'_>, rules: &Rules) -> OverParticipants {
     let models = with_vaf(cells);
     let vaf: Vec<f64> = models.iter().filter_map(|&m| cells.vaf[m]).collect();
     let table = cells.table(&models);
-    by_subject(cells, &table, &vaf, values);
-    trend(&table, &vaf, values);
-    resampled(&table, &vaf, rules, values);
-    within(cells, &models, values);
+    let (subject_corr, subject_slope) = by_subject(cells, &table, &vaf);
+    let (rmcorr_cells, rmcorr_trials) = within(cells, &models);
+    OverParticipants {
+        subject_corr,
+        subject_slope,
+        page: trend(&table, &vaf),
+        bootstrap: resampled(&table, &vaf, rules),
+        rmcorr_cells,
+        rmcorr_trials,
+    }
 }
 
 /// The correlations with the means as they are and with the adjusted means.
@@ -146,18 +261,25 @@ impl<'a> Points<'a> {
 }
 
 /// Correlation and slope of each complete subject, and their means.
-fn by_subject(cells: &Cells<'_>, table: &CompleteTable, vaf: &[f64], values: &mut Values) {
+fn by_subject(
+    cells: &Cells<'_>,
+    table: &CompleteTable,
+    vaf: &[f64],
+) -> (SubjectCorr, SubjectSlope) {
     let (mut z, mut slopes, mut perfect) = (Vec::new(), Vec::new(), false);
+    let mut by_subject = BTreeMap::new();
     let enough = vaf.len() >= 3 && !is_constant(vaf);
     for (&s, row) in table.subjects.iter().zip(&table.rows).filter(|_| enough) {
         let r = pearson(vaf, row);
         let b = slope(vaf, row);
         if table.subjects.len() <= MAX_LISTED {
-            let id = group_id("subject_corr", &[cells.subject_name(s)]);
-            let mut g = values.group(id, "the subject rated all realizations alike");
-            g.maybe("r", r);
-            g.maybe("spearman", spearman(vaf, row));
-            g.maybe("slope", b);
+            let or = |x| Stat::or(x, "the subject rated all realizations alike");
+            let of_subject = OfSubject {
+                r: or(r),
+                spearman: or(spearman(vaf, row)),
+                slope: or(b),
+            };
+            by_subject.insert(cells.subject_name(s).into(), of_subject);
         }
         slopes.extend(b);
         if let Some(r) = r {
@@ -172,83 +294,79 @@ fn by_subject(cells: &Cells<'_>, table: &CompleteTable, vaf: &[f64], values: &mu
     } else {
         "fewer than two subjects with a correlation"
     };
+    let or = |x: Option<f64>| Stat::or(x, why);
     let test = one_sample(&z).filter(|_| !perfect);
-    let mut g = values.group("subject_corr", why);
-    g.put("n_defined", z.len() as f64);
-    g.maybe("fisher_z_mean", test.map(|t| t.mean));
-    g.maybe("r_back", test.map(|t| t.mean.tanh()));
-    g.maybe("t", test.and_then(|t| t.t));
-    g.maybe("p", test.and_then(|t| t.p));
     let ends = test.map(|t| t.ci95);
-    g.interval("r_ci95", ends.map(|(l, h)| (l.tanh(), h.tanh())));
+    let correlations = SubjectCorr {
+        by_subject,
+        n_defined: Stat::count(z.len()),
+        fisher_z_mean: or(test.map(|t| t.mean)),
+        r_back: or(test.map(|t| t.mean.tanh())),
+        t: or(test.and_then(|t| t.t)),
+        p: or(test.and_then(|t| t.p)),
+        r_ci95: Interval::or(ends.map(|(l, h)| (l.tanh(), h.tanh())), why),
+    };
     let test = one_sample(&slopes);
     let why = if enough {
         "fewer than two complete subjects, or equal slopes"
     } else {
         FEW
     };
-    let mut g = values.group("subject_slope", why);
-    g.maybe("mean", test.map(|t| t.mean));
-    g.maybe("sd", test.map(|t| t.sd));
-    g.maybe("t", test.and_then(|t| t.t));
-    g.maybe("p", test.and_then(|t| t.p));
-    g.interval("ci95", test.map(|t| t.ci95));
+    let or = |x: Option<f64>| Stat::or(x, why);
     let t = test.and_then(|t| t.t);
-    g.maybe("jzs_bf10", t.and_then(|t| jzs_bf10(t, slopes.len(), 0.707)));
+    let of_slopes = SubjectSlope {
+        mean: or(test.map(|t| t.mean)),
+        sd: or(test.map(|t| t.sd)),
+        t: or(t),
+        p: or(test.and_then(|t| t.p)),
+        ci95: Interval::or(test.map(|t| t.ci95), why),
+        jzs_bf10: or(t.and_then(|t| jzs_bf10(t, slopes.len(), 0.707))),
+    };
+    (correlations, of_slopes)
 }
 
-fn trend(table: &CompleteTable, vaf: &[f64], values: &mut Values) {
+fn trend(table: &CompleteTable, vaf: &[f64]) -> Page {
     let Some(p) = page(&table.rows, vaf).filter(|_| vaf.len() >= 3) else {
         let why = "fewer than two complete subjects, or three realizations, or one VAF";
-        values.group("page", why).none(&["L", "z", "p_greater"]);
-        return;
+        return Page::undefined(why);
     };
-    let mut g = values.group("page", "every subject rated all realizations alike");
-    g.put("L", p.l);
-    g.maybe("z", p.z);
-    g.maybe("p_greater", p.p_greater);
-    let why = "realizations share a VAF";
-    g.put_or(
-        "p_greater_no_tie_correction",
-        p.p_greater_no_tie_correction,
-        why,
-    );
+    let alike = "every subject rated all realizations alike";
+    Page {
+        l: Stat::of(p.l),
+        z: Stat::or(p.z, alike),
+        p_greater: Stat::or(p.p_greater, alike),
+        p_greater_no_tie_correction: Some(Stat::or(
+            p.p_greater_no_tie_correction,
+            "realizations share a VAF",
+        )),
+    }
 }
 
-fn resampled(table: &CompleteTable, vaf: &[f64], rules: &Rules, values: &mut Values) {
+fn resampled(table: &CompleteTable, vaf: &[f64], rules: &Rules) -> Bootstrap {
     let found = bootstrap::correlation(&table.rows, vaf, &mut Draws::new(rules.seed, "bootstrap"));
-    let why = "fewer than two complete subjects or three realizations, or no correlation";
-    let mut g = values.group("bootstrap", why);
     let Some(b) = found else {
-        g.none(&[
-            "mean",
-            "se",
-            "percentile_lo",
-            "percentile_hi",
-            "bca_lo",
-            "bca_hi",
-        ]);
-        return;
+        let why = "fewer than two complete subjects or three realizations, or no correlation";
+        return Bootstrap::undefined(why);
     };
-    g.put("mean", b.mean);
-    g.put("se", b.se);
-    g.put("percentile_lo", b.percentile.0);
-    g.put("percentile_hi", b.percentile.1);
-    g.put("p_le_zero", b.p_le_zero);
-    g.put("undefined_probability", b.undefined_probability);
-    g.put("exact", f64::from(u8::from(b.exact)));
-    g.put("normal_limit", f64::from(u8::from(b.normal_limit)));
-    let why = "the correlation lies at the end of its own distribution";
-    g.put_or("z0", b.z0, why);
-    g.put_or("bca_lo", b.bca.map(|c| c.0), why);
-    g.put_or("bca_hi", b.bca.map(|c| c.1), why);
-    let why = "leaving out any one subject changes nothing, or leaves no correlation";
-    g.put_or("jackknife_acceleration", b.acceleration, why);
+    let end = "the correlation lies at the end of its own distribution";
+    let alone = "leaving out any one subject changes nothing, or leaves no correlation";
+    Bootstrap {
+        mean: Stat::of(b.mean),
+        se: Stat::of(b.se),
+        percentile: Interval::or(Some(b.percentile), ""),
+        bca: Interval::or(b.bca, end),
+        p_le_zero: Some(Stat::of(b.p_le_zero)),
+        undefined_probability: Some(Stat::of(b.undefined_probability)),
+        exact: Some(Stat::flag(b.exact)),
+        normal_limit: Some(Stat::flag(b.normal_limit)),
+        z0: Some(Stat::or(b.z0, end)),
+        jackknife_acceleration: Some(Stat::or(b.acceleration, alone)),
+    }
 }
 
 /// Repeated-measures correlation, over cells and over trials. Trials need a VAF but no
 /// realization.
-fn within(cells: &Cells<'_>, models: &[usize], values: &mut Values) {
+fn within(cells: &Cells<'_>, models: &[usize]) -> (Within, Within) {
     let r = cells.ratings;
     let mut by_cell = Flat::default();
     for own in cells.cells.chunk_by(|a, b| a.subject == b.subject) {
@@ -275,15 +393,7 @@ fn within(cells: &Cells<'_>, models: &[usize], values: &mut Values) {
             }
         }
     }
-    for (id, groups) in [("rmcorr_cells", by_cell), ("rmcorr_trials", by_trial)] {
-        let found = within_subjects(&groups.x, &groups.y, &groups.lengths);
-        let why = "too few ratings with a VAF, or no variation within subjects";
-        let mut g = values.group(id, why);
-        g.maybe("r", found.map(|w| w.r));
-        g.maybe("df", found.map(|w| w.df));
-        g.maybe("p", found.and_then(|w| w.p));
-        g.interval("ci95", found.and_then(|w| w.ci95));
-    }
+    (by_cell.correlate(), by_trial.correlate())
 }
 
 /// Pairs (x, y) of all subjects, and the number of pairs of each.
@@ -305,6 +415,17 @@ impl Flat {
         self.y.push(y);
         if let Some(n) = self.lengths.last_mut() {
             *n += 1;
+        }
+    }
+
+    fn correlate(&self) -> Within {
+        let found = within_subjects(&self.x, &self.y, &self.lengths);
+        let why = "too few ratings with a VAF, or no variation within subjects";
+        Within {
+            r: Stat::or(found.map(|w| w.r), why),
+            df: Stat::or(found.map(|w| w.df), why),
+            p: Stat::or(found.and_then(|w| w.p), why),
+            ci95: Interval::or(found.and_then(|w| w.ci95), why),
         }
     }
 }

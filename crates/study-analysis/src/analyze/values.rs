@@ -68,15 +68,6 @@ impl Values {
         self.0.append(&mut other.0);
     }
 
-    /// Replaces the reason of the undefined statistics whose identifiers match.
-    pub(super) fn explain(&mut self, matches: impl Fn(&str) -> bool, reason: &str) {
-        for (id, value) in &mut self.0 {
-            if let (Value::Undefined(why), true) = (value, matches(id)) {
-                reason.clone_into(why);
-            }
-        }
-    }
-
     /// Copies a statistic of another set to a new identifier.
     pub(super) fn copy(&mut self, from: &Self, id: &str, to: String) {
         if let Some(value) = from.0.get(id) {
@@ -138,13 +129,6 @@ impl Group<'_> {
             Value::Undefined("it overflows".to_owned())
         };
         self.insert(name, value);
-    }
-
-    /// Adds several statistics that are undefined for the group's reason.
-    pub(super) fn none(&mut self, names: &[&str]) {
-        for name in names {
-            self.maybe(name, None);
-        }
     }
 
     fn insert(&mut self, name: &str, value: Value) {

@@ -47,10 +47,7 @@ impl Analysis {
 
     /// The participants that are listed one by one. Untrusted.
     pub fn listed_subjects(&self) -> impl Iterator<Item = &str> {
-        let listed = |s: &&str| {
-            let id = group_id("subject", &[s]);
-            self.values.get(&format!("{id}/n")).is_some()
-        };
+        let listed = |s: &&str| self.results.screening.subject.contains_key(*s);
         self.subjects.iter().map(String::as_str).filter(listed)
     }
 

@@ -6,12 +6,13 @@ use super::design::Design;
 use super::deviation::PreregisteredRule;
 use super::exclude::Applied;
 use super::findings::{Finding, Question, Verdict};
-use super::identifiers::group_id;
-use super::results::{Evidence, Number as _, Results};
+use super::results::{
+    Ends, Evidence, Number as _, RealizationName, Results, Screened, Screening, Stat,
+};
 use super::select::Counts;
 use super::subjects::MAX_LISTED;
-use super::values::Values;
 use super::warning::Warning;
+use std::collections::BTreeMap;
 use study_base::apa;
 use study_base::text::counted;
 use study_stats::permutation::{DRAWS, MAX_EXACT};
@@ -27,7 +28,7 @@ pub(super) fn warnings(
     counts: &Counts,
     rules: &Rules,
     exclusions: &[Applied],
-    (results, values): (&Results, &Values),
+    results: &Results,
     findings: &[Finding],
 ) -> Vec<Warning> {
     let mut found = Vec::new();
@@ -87,11 +88,11 @@ pub(super) fn warnings(
     }
     let changed =
         (rules.deviations.iter()).any(|d| d.affects.contains(&PreregisteredRule::Exclusions));
-    excluded(&mut warn, exclusions, changed, values);
+    excluded(&mut warn, exclusions, changed, results);
     headline(&mut warn, &results.evidence, findings);
-    design(&mut warn, cells, values);
-    raters(&mut warn, cells, values);
-    ends(&mut warn, cells, values);
+    design(&mut warn, cells, results);
+    raters(&mut warn, cells, &results.screening);
+    ends(&mut warn, cells, &results.ends);
     found
 }
 
@@ -113,7 +114,7 @@ fn excluded(
     warn: &mut impl FnMut(&'static str, String),
     exclusions: &[Applied],
     changed: bool,
-    values: &Values,
+    results: &Results,
 ) {
     let (first, later) = if changed {
         ("the", " (changed after the study began)")
@@ -137,11 +138,9 @@ fn excluded(
             );
         }
     }
-    let both = |id: &str| {
-        let before = values.number(&format!("before_exclusion/{id}"));
-        before.zip(values.number(id))
-    };
-    if let Some((before, after)) = both("corr/pearson/r") {
+    let before = results.before_exclusion.as_ref();
+    let before = before.and_then(|b| b.corr.pearson.r.number());
+    if let Some((before, after)) = before.zip(results.evidence.corr.pearson.r.number()) {
         let (before, after) = (apa::r(before), apa::r(after));
         let text = if before == after {
             format!("the exclusions do not change r to three decimals: r = {after}")
@@ -233,7 +232,7 @@ fn headline(
     warn("assumptions", text.to_owned());
 }
 
-fn design(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values: &Values) {
+fn design(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, results: &Results) {
     let design = Design::of(cells);
     // Participants without any rating are counted at the head of the report.
     let incomplete = design.participants - design.complete;
@@ -288,13 +287,14 @@ fn design(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values
             );
         }
     }
-    if values.number("screen/listed") == Some(0.0) {
+    if !results.screening.screen.listed.is_set() {
         warn(
             "many-participants",
             format!("more than {MAX_LISTED} participants: they are screened but not listed"),
         );
     }
-    if values.number("bootstrap/normal_limit") == Some(1.0) {
+    let normal_limit = &results.over_participants.bootstrap.normal_limit;
+    if normal_limit.as_ref().is_some_and(Stat::is_set) {
         warn(
             "normal-limit",
             "with so many participants the bootstrap draws means from their normal limit"
@@ -306,21 +306,19 @@ fn design(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values
     }
 }
 
-fn raters(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values: &Values) {
+fn raters(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, screening: &Screening) {
     if cells.ratings.models.len() < 2 {
         return;
     }
-    let constant = values.number("screen/n_constant").unwrap_or(0.0) as usize;
+    let constant = screening.screen.n_constant.number().unwrap_or(0.0) as usize;
     if constant == 0 {
         return;
     }
+    let is_constant =
+        |s: &Screened| s.n.number().is_some_and(|n| n > 1.0) && s.distinct.number() == Some(1.0);
     let names = (cells.ratings.subjects.iter())
         .map(|s| s.id.as_str())
-        .filter(|id| {
-            let id = group_id("subject", &[id]);
-            let n = values.number(&format!("{id}/n")).unwrap_or(0.0);
-            n > 1.0 && values.number(&format!("{id}/distinct")) == Some(1.0)
-        })
+        .filter(|id| screening.subject.get(*id).is_some_and(is_constant))
         .take(5);
     let shown = names.collect::<Vec<_>>().join(", ");
     let more = if constant > 5 { ", …" } else { "" };
@@ -337,20 +335,23 @@ fn raters(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values
 const MOST: f64 = 0.5;
 
 /// Realizations that most ratings put at an end of the scale.
-fn ends(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values: &Values) {
-    for (code, share, end, beyond) in [
-        ("floor", "share_low", "lowest", "below"),
-        ("ceiling", "share_high", "highest", "above"),
-    ] {
+fn ends(
+    warn: &mut impl FnMut(&'static str, String),
+    cells: &Cells<'_>,
+    ends: &BTreeMap<RealizationName, Ends>,
+) {
+    let shares: [(_, fn(&Ends) -> &Stat, _, _); 2] = [
+        ("floor", |e| &e.share_low, "lowest", "below"),
+        ("ceiling", |e| &e.share_high, "highest", "above"),
+    ];
+    for (code, share, end, beyond) in shares {
         let tested = cells.tested().into_iter().map(|m| cells.model_name(m));
-        let names: Vec<&str> = tested
-            .filter(|name| {
-                let id = group_id("ends", &[name]);
-                values
-                    .number(&format!("{id}/{share}"))
-                    .is_some_and(|share| share > MOST)
-            })
-            .collect();
+        let most = |name: &&str| {
+            share(ends.get(*name)?)
+                .number()
+                .filter(|share| *share > MOST)
+        };
+        let names: Vec<&str> = tested.filter(|name| most(name).is_some()).collect();
         if let [first, ..] = names[..] {
             let others = match names.len() - 1 {
                 0 => String::new(),
