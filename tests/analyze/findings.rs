@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use serde_json::Value as Json;
 use std::fmt::Write as _;
 use study_analysis::analyze::findings::Direction;
+use study_analysis::analyze::results::Number as _;
 use study_analysis::analyze::{
     Analysis, Finding, Include, Question, Rules, TestKind, Verdict, all_findings, analyze,
 };
@@ -239,11 +240,11 @@ fn names_with_separators_do_not_share_a_statistic() {
     assert_eq!(pairs.count(), 10);
     assert_eq!(a.pairs.len(), 10);
     for m in &a.realizations {
-        let mean = a.described(&m.id, "subject_mean/mean").unwrap();
-        let low = a.described(&m.id, "subject_mean/ci95_lo").unwrap();
-        let high = a.described(&m.id, "subject_mean/ci95_hi").unwrap();
+        let described = a.described(&m.id).unwrap();
+        let mean = described.subject_mean.mean.number().unwrap();
+        let (low, high) = described.subject_mean.ci95.ends().unwrap();
         assert!(low <= mean && mean <= high, "{}: {low} {mean} {high}", m.id);
-        assert!((mean - a.described(&m.id, "mean").unwrap()).abs() < 1e-9);
+        assert!((mean - described.mean.number().unwrap()).abs() < 1e-9);
     }
     let page = Printed::of(&a).html;
     assert!(page.contains("a|b − b|c"), "{page}");

@@ -10,6 +10,7 @@ mod vaf;
 pub(super) use conditional::conditional;
 
 use super::{apa, sentences};
+use study_analysis::analyze::results::Number;
 use study_analysis::analyze::{Analysis, Finding, Question};
 use study_base::text::sentence;
 
@@ -87,14 +88,14 @@ fn differ(a: &Analysis) -> Option<Answer> {
 
 /// The shape of what the analysis of variance leaves unexplained.
 fn residuals(a: &Analysis) -> Option<String> {
-    let get = |id: &str| a.values.number(&format!("residuals/{id}"));
-    let (skewness, kurtosis) = (get("skewness")?, get("excess_kurtosis")?);
+    let found = &a.results.residuals;
+    let (skewness, kurtosis) = (found.skewness.number()?, found.excess_kurtosis.number()?);
     Some(format!(
         "Residuals of the cell means: skewness {}, excess kurtosis {} (0 if normally distributed); the \
          largest is {} standard deviations.",
         apa::two(skewness),
         apa::two(kurtosis),
-        apa::two(get("largest")?)
+        apa::two(found.largest.number()?)
     ))
 }
 
@@ -114,9 +115,9 @@ fn disagreement(a: &Analysis) -> Option<Answer> {
             apa::percent(share.value)
         ));
     }
-    let get = |id: &str| a.values.number(&format!("slope_variance/{id}"));
-    if let (Some(sd), Some(slope), Some(chi2), Some(p)) =
-        (get("sd"), get("slope"), get("chi2"), get("p"))
+    let slopes = &a.results.mixed.slope_variance;
+    if let [Some(sd), Some(slope), Some(chi2), Some(p)] =
+        [&slopes.sd, &slopes.slope, &slopes.chi2, &slopes.p].map(Number::number)
     {
         answer.more.push(format!(
             "The slopes of the participants on VAF have the mean {} and the standard deviation {} per .01 \
@@ -148,38 +149,43 @@ fn variance(a: &Analysis) -> Option<Answer> {
 /// Name and share of each variance component: by expected mean squares, else of the
 /// mixed model with crossed random effects.
 pub(super) fn variance_shares(a: &Analysis) -> Vec<(&'static str, f64)> {
-    let get = |id: &str| a.values.number(&format!("variance/share/{id}"));
-    let complete = a.design.uses_complete();
-    if let (Some(model), Some(subject), true) = (get("model"), get("subject"), complete) {
+    let evidence = &a.results.evidence;
+    let shares = evidence.variance.share.as_ref();
+    if let Some(found) = shares.filter(|_| a.design.uses_complete())
+        && let (Some(model), Some(subject)) = (found.model.number(), found.subject.number())
+    {
         let mut shares = vec![("realizations", model), ("participants", subject)];
-        match get("interaction").zip(get("noise")) {
+        match found.interaction.number().zip(found.noise.number()) {
             Some((interaction, noise)) => {
                 shares.push(("participants × realizations", interaction));
                 shares.push(("within cells", noise));
             }
             None => shares.extend(
-                get("interaction_and_noise").map(|x| ("participants × realizations and noise", x)),
+                (found.interaction_and_noise.number())
+                    .map(|x| ("participants × realizations and noise", x)),
             ),
         }
         return shares;
     }
-    let get = |id: &str| a.values.number(&format!("lmm_variance/share_{id}"));
+    let Some(model) = &evidence.lmm_variance else {
+        return Vec::new();
+    };
     let all = [
-        ("realizations", get("model")),
-        ("participants", get("subject")),
-        ("participants × realizations", get("subject_model")),
-        ("within cells", get("error")),
+        ("realizations", &model.share_model),
+        ("participants", &model.share_subject),
+        ("participants × realizations", &model.share_subject_model),
+        ("within cells", &model.share_error),
     ];
     all.into_iter()
-        .filter_map(|(name, x)| Some((name, x?)))
+        .filter_map(|(name, x)| Some((name, x.number()?)))
         .collect()
 }
 
 /// Whether ratings drift over the session.
 fn order(a: &Analysis) -> Option<Answer> {
     let f = a.finding(&Question::Order)?;
-    let get = |id: &str| a.values.number(id);
-    let decimals = apa::decimals(get("order_trial/se").unwrap_or(0.0), 3);
+    let se = a.results.evidence.order.trial.se.number();
+    let decimals = apa::decimals(se.unwrap_or(0.0), 3);
     let slope = f
         .estimate
         .map_or_else(String::new, |e| apa::number(e.value, decimals));

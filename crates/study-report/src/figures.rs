@@ -20,6 +20,7 @@ pub use parts::{PREFIX as PARTS_PREFIX, of_part};
 use super::chart::{Axis, Figure, Look, Mark, Panel, for_names};
 use super::picture::{POINTS, Picture};
 use std::collections::BTreeMap;
+use study_analysis::analyze::results::{Described, Number as _, Stat};
 use study_analysis::analyze::{Analysis, RealizationSummary};
 pub use study_analysis::study::Trace;
 use study_session::outcome::Role;
@@ -219,14 +220,15 @@ impl<'a> Scene<'a> {
         self.models.iter().map(|m| name(m)).collect()
     }
 
-    fn number(&self, model: &str, what: &str) -> Option<f64> {
-        self.a.described(model, what)
+    /// A statistic of the ratings of a realization.
+    fn number(&self, model: &str, field: fn(&Described) -> &Stat) -> Option<f64> {
+        self.a.described(model).map(field).number()
     }
 
     /// The mean of a realization over participants, adjusted if cells are missing.
     fn mean(&self, model: &str) -> Option<f64> {
-        (self.a.about("adjusted", &[model], "mean"))
-            .or_else(|| self.number(model, "subject_mean/mean"))
+        let adjusted = self.a.adjusted(model).map(|m| &m.mean);
+        (adjusted.number()).or_else(|| self.number(model, |d| &d.subject_mean.mean))
     }
 
     /// "adjusted " if means are adjusted for missing cells.
@@ -261,12 +263,12 @@ impl<'a> Scene<'a> {
             }
             None => {
                 // All ratings, so that all figures have the same axis.
-                let ends = |what, end: fn(f64, f64) -> f64| {
+                let ends = |what: fn(&Described) -> &Stat, end: fn(f64, f64) -> f64| {
                     let all = self.models.iter().filter_map(|m| self.number(&m.id, what));
                     all.reduce(end)
                 };
-                let least = ends("min", f64::min).map_or(low, |v| v.min(low));
-                let most = ends("max", f64::max).map_or(high, |v| v.max(high));
+                let least = ends(|d| &d.min, f64::min).map_or(low, |v| v.min(low));
+                let most = ends(|d| &d.max, f64::max).map_or(high, |v| v.max(high));
                 let room = (most - least) * 0.04;
                 Axis::new(label, least - room, most + room)
             }

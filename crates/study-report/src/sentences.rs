@@ -3,6 +3,7 @@
 
 use super::apa;
 use study_analysis::analyze::findings::{Direction, Estimate, Statistic};
+use study_analysis::analyze::results::{Coefficients, Interval, Number as _, ReferenceTest};
 use study_analysis::analyze::{
     Analysis, Finding, Pair, PreregisteredRule, Test, TestKind, Verdict, Warning,
 };
@@ -112,32 +113,34 @@ pub(super) fn caveat(w: &Warning) -> String {
 }
 
 /// `, 95 % CI [a, b]`, or nothing if the interval is undefined.
-pub(super) fn ci(a: &Analysis, id: &str, format: impl Fn(f64) -> String) -> String {
-    let bounds = a.values.interval(id);
+pub(super) fn ci<'a>(
+    interval: impl Into<Option<&'a Interval>>,
+    format: impl Fn(f64) -> String,
+) -> String {
+    let bounds = interval.into().and_then(Interval::ends);
     bounds.map_or_else(String::new, |b| {
         format!(", 95 % CI {}", apa::interval(b, format))
     })
 }
 
 /// `, exact p = .008` or `, permutation p = .008`; nothing if there is no test.
-pub(super) fn permutation_p(a: &Analysis, correlation: &str) -> String {
-    a.permutation_p(correlation)
-        .map_or_else(String::new, |(p, exact)| {
-            let kind = if exact { "exact p" } else { "permutation p" };
-            format!(", {kind} {}", apa::p_beside(p, a.alpha))
-        })
+pub(super) fn permutation_p(a: &Analysis, found: Option<(f64, bool)>) -> String {
+    found.map_or_else(String::new, |(p, exact)| {
+        let kind = if exact { "exact p" } else { "permutation p" };
+        format!(", {kind} {}", apa::p_beside(p, a.alpha))
+    })
 }
 
 /// The effect of the realizations in an analysis of variance, where it was decided by one:
 /// generalized η² and the correction.
 pub(super) fn anova_effect(a: &Analysis, test: &Test) -> String {
-    let get = |id: &str| a.values.number(&format!("rmanova/{id}"));
-    let ges = get("ges").map_or_else(String::new, |g| {
+    let anova = &a.results.evidence.differences.rmanova;
+    let ges = anova.ges.number().map_or_else(String::new, |g| {
         format!(", generalized η² = {}", apa::share(g, 2))
     });
     let epsilon = match test.kind {
-        TestKind::AnovaGreenhouseGeisser => get("eps_gg"),
-        TestKind::AnovaHuynhFeldt => get("eps_hf_unclipped").map(|e| e.min(1.0)),
+        TestKind::AnovaGreenhouseGeisser => anova.eps_gg.number(),
+        TestKind::AnovaHuynhFeldt => anova.eps_hf_unclipped.number().map(|e| e.min(1.0)),
         _ => None,
     };
     let epsilon = epsilon.map_or_else(String::new, |e| format!(", ε = {}", apa::share(e, 2)));
@@ -151,14 +154,14 @@ pub(super) fn anova_effect(a: &Analysis, test: &Test) -> String {
 
 /// Friedman's test, exact where possible.
 pub(super) fn friedman(a: &Analysis) -> Option<String> {
-    let get = |id: &str| a.values.number(&format!("friedman/{id}"));
-    let (chi2, df) = (get("chi2")?, get("df")?);
-    let (kind, p) = match get("exact_p") {
+    let found = &a.results.evidence.differences.friedman;
+    let (chi2, df) = (found.chi2.number()?, found.df.number()?);
+    let (kind, p) = match found.exact_p.number() {
         Some(p) => ("exact ", p),
-        None => ("", get("p")?),
+        None => ("", found.p.number()?),
     };
     // A better approximation than χ², where the exact p is missing.
-    let better = get("iman_davenport_p")
+    let better = (found.iman_davenport_p.number())
         .filter(|_| kind.is_empty())
         .map_or_else(String::new, |p| {
             format!(
@@ -166,7 +169,7 @@ pub(super) fn friedman(a: &Analysis) -> Option<String> {
                 apa::p_beside(p, a.alpha)
             )
         });
-    let w = get("kendall_W").map_or_else(String::new, |w| {
+    let w = found.kendall_w.number().map_or_else(String::new, |w| {
         format!(", Kendall's W = {}", apa::share(w, 2))
     });
     Some(format!(
@@ -178,12 +181,14 @@ pub(super) fn friedman(a: &Analysis) -> Option<String> {
 }
 
 /// The slope on VAF of a mixed model, per .01: `b = 0.38 per .01 of VAF, SE = 0.05, …`.
-pub(super) fn slope_on_vaf(a: &Analysis, model: &str) -> Option<String> {
-    let get = |id: &str| a.values.number(&format!("{model}/slope{id}"));
-    let (slope, se) = (get("")? / 100.0, get("_se")? / 100.0);
-    let test = get("_t")
-        .zip(get("_satterthwaite_df"))
-        .zip(get("_satterthwaite_p"))
+pub(super) fn slope_on_vaf(a: &Analysis, model: &Coefficients) -> Option<String> {
+    let (slope, se) = (
+        model.slope.number()? / 100.0,
+        model.slope_se.number()? / 100.0,
+    );
+    let test = (model.slope_t.number())
+        .zip(model.slope_satterthwaite_df.number())
+        .zip(model.slope_satterthwaite_p.number())
         .map_or_else(String::new, |((t, df), p)| {
             let df = apa::number(df, 1);
             format!(
@@ -226,7 +231,8 @@ pub(super) fn sole_influence(a: &Analysis) -> Option<String> {
 pub(super) fn ties(a: &Analysis) -> Vec<String> {
     let limit = "exchanging them does not change r, which limits how small p can be.";
     let mut found = Vec::new();
-    if !a.permutation_p("pearson").is_some_and(|(_, exact)| exact) {
+    let permutation = a.correlation().pearson.permutation_p();
+    if !permutation.is_some_and(|(_, exact)| exact) {
         return found;
     }
     let vaf = a.tied_vaf();
@@ -238,7 +244,7 @@ pub(super) fn ties(a: &Analysis) -> Vec<String> {
     }
     let means = a.tied_means();
     if means > 1 {
-        let n = a.values.number("corr_adjusted/n_models").unwrap_or(0.0);
+        let n = a.correlation().n();
         let tied = capital(&apa::count(means));
         found.push(format!("{tied} of the {n} means are tied: {limit}"));
     }
@@ -246,9 +252,9 @@ pub(super) fn ties(a: &Analysis) -> Vec<String> {
 }
 
 /// Why equivalence with a reference was not tested; `None` if it was.
-pub(super) fn no_equivalence(a: &Analysis, contrast: &str) -> Option<String> {
-    let why = a.values.reason(&format!("{contrast}/p_tost"))?;
-    let margin = a.values.number(&format!("{contrast}/margin"));
+pub(super) fn no_equivalence(a: &Analysis, contrast: &ReferenceTest) -> Option<String> {
+    let why = contrast.p_tost.reason()?;
+    let margin = contrast.equivalence.as_ref().map(|e| &e.margin).number();
     Some(match margin {
         None if a.changed(PreregisteredRule::Margin) => {
             "The equivalence margin was removed after the study began: see Deviations.".to_owned()

@@ -3,6 +3,7 @@
 
 use super::apa::{digits, interval_or_dash, name, or_dash};
 use std::rc::Rc;
+use study_analysis::analyze::results::Number;
 
 /// How a number is printed.
 pub(crate) type Format = fn(f64) -> String;
@@ -286,11 +287,6 @@ impl<'a, T: Copy> Builder<'a, T> {
         self.number(head, format, &|row| get(row, what))
     }
 
-    /// A statistic that only the file has.
-    pub(crate) fn in_file(self, what: &str) -> Self {
-        self.stat_as(file(what), what, super::apa::plain)
-    }
-
     /// An interval, whose ends are two statistics.
     pub(crate) fn interval(self, head: Head, what: &str, format: Format) -> Self {
         let get = Rc::clone(&self.get);
@@ -298,6 +294,16 @@ impl<'a, T: Copy> Builder<'a, T> {
         self.push(head, true, &|row| {
             Cell::Interval(end(row, "lo").zip(end(row, "hi")), format)
         })
+    }
+
+    /// A column of statistics that are a field of what a row is about.
+    pub(crate) fn field<N: Number>(
+        self,
+        head: Head,
+        format: Format,
+        field: impl Fn(T) -> N,
+    ) -> Self {
+        self.number(head, format, &|row| field(row).number())
     }
 
     /// A column of intervals.

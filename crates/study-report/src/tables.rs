@@ -14,7 +14,10 @@ pub(crate) use subjects::subjects;
 use crate::apa::{self, one, percent, three, two, whole};
 use crate::table::{Builder, Cell, Format, Head, Table, file, none, page, report, terminal};
 use crate::{Site, SiteDevice, answers, plot, sites as of_sites};
-use study_analysis::analyze::{Analysis, RealizationSummary, group_id};
+use study_analysis::analyze::results::{
+    Coefficient, Described, Differences, List, Number as _, Stat,
+};
+use study_analysis::analyze::{Analysis, RealizationSummary};
 use study_base::text::{Untrusted, counted};
 use study_session::outcome::Role;
 use unicode_width::UnicodeWidthStr as _;
@@ -27,15 +30,18 @@ const MAX_BINS: usize = 11;
 
 /// Number, median and such of the ratings of each realization; `gap` is between the bars of a
 /// histogram.
-pub(crate) fn realizations(a: &Analysis, gap: &str) -> Table {
-    let v = &a.values;
-    let get = |m: &RealizationSummary, what: &str| a.described(&m.id, what);
-    let list = |m: &RealizationSummary| v.list(&format!("{}/hist", group_id("desc", &[&m.id])));
-    let from = v.number("desc_all/hist_from").unwrap_or(0.0);
-    let counts = v.list("desc_all/hist");
+pub(crate) fn realizations<'a>(a: &'a Analysis, gap: &str) -> Table {
+    let results = &a.results.descriptives;
+    let all = &results.desc_all;
+    let from = all.hist_from.number().unwrap_or(0.0);
+    let counts = all.hist.as_ref().and_then(List::numbers);
+    let list = |d: &'a Described| d.hist.as_ref()?.numbers();
+    let rows: Vec<(&RealizationSummary, &Described)> = (a.realizations.iter())
+        .filter_map(|m| Some((m, a.described(&m.id)?)))
+        .collect();
     let bins = counts.map_or(0, <[f64]>::len);
     let has_bars = counts.is_some() && bins <= MAX_BINS && from.abs() < 1000.0;
-    let most = (a.realizations.iter().filter_map(list).flatten().copied()).fold(0.0, f64::max);
+    let most = (rows.iter().filter_map(|r| list(r.1)).flatten().copied()).fold(0.0, f64::max);
     let vaf: Vec<f64> = a.realizations.iter().filter_map(|m| m.vaf).collect();
     let digits = apa::distinguishing_decimals(&vaf);
     let shown_vaf = |m: &RealizationSummary, format: fn(f64, usize) -> String| {
@@ -43,12 +49,11 @@ pub(crate) fn realizations(a: &Analysis, gap: &str) -> Table {
     };
     let threshold = a.realistic_from.unwrap_or_default();
     let at_least = |sign: &str| format!("{sign}{threshold}");
-    let realistic = |m: &RealizationSummary| a.about("realistic", &[&m.id], "share");
-    let over_participants = |m: &RealizationSummary| {
-        let end = |end: &str| get(m, &format!("subject_mean/ci95_{end}"));
-        let ci = end("lo").zip(end("hi"));
+    let realistic = |(m, _): (&RealizationSummary, _)| a.realistic(&m.id).map(|r| &r.share);
+    let over_participants = |d: &Described| {
+        let ci = d.subject_mean.ci95.ends();
         let ci = ci.map_or_else(String::new, |ci| format!(" {}", apa::interval(ci, two)));
-        apa::or_dash(get(m, "subject_mean/mean"), two) + &ci
+        apa::or_dash(d.subject_mean.mean.number(), two) + &ci
     };
     let has_vaf = !vaf.is_empty();
     let vaf_head = if has_vaf {
@@ -57,31 +62,35 @@ pub(crate) fn realizations(a: &Analysis, gap: &str) -> Table {
         Head::default()
     }
     .file("vaf");
-    let mut table = Builder::new("Ratings by realization", &a.realizations, &get)
-        .apart(&|m| !m.tested)
-        .text(terminal("realization"), &with_role)
-        .column(report("realization").file("model"), &|m| {
+    let mut table = Builder::new("Ratings by realization", rows, &none)
+        .apart(&|(m, _)| !m.tested)
+        .text(terminal("realization"), &|(m, _)| with_role(m))
+        .column(report("realization").file("model"), &|(m, _)| {
             Cell::Name(m.id.clone())
         })
-        .text(report("role"), &role)
-        .text(file("role"), &|m| m.role.as_str().to_owned())
-        .text(file("duplicate_of"), &|m| {
+        .text(report("role"), &|(m, _)| role(m))
+        .text(file("role"), &|(m, _)| m.role.as_str().to_owned())
+        .text(file("duplicate_of"), &|(m, _)| {
             m.duplicate_of.clone().unwrap_or_default()
         })
-        .column(vaf_head, &|m| shown_vaf(m, apa::share))
-        .stat_as(page("n").file("n").droppable(3), "n", whole)
-        .stat("mean", "mean", three)
-        .stat_as(terminal("sd"), "sd", three)
-        .stat_as(report("SD").file("sd"), "sd", three)
-        .stat_as(page("median").file("median").droppable(0), "median", one)
-        .in_file("q1")
-        .in_file("q3")
-        .in_file("min")
-        .in_file("max");
-    for what in ["n", "mean", "sd", "sem"] {
-        let name = file(&format!("subject_mean_{what}"));
-        table = table.stat_as(name, &format!("subject_mean/{what}"), two);
-    }
+        .column(vaf_head, &|(m, _)| shown_vaf(m, apa::share))
+        .field(page("n").file("n").droppable(3), whole, |(_, d)| &d.n)
+        .field(page("mean").file("mean"), three, |(_, d)| &d.mean)
+        .field(terminal("sd"), three, |(_, d)| &d.sd)
+        .field(report("SD").file("sd"), three, |(_, d)| &d.sd)
+        .field(page("median").file("median").droppable(0), one, |(_, d)| {
+            &d.median
+        })
+        .field(file("q1"), two, |(_, d)| &d.q1)
+        .field(file("q3"), two, |(_, d)| &d.q3)
+        .field(file("min"), two, |(_, d)| &d.min)
+        .field(file("max"), two, |(_, d)| &d.max)
+        .field(file("subject_mean_n"), two, |(_, d)| &d.subject_mean.n)
+        .field(file("subject_mean_mean"), two, |(_, d)| {
+            &d.subject_mean.mean
+        })
+        .field(file("subject_mean_sd"), two, |(_, d)| &d.subject_mean.sd)
+        .field(file("subject_mean_sem"), two, |(_, d)| &d.subject_mean.sem);
     let interval = report("95 % CI").file("subject_mean_ci95");
     let half = file("cousineau_morey_ci95_half");
     let bars_head = terminal(&scale(from, bins, gap))
@@ -92,30 +101,33 @@ pub(crate) fn realizations(a: &Analysis, gap: &str) -> Table {
         .on_terminal(&at_least("≥"))
         .droppable(2);
     table = table
-        .interval(interval, "subject_mean/ci95", two)
-        .stat_as(half, "cousineau_morey/ci95_half", three)
-        .text(bars_head.when(has_bars), &|m| {
-            plot::bars(list(m).unwrap_or(&[]), most, gap)
+        .ends(interval, two, &|(_, d)| d.subject_mean.ci95.ends())
+        .field(half, three, |(_, d)| {
+            d.cousineau_morey.as_ref().map(|c| &c.ci95_half)
         })
-        .column(terminal("VAF").when(has_vaf), &|m| {
+        .text(bars_head.when(has_bars), &|(_, d)| {
+            plot::bars(list(d).unwrap_or(&[]), most, gap)
+        })
+        .column(terminal("VAF").when(has_vaf), &|(m, _)| {
             shown_vaf(m, apa::number)
         })
-        .number(adjusted, three, &|m| a.about("adjusted", &[&m.id], "mean"))
-        .number(share.when(a.realistic_from.is_some()), percent, &realistic)
-        .number(file("share_realistic"), percent, &realistic)
-        .text(terminal("by subject [95 %]"), &over_participants);
+        .field(adjusted, three, |(m, _)| a.adjusted(&m.id).map(|c| &c.mean))
+        .field(share.when(a.realistic_from.is_some()), percent, realistic)
+        .field(file("share_realistic"), percent, realistic)
+        .text(terminal("by subject [95 %]"), &|(_, d)| {
+            over_participants(d)
+        });
     for bin in 0..bins {
         let name = file(&format!("count_{}", apa::digits(from + bin as f64)));
-        table = table.number(name, whole, &|m| list(m)?.get(bin).copied());
+        table = table.number(name, whole, &|(_, d)| list(d)?.get(bin).copied());
     }
     table.notes(about_realizations(a))
 }
 
 /// What the columns of the realizations are.
 fn about_realizations(a: &Analysis) -> Option<String> {
-    let has_interval =
-        |m: &RealizationSummary| a.described(&m.id, "subject_mean/ci95_lo").is_some();
-    let interval = match a.realizations.iter().any(has_interval) {
+    let mut described = a.results.descriptives.desc.values();
+    let interval = match described.any(|d| d.subject_mean.ci95.ends().is_some()) {
         true => "; the interval is a 95 % t interval of the mean over participants",
         false => "",
     };
@@ -168,25 +180,31 @@ fn role(m: &RealizationSummary) -> String {
 
 /// Definitions of the symbols on the page.
 fn glossary(a: &Analysis) -> Option<String> {
-    let any = |ids: &[&str]| ids.iter().any(|id| a.values.number(id).is_some());
+    let Differences {
+        rmanova, friedman, ..
+    } = &a.results.evidence.differences;
+    let agreement = &a.results.agreement;
     let alpha = [
-        "krippendorff_subjects/ordinal",
-        "krippendorff_repetitions/ordinal",
+        &agreement.krippendorff_subjects.ordinal,
+        &agreement.krippendorff_repetitions.ordinal,
     ];
     let all: Vec<&str> = [
         (
-            any(&["rmanova/eps_gg"]),
+            rmanova.eps_gg.number().is_some(),
             "ε: departure from sphericity (1: none); it reduces the degrees of freedom.",
         ),
         (
-            any(&["rmanova/ges"]),
+            rmanova.ges.number().is_some(),
             "Generalized η²: share of the variance explained by the realizations.",
         ),
         (
-            any(&["friedman/kendall_W"]),
+            friedman.kendall_w.number().is_some(),
             "W: concordance of the participants' rankings, from 0 to 1.",
         ),
-        (any(&alpha), "α: agreement beyond chance, at most 1."),
+        (
+            alpha.iter().any(|alpha| alpha.number().is_some()),
+            "α: agreement beyond chance, at most 1.",
+        ),
         (
             a.pairs.iter().any(|p| p.dz.is_some()),
             "dz: mean difference divided by the standard deviation of the differences.",
@@ -208,59 +226,49 @@ pub(crate) fn variance(a: &Analysis) -> Table {
 }
 
 /// The confidence interval of a coefficient of agreement.
-pub(crate) fn icc_interval(a: &Analysis, id: &str) -> Option<(f64, f64)> {
-    let bound = |end: &str| a.values.number(&format!("{id}/{end}"));
-    bound("lo").zip(bound("hi"))
+pub(crate) fn icc_interval(icc: &Coefficient) -> Option<(f64, f64)> {
+    icc.lo.number().zip(icc.hi.number())
 }
-
-/// What a coefficient of agreement is, its identifier and its format.
-const COEFFICIENTS: [(&str, &str, Format); 7] = [
-    (
-        "between participants, single: ICC(2,1)",
-        "icc_subjects/ICC2",
-        share_3,
-    ),
-    (
-        "between participants, mean: ICC(2,k)",
-        "icc_subjects/ICC2k",
-        share_3,
-    ),
-    (
-        "over repetitions, single: ICC(1,1)",
-        "icc_repetitions/ICC1",
-        share_3,
-    ),
-    (
-        "between participants: Krippendorff's α, ordinal",
-        "krippendorff_subjects/ordinal",
-        share_3,
-    ),
-    (
-        "over repetitions: Krippendorff's α, ordinal",
-        "krippendorff_repetitions/ordinal",
-        share_3,
-    ),
-    ("SD within cells", "desc_all/within_cell_sd", three),
-    (
-        "repeatability coefficient (1.96 √2 SD)",
-        "desc_all/repeatability_coefficient",
-        three,
-    ),
-];
 
 /// Agreement of participants and of repetitions.
 pub(crate) fn agreement(a: &Analysis) -> Table {
-    let defined = COEFFICIENTS
-        .iter()
-        .filter(|c| a.values.number(c.1).is_some());
+    let all = &a.results.agreement;
+    let within = &a.results.descriptives.desc_all;
+    let (single, mean) = (&all.icc_subjects.icc2, &all.icc_subjects.icc2k);
+    let repeated = &all.icc_repetitions.icc.icc1;
+    let of_subjects = &all.krippendorff_subjects.ordinal;
+    let of_repetitions = &all.krippendorff_repetitions.ordinal;
+    let share: Format = share_3;
+    let icc = |what, icc: &'_ Coefficient| (what, icc.value.number(), share, icc_interval(icc));
+    let alone = |what, stat: &Stat, format: Format| (what, stat.number(), format, None);
+    let coefficients = [
+        icc("between participants, single: ICC(2,1)", single),
+        icc("between participants, mean: ICC(2,k)", mean),
+        icc("over repetitions, single: ICC(1,1)", repeated),
+        alone(
+            "between participants: Krippendorff's α, ordinal",
+            of_subjects,
+            share,
+        ),
+        alone(
+            "over repetitions: Krippendorff's α, ordinal",
+            of_repetitions,
+            share,
+        ),
+        alone("SD within cells", &within.within_cell_sd, three),
+        alone(
+            "repeatability coefficient (1.96 √2 SD)",
+            &within.repeatability_coefficient,
+            three,
+        ),
+    ];
+    let defined = coefficients.into_iter().filter(|c| c.1.is_some());
     let rounded = "Shares are rounded to whole per cent, so their sum can be 99 or 101.";
     let shares = (!answers::variance_shares(a).is_empty()).then(|| rounded.to_owned());
     Builder::new("Agreement", defined, none)
         .text(report("coefficient"), &|c| c.0.to_owned())
-        .column(report("value"), &|c| {
-            Cell::Number(a.values.number(c.1), c.2)
-        })
-        .ends(report("95 % CI"), share_2, &|c| icc_interval(a, c.1))
+        .column(report("value"), &|c| Cell::Number(c.1, c.2))
+        .ends(report("95 % CI"), share_2, &|c| c.3)
         .notes(shares.into_iter().chain(glossary(a)))
 }
 

@@ -13,6 +13,7 @@ use super::plot::Axis;
 use super::tables::{self, with_role};
 use super::{Source, apa, sentences};
 use layout::{Grid, Paint, pad, wrap};
+use study_analysis::analyze::results::Number as _;
 use study_analysis::analyze::{Analysis, RealizationSummary};
 use study_analysis::preregister::Comparison;
 use study_base::text::{Untrusted, counted, cut_middle};
@@ -108,7 +109,7 @@ pub fn comments(a: &Analysis, page: Page) -> String {
     let mut out = String::new();
     for group in a.comments.chunk_by(|x, y| x.model == y.model) {
         let id = Untrusted(&group[0].model).to_string();
-        let mean = a.described(&group[0].model, "mean");
+        let mean = a.described(&group[0].model).map(|d| &d.mean).number();
         let mean = mean.map_or_else(String::new, |m| format!("  mean {}", apa::number(m, 3)));
         out += &paint.strong(&format!("{id}{mean}"));
         out.push('\n');
@@ -219,22 +220,22 @@ fn chart(
         .unwrap_or(0)
         .clamp(8, width / 3);
     let columns = width - margin - 3;
-    let extent = |id: &str| -> Vec<f64> {
-        let values = shown.iter().filter_map(|m| a.described(&m.id, id));
-        values.collect()
-    };
+    let described = || shown.iter().filter_map(|m| a.described(&m.id));
     let mut out = String::new();
     let ends = a.scale.or_else(|| {
-        let low = extent("min").into_iter().fold(f64::INFINITY, f64::min);
-        let high = extent("max").into_iter().fold(f64::NEG_INFINITY, f64::max);
+        let least = described().filter_map(|d| d.min.number());
+        let most = described().filter_map(|d| d.max.number());
+        let low = least.fold(f64::INFINITY, f64::min);
+        let high = most.fold(f64::NEG_INFINITY, f64::max);
         Some((low, high))
     });
     if let Some(axis) = ends.and_then(|(l, h)| Axis::new(l, h, columns)) {
         let title = format!("{}, mean ± 1 SD", Untrusted(&sentences::asked(a)));
         out += &section(&title, &axis, margin, paint);
         for m in &shown {
-            if let Some(mean) = a.described(&m.id, "mean") {
-                let half = a.described(&m.id, "sd");
+            let described = a.described(&m.id);
+            if let Some(mean) = described.map(|d| &d.mean).number() {
+                let half = described.map(|d| &d.sd).number();
                 out += &line(m, &axis.dot(mean, half), margin);
             }
         }

@@ -120,6 +120,13 @@ impl Permuted {
     }
 }
 
+impl Pearson {
+    /// The two-sided p of the permutation test, and whether it is exact.
+    pub fn permutation_p(&self) -> Option<(f64, bool)> {
+        self.permuted.as_ref()?.two_sided()
+    }
+}
+
 impl Correlation {
     /// Number of realizations; 0 where there are no means.
     pub fn n(&self) -> usize {

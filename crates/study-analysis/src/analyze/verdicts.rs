@@ -1,7 +1,8 @@
 //! What a report looks up in an analysis, besides its findings.
 
-use super::identifiers::group_id;
-use super::results::{AdjustedCells, Correlation, Number as _};
+use super::results::{
+    AdjustedCells, AdjustedMean, Correlation, Described, Number as _, Realistic, ReferenceTest,
+};
 use super::{Analysis, Better, Finding, Pair, Question, RealizationSummary};
 
 /// Whether two means or VAF are equal but for rounding.
@@ -34,21 +35,25 @@ impl Analysis {
         self.realizations.iter().filter(|m| m.tested)
     }
 
-    /// A descriptive statistic of a realization, such as its `mean`.
-    pub fn described(&self, model: &str, statistic: &str) -> Option<f64> {
-        self.about("desc", &[model], statistic)
+    /// The ratings of a realization.
+    pub fn described(&self, model: &str) -> Option<&Described> {
+        self.results.descriptives.desc.get(model)
     }
 
-    /// A statistic about something with a name, such as `realistic/M/share`.
-    pub fn about(&self, group: &str, names: &[&str], statistic: &str) -> Option<f64> {
-        let id = group_id(group, names);
-        self.values.number(&format!("{id}/{statistic}"))
+    /// The share of the ratings of a realization that count as realistic.
+    pub fn realistic(&self, model: &str) -> Option<&Realistic> {
+        self.results.realistic.get(model)
     }
 
-    /// The participants that are listed one by one. Untrusted.
-    pub fn listed_subjects(&self) -> impl Iterator<Item = &str> {
-        let listed = |s: &&str| self.results.screening.subject.contains_key(*s);
-        self.subjects.iter().map(String::as_str).filter(listed)
+    /// The mean of a realization on which verdicts rest.
+    pub fn adjusted(&self, model: &str) -> Option<&AdjustedMean> {
+        self.results.evidence.cells.means.get(model)
+    }
+
+    /// A realization minus a reference, anchor or physical sample.
+    pub fn against(&self, reference: &str, model: &str) -> Option<&ReferenceTest> {
+        let references = &self.results.evidence.references.reference;
+        references.get(reference)?.get(model)
     }
 
     /// The finding that answers a question.
@@ -99,18 +104,6 @@ impl Analysis {
     /// The correlation over realizations of VAF with the means on which verdicts rest.
     pub fn correlation(&self) -> &Correlation {
         &self.results.evidence.corr_adjusted
-    }
-
-    /// p of a permutation test of a correlation over realizations (`pearson`, `spearman`
-    /// or `kendall`) with the means on which verdicts rest, and whether it is exact.
-    pub fn permutation_p(&self, correlation: &str) -> Option<(f64, bool)> {
-        let all = self.correlation();
-        let permuted = match correlation {
-            "spearman" => &all.spearman.as_ref()?.permuted,
-            "kendall" => &all.kendall.as_ref()?.permuted,
-            _ => all.pearson.permuted.as_ref()?,
-        };
-        permuted.two_sided()
     }
 
     /// Name, mean and VAF of the points of the correlation.

@@ -2,6 +2,7 @@
 
 use super::Answer;
 use crate::{apa, sentences};
+use study_analysis::analyze::results::Number as _;
 use study_analysis::analyze::{Analysis, MAX_PAIRED, Question, Test};
 use study_base::text::counted;
 
@@ -89,7 +90,7 @@ pub(super) fn which(a: &Analysis) -> Option<Answer> {
             .push(format!("{more} more are in the table of pairs."));
     }
     answer.main.extend(equivalent(a));
-    if let Some(dz) = a.values.number("sensitivity/difference") {
+    if let Some(dz) = a.results.sensitivity.difference.number() {
         answer.more.push(format!(
             "A single difference of {} standard deviations (of the differences) is found with a power \
              of 80 % in this design; of a pair among several it has to be larger.",

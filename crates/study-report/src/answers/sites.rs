@@ -2,7 +2,8 @@
 
 use super::Answer;
 use crate::{apa, sentences};
-use study_analysis::analyze::{Analysis, Finding, Question, group_id};
+use study_analysis::analyze::results::Number as _;
+use study_analysis::analyze::{Analysis, Finding, Question};
 
 pub(super) fn sites(a: &Analysis) -> Vec<Answer> {
     [realizations(a), vaf(a), level(a)]
@@ -28,9 +29,12 @@ fn realizations(a: &Analysis) -> Option<Answer> {
         answer.main.push(format!("Partial η² = {share}."));
     }
     for site in &a.sites {
+        let means = (a.results.evidence.sites.as_ref()?)
+            .site_mean
+            .get(site.as_str());
         let means: Vec<String> = (a.tested())
             .filter_map(|m| {
-                let mean = a.about("site_mean", &[site, &m.id], "mean")?;
+                let mean = means?.get(m.id.as_str())?.mean.number()?;
                 Some(format!("{} {}", m.id, apa::two(mean)))
             })
             .collect();
@@ -48,14 +52,16 @@ fn vaf(a: &Analysis) -> Option<Answer> {
     let question = "Does the effect of VAF depend on the site?";
     let mut answer = Answer::of(question, f, |verdict| tested(f, verdict));
     for site in &a.sites {
-        let get = |what: &str| a.about("site_vaf", &[site], what);
-        let Some((r, p)) = get("r").zip(get("p_two_sided")) else {
+        let of_site =
+            (a.results.evidence.sites.as_ref()).and_then(|s| s.vaf.by_site.get(site.as_str()));
+        let Some((of_site, (r, p))) =
+            of_site.and_then(|s| Some((s, s.r.number().zip(s.p_two_sided.number())?)))
+        else {
             continue;
         };
         let per = |x: f64| apa::two(x / 100.0);
-        let slope = get("slope").map_or_else(String::new, |slope| {
-            let id = format!("{}/slope_ci95", group_id("site_vaf", &[site]));
-            let ci = sentences::ci(a, &id, per);
+        let slope = of_site.slope.number().map_or_else(String::new, |slope| {
+            let ci = sentences::ci(&of_site.slope_ci95, per);
             format!(
                 "; the slopes of its participants have the mean {} per .01 of VAF{ci}",
                 per(slope)
@@ -82,9 +88,11 @@ fn level(a: &Analysis) -> Option<Answer> {
     });
     let means: Vec<String> = (a.sites.iter())
         .filter_map(|site| {
-            let mean = a.about("site", &[site], "mean")?;
-            let n = a.about("site", &[site], "n")?;
-            let ci = sentences::ci(a, &format!("{}/ci95", group_id("site", &[site])), apa::two);
+            let found = (a.results.evidence.sites.as_ref()?)
+                .site
+                .get(site.as_str())?;
+            let (mean, n) = (found.mean.number()?, found.n.number()?);
+            let ci = sentences::ci(&found.ci95, apa::two);
             Some(format!("{site} {}{ci} (n = {n})", apa::two(mean)))
         })
         .collect();

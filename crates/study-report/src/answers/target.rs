@@ -3,9 +3,8 @@
 
 use super::Answer;
 use crate::{apa, sentences};
-use study_analysis::analyze::{
-    Analysis, Better, Finding, PreregisteredRule, Question, Verdict, group_id,
-};
+use study_analysis::analyze::results::Number as _;
+use study_analysis::analyze::{Analysis, Better, Finding, PreregisteredRule, Question, Verdict};
 use study_base::text::capital;
 use study_session::outcome::Role;
 
@@ -30,13 +29,12 @@ pub(super) fn target(a: &Analysis) -> Option<Answer> {
     let scale = a.scale.map_or_else(String::new, |(from, to)| {
         format!(" on a scale from {from} to {to}")
     });
-    let id = group_id("adjusted", &[best]);
     let ci = if a.design.is_complete() {
-        format!("{}/subject_mean/ci95", group_id("desc", &[best]))
+        a.described(best).map(|d| &d.subject_mean.ci95)
     } else {
-        format!("{id}/ci95")
+        a.adjusted(best).map(|m| &m.ci95)
     };
-    let ci = sentences::ci(a, &ci, apa::two);
+    let ci = sentences::ci(ci, apa::two);
     let realistic = realistic(a, best).map_or_else(String::new, |r| format!("; {r}"));
     let question = if sentences::is_about_realism(a) {
         "Do the realizations feel like the target?".to_owned()
@@ -64,7 +62,7 @@ pub(super) fn target(a: &Analysis) -> Option<Answer> {
         (Role::MidAnchor, "mid anchor"),
     ] {
         for m in a.realizations.iter().filter(|m| m.role == role) {
-            if let Some(mean) = a.described(&m.id, "mean") {
+            if let Some(mean) = a.described(&m.id).map(|d| &d.mean).number() {
                 let mean = apa::two(mean);
                 (answer.more).push(format!("Mean rating of the {name} {}: {mean}.", m.id));
             }
@@ -76,22 +74,25 @@ pub(super) fn target(a: &Analysis) -> Option<Answer> {
 /// The share of realistic ratings of a realization with its interval: `60 %, 95 % CI [41 %,
 /// 77 %]`.
 pub(super) fn share(a: &Analysis, name: &str) -> Option<String> {
-    let share = apa::percent(a.about("realistic", &[name], "share")?);
-    let id = format!("{}/ci95", group_id("realistic", &[name]));
-    Some(format!("{share}{}", sentences::ci(a, &id, apa::percent)))
+    let found = a.realistic(name)?;
+    let share = apa::percent(found.share.number()?);
+    Some(format!(
+        "{share}{}",
+        sentences::ci(&found.ci95, apa::percent)
+    ))
 }
 
 fn realistic(a: &Analysis, best: &str) -> Option<String> {
     let changed = a.changed(PreregisteredRule::RealisticFrom);
-    match a.realistic_from.zip(a.about("realistic", &[best], "share")) {
-        Some((from, part)) => {
+    let found = (a.realistic(best)).and_then(|found| Some((found, found.share.number()?)));
+    match a.realistic_from.zip(found) {
+        Some((from, (found, part))) => {
             let later = if changed {
                 ", a threshold changed after the study began"
             } else {
                 ""
             };
-            let id = format!("{}/ci95", group_id("realistic", &[best]));
-            let ci = sentences::ci(a, &id, apa::percent);
+            let ci = sentences::ci(&found.ci95, apa::percent);
             let part = apa::percent(part);
             Some(format!(
                 "{part} of its ratings are {from} or higher{later}{ci}"
@@ -164,12 +165,12 @@ fn difference(f: &Finding, (first, second): (&str, &str), verdict: &str) -> Stri
 }
 
 fn equivalence(a: &Analysis, best: &str, reference: &str) -> Option<String> {
-    let id = group_id("reference", &[reference, best]);
+    let contrast = a.against(reference, best)?;
     let f = a.finding(&Question::Equivalence(reference.to_owned()));
     let Some((f, test)) = f.and_then(|f| Some((f, f.test.as_ref()?))) else {
-        return sentences::no_equivalence(a, &id);
+        return sentences::no_equivalence(a, contrast);
     };
-    let margin = a.values.number(&format!("{id}/margin"))?;
+    let margin = contrast.equivalence.as_ref()?.margin.number()?;
     let later = match a.changed(PreregisteredRule::Margin) {
         true => " (changed after the study began)",
         false => "",

@@ -3,7 +3,8 @@
 use super::Answer;
 use crate::{apa, sentences};
 use study_analysis::analyze::findings::Direction;
-use study_analysis::analyze::{Analysis, Question, Value, group_id};
+use study_analysis::analyze::results::Number as _;
+use study_analysis::analyze::{Analysis, Question};
 use study_stats::permutation::DRAWS;
 
 /// Covariates in a list.
@@ -11,7 +12,7 @@ const MAX_COVARIATES: usize = 8;
 
 /// Whether VAF predicts the rating.
 pub(super) fn predicts(a: &Analysis) -> Option<Answer> {
-    let v = &a.values;
+    let correlation = a.correlation();
     let f = a.finding(&Question::Vaf)?;
     let question = format!("Does VAF predict {}?", sentences::asked(a));
     let n = f.realizations;
@@ -28,7 +29,7 @@ pub(super) fn predicts(a: &Analysis) -> Option<Answer> {
         let r = f
             .estimate
             .map_or_else(String::new, |e| sentences::estimate(&e, apa::r));
-        let p = sentences::permutation_p(a, "pearson");
+        let p = sentences::permutation_p(a, correlation.pearson.permutation_p());
         format!("{verdict}: r = {r}{p} (two-sided).")
     });
     if f.test.is_none() {
@@ -37,33 +38,33 @@ pub(super) fn predicts(a: &Analysis) -> Option<Answer> {
     let caveats = std::mem::take(&mut answer.main);
     answer.main.extend(points(a, n));
     answer.main.extend(sentences::ties(a));
-    answer
-        .main
-        .extend(v.number("sensitivity/correlation").map(|r| {
-            format!(
-                "A true correlation of {} is found with a power of 80 % in this design.",
-                apa::r(r)
-            )
-        }));
+    let detectable = a.results.sensitivity.correlation.number();
+    answer.main.extend(detectable.map(|r| {
+        format!(
+            "A true correlation of {} is found with a power of 80 % in this design.",
+            apa::r(r)
+        )
+    }));
     answer.main.extend(caveats);
     answer.main.extend(crossed(a));
     answer.more.extend(ordinal(a));
-    if let Some(rho) = v.number("corr_adjusted/spearman/rho") {
-        let tau = v
-            .number("corr_adjusted/kendall/tau_b")
-            .map_or_else(String::new, |tau| {
-                let p = sentences::permutation_p(a, "kendall");
-                format!("; Kendall's τb = {}{p}", apa::r(tau))
-            });
+    if let Some((spearman, rho)) =
+        (correlation.spearman.as_ref()).and_then(|s| Some((s, s.rho.number()?)))
+    {
+        let kendall = correlation.kendall.as_ref();
+        let tau = kendall.and_then(|k| Some((k, k.tau_b.number()?)));
+        let tau = tau.map_or_else(String::new, |(kendall, tau)| {
+            let p = sentences::permutation_p(a, kendall.permuted.two_sided());
+            format!("; Kendall's τb = {}{p}", apa::r(tau))
+        });
         answer.main.push(format!(
             "Rank correlations: Spearman's ρ = {}{}{tau}.",
             apa::r(rho),
-            sentences::permutation_p(a, "spearman")
+            sentences::permutation_p(a, spearman.permuted.two_sided())
         ));
     }
-    let bounds = v
-        .number("corr_adjusted/leave_one_out/pearson_min")
-        .zip(v.number("corr_adjusted/leave_one_out/pearson_max"));
+    let left_out = correlation.leave_one_out.as_ref();
+    let bounds = left_out.and_then(|l| l.pearson_min.number().zip(l.pearson_max.number()));
     if let Some((low, high)) = bounds {
         answer.main.push(format!(
             "Leaving out one realization at a time, r ranges from {} to {}.",
@@ -72,8 +73,9 @@ pub(super) fn predicts(a: &Analysis) -> Option<Answer> {
         ));
     }
     answer.main.extend(sentences::sole_influence(a));
-    if let Some(share) = v.number("corr_adjusted/share/r2") {
-        let adjusted = v.number("corr_adjusted/share/r2_adjusted");
+    let shares = correlation.share.as_ref();
+    if let Some(share) = shares.map(|s| &s.r2).number() {
+        let adjusted = shares.map(|s| &s.r2_adjusted).number();
         let adjusted = adjusted.map_or_else(String::new, |x| {
             format!(
                 " (corrected for their number: {})",
@@ -87,7 +89,7 @@ pub(super) fn predicts(a: &Analysis) -> Option<Answer> {
     }
     answer
         .more
-        .extend(v.number("corr_adjusted/pearson/bf10").map(|bf| {
+        .extend(correlation.pearson.bf10.number().map(|bf| {
             format!(
                 "Bayes factor of a correlation against none, with a flat prior on r: BF₁₀ = {}.",
                 apa::two(bf)
@@ -118,7 +120,7 @@ pub(super) fn delivered(a: &Analysis) -> Option<Answer> {
         let p = sentences::result(f).unwrap_or_default();
         format!("{verdict}: over these {n} realizations r = {r}, {p} ({result}).")
     });
-    if let Some(r) = a.values.number("corr_adjusted/pearson/r") {
+    if let Some(r) = a.correlation().pearson.r.number() {
         answer.main.push(format!(
             "With the VAF of the identification the same means correlate at r = {}.",
             apa::r(r)
@@ -129,10 +131,10 @@ pub(super) fn delivered(a: &Analysis) -> Option<Answer> {
 
 /// The number of points and the p that it allows.
 fn points(a: &Analysis, n: usize) -> Option<String> {
-    let smallest = a
-        .values
-        .number("corr_adjusted/pearson/smallest_p_two_sided")?;
-    let (_, exact) = a.permutation_p("pearson")?;
+    let pearson = &a.correlation().pearson;
+    let permuted = pearson.permuted.as_ref()?;
+    let smallest = permuted.smallest_p_two_sided.number()?;
+    let (_, exact) = permuted.two_sided()?;
     let smallest = if exact {
         format!(
             "the smallest p that {n} realizations can give is {}",
@@ -144,9 +146,8 @@ fn points(a: &Analysis, n: usize) -> Option<String> {
             DRAWS + 1
         )
     };
-    let critical = a.values.number("corr_adjusted/pearson/critical_r");
     let level = sentences::level(a.alpha);
-    let critical = critical.map_or_else(String::new, |r| {
+    let critical = pearson.critical_r.number().map_or_else(String::new, |r| {
         format!("; in a t test, p ≤ {level} requires |r| ≥ {}", apa::r(r))
     });
     Some(format!(
@@ -157,9 +158,9 @@ fn points(a: &Analysis, n: usize) -> Option<String> {
 
 /// The mixed model with crossed random effects.
 fn crossed(a: &Analysis) -> Option<String> {
-    let slope = sentences::slope_on_vaf(a, "lmm_vaf_crossed")?;
-    let get = |id: &str| a.values.number(&format!("lmm_vaf_crossed/{id}"));
-    let between = get("var_model_without_vaf").zip(get("var_model"));
+    let model = &a.results.evidence.crossed;
+    let slope = sentences::slope_on_vaf(a, &model.coefficients)?;
+    let between = (model.var_model_without_vaf.number()).zip(model.var_model.number());
     let between = between.map_or_else(String::new, |(without, with)| {
         format!(
             " The variance between realizations is {} without VAF in the model and {} with it.",
@@ -186,12 +187,14 @@ fn crossed(a: &Analysis) -> Option<String> {
 
 /// The ordinal model with crossed random effects, and whether its odds are proportional.
 fn ordinal(a: &Analysis) -> Option<String> {
-    let get = |id: &str| a.values.number(&format!("clmm_vaf_crossed/{id}"));
-    let beta = get("beta/vaf")? / 100.0;
-    let (t, p) = (get("t")?, get("p")?);
-    let n = a.values.number("corr_adjusted/n_models").unwrap_or(0.0);
-    let odds = |id: &str| a.values.number(&format!("clm_vaf/proportional_odds/{id}"));
-    let odds = (odds("chi2").zip(odds("df")).zip(odds("p"))).map_or_else(
+    let ordinal = &a.results.ordinal;
+    let model = &ordinal.clmm_vaf_crossed;
+    let beta = model.beta.number()? / 100.0;
+    let (t, p) = (model.t.number()?, model.p.number()?);
+    let n = a.correlation().n_models.number().unwrap_or(0.0);
+    let odds = ordinal.clm_vaf.proportional_odds.as_ref();
+    let odds = odds.and_then(|o| o.chi2.number().zip(o.df.number()).zip(o.p.number()));
+    let odds = odds.map_or_else(
         String::new,
         |((chi2, df), p)| {
             format!(
@@ -214,20 +217,21 @@ fn ordinal(a: &Analysis) -> Option<String> {
 
 /// Whether the forgetting factor or other covariates matter.
 pub(super) fn covariates(a: &Analysis) -> Option<Answer> {
-    let v = &a.values;
-    let get = |id: &str| v.number(&format!("covariate/log10_memory/{id}"));
+    let memory = a.results.evidence.covariates.log10_memory.as_ref();
+    let line = memory.map(|m| &m.line);
+    let r_of_memory = line.map(|l| &l.r).number();
     let others = others(a);
     let short = match a.finding(&Question::Memory) {
         Some(f) => {
-            let r = get("r").map_or_else(String::new, |r| {
-                let test = get("t").zip(get("df")).zip(get("p"));
+            let r = r_of_memory.map_or_else(String::new, |r| {
+                let test = line.and_then(|l| l.t.number().zip(l.df.number()).zip(l.p.number()));
                 let test = test.map_or_else(String::new, |((t, df), p)| {
                     let (df, t) = (apa::number(df, 0), apa::two(t));
                     let level = f.test.as_ref().map_or(a.alpha, |t| t.level);
                     format!(", t({df}) = {t}, p {}", apa::p_beside(p, level))
                 });
-                let unit = match get("in_mm") {
-                    Some(1.0) => "mm",
+                let unit = match memory {
+                    Some(memory) if memory.in_mm.is_set() => "mm",
                     _ => "samples",
                 };
                 format!(
@@ -247,7 +251,7 @@ pub(super) fn covariates(a: &Analysis) -> Option<Answer> {
     };
     let mut answer = Answer::new(question, short);
     answer.main.extend(curvature(a));
-    if let Some(r) = get("r_with_vaf") {
+    if let Some(r) = line.map(|l| &l.r_with_vaf).number() {
         answer.main.push(format!(
             "Over these realizations memory and VAF correlate at r = {}: their effects are \
              confounded.",
@@ -265,7 +269,7 @@ pub(super) fn covariates(a: &Analysis) -> Option<Answer> {
         Some(_) => answer.more.extend(others),
         None => answer.main.extend(others),
     }
-    if get("r").is_some() {
+    if r_of_memory.is_some() {
         answer.more.push(
             "The memory is the length over which the identification averages: the closer the \
              forgetting factor λ is to 1, the longer."
@@ -276,14 +280,16 @@ pub(super) fn covariates(a: &Analysis) -> Option<Answer> {
 }
 
 fn curvature(a: &Analysis) -> Option<String> {
-    let get = |id: &str| {
-        a.values
-            .number(&format!("covariate/log10_memory/quadratic/{id}"))
-    };
-    let ((b, p), df) = get("square").zip(get("p")).zip(get("df"))?;
+    let found = &(a.results.evidence.covariates.log10_memory.as_ref()?).quadratic;
+    let (b, p, df) = (
+        found.square.number()?,
+        found.p.number()?,
+        found.df.number()?,
+    );
     let direction = if b < 0.0 { "downward" } else { "upward" };
     let df = apa::number(df, 0);
-    let both = get("F").zip(get("p_F")).map_or_else(String::new, |(f, p)| {
+    let both = found.f.number().zip(found.p_f.number());
+    let both = both.map_or_else(String::new, |(f, p)| {
         let (f, p) = (apa::two(f), apa::p(p));
         format!(" Both terms jointly: F(2, {df}) = {f}, p {p}.")
     });
@@ -291,7 +297,7 @@ fn curvature(a: &Analysis) -> Option<String> {
         "Quadratic term: b = {} (a {direction} curve), t({df}) = {}, p {}. The linear and the \
          quadratic term are two tests of one question, each at the level {}.{both}",
         apa::two(b),
-        apa::or_dash(get("t"), apa::two),
+        apa::or_dash(found.t.number(), apa::two),
         apa::p_beside(p, a.alpha / 2.0),
         sentences::level(a.alpha / 2.0)
     ))
@@ -299,27 +305,30 @@ fn curvature(a: &Analysis) -> Option<String> {
 
 /// A sentence for each covariate other than the logarithm of the memory.
 fn others(a: &Analysis) -> Vec<String> {
-    let v = &a.values;
+    let all = &a.results.evidence.covariates;
     // The memory in mm is covered by its logarithm.
-    let covered = v.number("covariate/log10_memory/r").is_some();
+    let covered = all
+        .log10_memory
+        .as_ref()
+        .map(|m| &m.line.r)
+        .number()
+        .is_some();
     let covariates = (a.covariates.iter()).filter(|name| *name != "memory_mm" || !covered);
     covariates
         .filter_map(|name| {
             let what = described(name);
-            let id = group_id("covariate", &[name]);
-            match v.get(&format!("{id}/r"))? {
-                Value::Number(r) => {
-                    let get = |what: &str| v.number(&format!("{id}/{what}"));
-                    let p = get("p").map_or_else(String::new, |p| format!(", p {}", apa::p(p)));
-                    let with_vaf = get("r_with_vaf").map_or_else(String::new, |r| {
-                        format!(" (with VAF it correlates at r = {})", apa::r(r))
-                    });
-                    let r = apa::r(*r);
-                    Some(format!("Mean rating against {what}: r = {r}{p}{with_vaf}."))
-                }
-                Value::Undefined(why) => Some(format!("Mean rating against {what}: {why}.")),
-                Value::List(_) => None,
-            }
+            let line = all.by_name.get(name.as_str())?;
+            let Some(r) = line.r.number() else {
+                let why = line.r.reason()?;
+                return Some(format!("Mean rating against {what}: {why}."));
+            };
+            let p = line.p.number();
+            let p = p.map_or_else(String::new, |p| format!(", p {}", apa::p(p)));
+            let with_vaf = line.r_with_vaf.number().map_or_else(String::new, |r| {
+                format!(" (with VAF it correlates at r = {})", apa::r(r))
+            });
+            let r = apa::r(r);
+            Some(format!("Mean rating against {what}: r = {r}{p}{with_vaf}."))
         })
         .take(MAX_COVARIATES)
         .collect()

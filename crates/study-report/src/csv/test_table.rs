@@ -1,7 +1,10 @@
 //! `tests.csv`: every test, one per row, the deciding ones first.
 
 use super::{cells, number};
-use study_analysis::analyze::{Analysis, Finding, Question, pair_id};
+use study_analysis::analyze::results::{
+    Coefficients, Correlation, Differences, Interval, Number, PairName, PairTest, Permuted, Stat,
+};
+use study_analysis::analyze::{Analysis, Finding, Question};
 
 const HEAD: [&str; 15] = [
     "question",
@@ -21,185 +24,181 @@ const HEAD: [&str; 15] = [
     "verdict",
 ];
 
-/// A test that decides nothing, by the identifiers of its numbers; empty for none.
+/// A test that decides nothing.
+#[derive(Default)]
 struct Model {
     question: &'static str,
     test: &'static str,
-    group: &'static str,
-    estimate: &'static str,
-    std_error: &'static str,
-    statistic: &'static str,
-    df: [&'static str; 2],
-    p: &'static str,
-    ci: &'static str,
+    estimate: Option<f64>,
+    std_error: Option<f64>,
+    statistic: Option<f64>,
+    df: [Option<f64>; 2],
+    p: Option<f64>,
+    ci: Option<(f64, f64)>,
 }
 
-const NONE: Model = Model {
-    question: "",
-    test: "",
-    group: "",
-    estimate: "",
-    std_error: "",
-    statistic: "",
-    df: [""; 2],
-    p: "p",
-    ci: "",
-};
-
-const fn anova(test: &'static str, p: &'static str) -> Model {
-    Model {
-        question: "differ",
-        test,
-        group: "rmanova",
-        statistic: "F",
-        df: ["df1", "df2"],
-        p,
-        ..NONE
-    }
-}
-
-const fn slope(test: &'static str, group: &'static str) -> Model {
-    Model {
-        question: "vaf",
-        test,
-        group,
-        estimate: "slope",
-        std_error: "slope_se",
-        statistic: "slope_t",
-        df: ["slope_satterthwaite_df", ""],
-        p: "slope_satterthwaite_p",
-        ..NONE
-    }
-}
-
-const fn correlation(
-    test: &'static str,
-    group: &'static str,
-    r: &'static str,
-    p: &'static str,
+/// A test by a statistic, with its degrees of freedom.
+fn by_statistic(
+    (question, test): (&'static str, &'static str),
+    statistic: &dyn Number,
+    df: [&dyn Number; 2],
+    p: &dyn Number,
 ) -> Model {
-    Model {
-        question: "vaf",
-        test,
-        group,
-        estimate: r,
-        p,
-        ci: "ci95",
-        ..NONE
-    }
-}
-
-const fn f_test(question: &'static str, test: &'static str, group: &'static str) -> Model {
     Model {
         question,
         test,
-        group,
-        statistic: "F",
-        df: ["df1", "df2"],
-        ..NONE
+        statistic: statistic.number(),
+        df: df.map(Number::number),
+        p: p.number(),
+        ..Model::default()
     }
 }
 
-const MODELS: [Model; 22] = [
-    anova("anova", "p"),
-    anova("anova-greenhouse-geisser", "p_gg"),
-    anova("anova-huynh-feldt", "p_hf"),
-    Model {
-        statistic: "chi2",
-        df: ["df", ""],
-        group: "friedman",
-        ..anova("friedman-chi2", "p")
-    },
-    Model {
-        statistic: "iman_davenport_F",
-        df: ["iman_davenport_df1", "iman_davenport_df2"],
-        group: "friedman",
-        ..anova("friedman-iman-davenport", "iman_davenport_p")
-    },
-    Model {
-        statistic: "chi2",
-        df: ["df", ""],
-        group: "friedman",
-        ..anova("friedman-exact", "exact_p")
-    },
-    f_test("differ", "mixed-model", "lmm_cells"),
-    correlation("pearson-t", "corr/pearson", "r", "p_t"),
-    correlation(
-        "pearson-permutation-exact",
-        "corr/pearson",
-        "r",
-        "p_exact_two_sided",
-    ),
-    correlation(
-        "pearson-permutation-monte-carlo",
-        "corr/pearson",
-        "r",
-        "p_monte_carlo_two_sided",
-    ),
-    correlation(
-        "spearman-permutation-exact",
-        "corr/spearman",
-        "rho",
-        "p_exact_two_sided",
-    ),
-    correlation(
-        "kendall-permutation-exact",
-        "corr/kendall",
-        "tau_b",
-        "p_exact_two_sided",
-    ),
-    correlation(
-        "adjusted-spearman-permutation-exact",
-        "corr_adjusted/spearman",
-        "rho",
-        "p_exact_two_sided",
-    ),
-    correlation(
-        "adjusted-kendall-permutation-exact",
-        "corr_adjusted/kendall",
-        "tau_b",
-        "p_exact_two_sided",
-    ),
-    slope("mixed-model-crossed", "lmm_vaf_crossed"),
-    slope("mixed-model-these-realizations-only", "lmm_vaf"),
-    slope(
-        "mixed-model-slopes-these-realizations-only",
-        "lmm_vaf_slope",
-    ),
-    Model {
-        estimate: "beta/vaf",
-        std_error: "se/vaf",
-        statistic: "t",
-        ..correlation("ordinal-crossed", "clmm_vaf_crossed", "beta/vaf", "p")
-    },
-    Model {
-        df: ["df", ""],
-        ..correlation(
-            "repeated-measures-correlation-these-realizations-only",
-            "rmcorr_cells",
-            "r",
-            "p",
-        )
-    },
-    f_test("disagreement", "interaction", "disagreement/interaction"),
-    f_test("disagreement", "slopes-differ", "disagreement/slopes"),
+fn slope(test: &'static str, model: &Coefficients) -> Model {
     Model {
         question: "vaf",
-        test: "proportional-odds",
-        group: "clm_vaf/proportional_odds",
-        statistic: "chi2",
-        df: ["df", ""],
-        ..NONE
-    },
-];
+        test,
+        estimate: model.slope.number(),
+        std_error: model.slope_se.number(),
+        statistic: model.slope_t.number(),
+        df: [model.slope_satterthwaite_df.number(), None],
+        p: model.slope_satterthwaite_p.number(),
+        ci: None,
+    }
+}
+
+fn correlation(test: &'static str, r: &dyn Number, p: &dyn Number) -> Model {
+    Model {
+        question: "vaf",
+        test,
+        estimate: r.number(),
+        p: p.number(),
+        ..Model::default()
+    }
+}
+
+/// The permutation tests of ranks.
+fn of_ranks(tests: [&'static str; 2], of: &Correlation) -> Vec<Model> {
+    let spearman = of.spearman.as_ref();
+    let kendall = of.kendall.as_ref();
+    let exact = |p: &Permuted| p.p_exact_two_sided.number();
+    let model = |test, r: &Stat, permuted: &Permuted| Model {
+        p: exact(permuted),
+        ..correlation(test, r, &None::<Stat>)
+    };
+    let spearman = spearman.map(|s| model(tests[0], &s.rho, &s.permuted));
+    let kendall = kendall.map(|k| model(tests[1], &k.tau_b, &k.permuted));
+    [spearman, kendall].into_iter().flatten().collect()
+}
+
+/// The tests that decide nothing.
+fn models(a: &Analysis) -> Vec<Model> {
+    let (evidence, mixed, ordinal) = (&a.results.evidence, &a.results.mixed, &a.results.ordinal);
+    let Differences {
+        rmanova, friedman, ..
+    } = &evidence.differences;
+    let none = &None::<Stat>;
+    let anova = |test, p| {
+        let df: [&dyn Number; 2] = [&rmanova.df1, &rmanova.df2];
+        by_statistic(("differ", test), &rmanova.f, df, p)
+    };
+    let ranks = |test, p| by_statistic(("differ", test), &friedman.chi2, [&friedman.df, none], p);
+    let mut all = vec![
+        anova("anova", &rmanova.p),
+        anova("anova-greenhouse-geisser", &rmanova.p_gg),
+        anova("anova-huynh-feldt", &rmanova.p_hf),
+        ranks("friedman-chi2", &friedman.p),
+        by_statistic(
+            ("differ", "friedman-iman-davenport"),
+            &friedman.iman_davenport_f,
+            [&friedman.iman_davenport_df1, &friedman.iman_davenport_df2],
+            &friedman.iman_davenport_p,
+        ),
+        ranks("friedman-exact", &friedman.exact_p),
+    ];
+    let cells = &evidence.cells.model;
+    let df: [&dyn Number; 2] = [&cells.df1, &cells.df2];
+    all.push(by_statistic(
+        ("differ", "mixed-model"),
+        &cells.f,
+        df,
+        &cells.p,
+    ));
+    let pearson = &evidence.corr.pearson;
+    let permuted = pearson.permuted.as_ref();
+    let of_pearson = |test, p: &dyn Number| Model {
+        ci: pearson.ci95.as_ref().and_then(Interval::ends),
+        ..correlation(test, &pearson.r, p)
+    };
+    let exact = permuted.and_then(|p| p.p_exact_two_sided.as_ref());
+    let random = permuted.and_then(|p| p.p_monte_carlo_two_sided.as_ref());
+    all.extend([
+        of_pearson("pearson-t", &pearson.p_t),
+        of_pearson("pearson-permutation-exact", &exact),
+        of_pearson("pearson-permutation-monte-carlo", &random),
+    ]);
+    let raw = ["spearman-permutation-exact", "kendall-permutation-exact"];
+    all.extend(of_ranks(raw, &evidence.corr));
+    let adjusted = [
+        "adjusted-spearman-permutation-exact",
+        "adjusted-kendall-permutation-exact",
+    ];
+    all.extend(of_ranks(adjusted, &evidence.corr_adjusted));
+    let crossed = &ordinal.clmm_vaf_crossed;
+    let within = &a.results.over_participants.rmcorr_cells;
+    all.extend([
+        slope("mixed-model-crossed", &evidence.crossed.coefficients),
+        slope(
+            "mixed-model-these-realizations-only",
+            &mixed.vaf.coefficients,
+        ),
+        slope(
+            "mixed-model-slopes-these-realizations-only",
+            &mixed.vaf_slope.coefficients,
+        ),
+        Model {
+            std_error: crossed.se.number(),
+            statistic: crossed.t.number(),
+            ..correlation("ordinal-crossed", &crossed.beta, &crossed.p)
+        },
+        Model {
+            df: [within.df.number(), None],
+            ci: within.ci95.ends(),
+            ..correlation(
+                "repeated-measures-correlation-these-realizations-only",
+                &within.r,
+                &within.p,
+            )
+        },
+    ]);
+    let disagree = &evidence.disagreement;
+    for (test, found) in [
+        ("interaction", &disagree.interaction),
+        ("slopes-differ", &disagree.slopes),
+    ] {
+        let df: [&dyn Number; 2] = [&found.df1, &found.df2];
+        all.push(by_statistic(("disagreement", test), &found.f, df, &found.p));
+    }
+    if let Some(odds) = &ordinal.clm_vaf.proportional_odds {
+        let df: [&dyn Number; 2] = [&odds.df, none];
+        all.push(by_statistic(
+            ("vaf", "proportional-odds"),
+            &odds.chi2,
+            df,
+            &odds.p,
+        ));
+    }
+    all.retain(|model| model.p.is_some());
+    all
+}
 
 /// The rows of the file.
 pub(super) fn rows(a: &Analysis) -> Vec<Vec<String>> {
     let mut rows = vec![cells(HEAD)];
     rows.extend(a.findings.iter().map(|f| finding(a, f)));
     for p in &a.pairs {
-        let id = pair_id("pair", &p.first, &p.second);
-        let get = |what: &str| a.values.number(&format!("{id}/{what}"));
+        let compared = compared(a, &p.first, &p.second);
+        let get = |field: fn(&PairTest) -> &Stat| compared.map(field).number();
         let test = p.test.as_ref();
         let mut row = vec![
             "pairs".to_owned(),
@@ -209,12 +208,12 @@ pub(super) fn rows(a: &Analysis) -> Vec<Vec<String>> {
         let ci = p.difference.ci95;
         row.extend(
             [
-                get("difference"),
-                get("se"),
-                get("t"),
-                get("df"),
+                get(|p| &p.difference),
+                get(|p| &p.se),
+                get(|p| &p.t),
+                get(|p| &p.df),
                 None,
-                get("p_holm"),
+                get(|p| &p.p_holm),
             ]
             .map(number),
         );
@@ -232,10 +231,12 @@ pub(super) fn rows(a: &Analysis) -> Vec<Vec<String>> {
     }
     for r in a.realizations.iter().filter(|m| !m.tested) {
         for t in a.tested() {
-            let get = |what: &str| a.about("reference", &[&r.id, &t.id], what);
-            let Some(p) = get("p_t_holm") else {
+            let Some((test, p)) =
+                (a.against(&r.id, &t.id)).and_then(|test| Some((test, test.p_t_holm.number()?)))
+            else {
                 continue;
             };
+            let ci = test.ci95.ends();
             let question = Question::Reference(r.id.clone()).id();
             let mut row = vec![
                 question,
@@ -244,15 +245,15 @@ pub(super) fn rows(a: &Analysis) -> Vec<Vec<String>> {
             ];
             row.extend(
                 [
-                    get("mean_diff"),
+                    test.mean_diff.number(),
                     None,
-                    get("t"),
-                    get("n").map(|n| n - 1.0),
+                    test.t.number(),
+                    test.n.number().map(|n| n - 1.0),
                     None,
                     Some(p),
-                    get("ci95_lo"),
-                    get("ci95_hi"),
-                    get("n"),
+                    ci.map(|c| c.0),
+                    ci.map(|c| c.1),
+                    test.n.number(),
                     Some(2.0),
                 ]
                 .map(number),
@@ -261,7 +262,7 @@ pub(super) fn rows(a: &Analysis) -> Vec<Vec<String>> {
             rows.push(row);
         }
     }
-    rows.extend(MODELS.iter().filter_map(|m| model(a, m)));
+    rows.extend(models(a).iter().map(model));
     rows
 }
 
@@ -271,12 +272,11 @@ fn finding(a: &Analysis, f: &Finding) -> Vec<String> {
     let df = |i: usize| statistic.and_then(|s| s.df.get(i).copied());
     let ci = f.estimate.and_then(|e| e.ci95);
     let se = match &f.question {
-        Question::Order => a.values.number("order_trial/se"),
-        Question::CarryOver => a.values.number("carry_over/se"),
-        Question::Best => f.names.get(1).and_then(|second| {
-            let id = pair_id("pair", &f.names[0], second);
-            a.values.number(&format!("{id}/se"))
-        }),
+        Question::Order => a.results.evidence.order.trial.se.number(),
+        Question::CarryOver => a.results.evidence.order.carry_over.se.number(),
+        Question::Best => {
+            (f.names.get(1)).and_then(|second| compared(a, &f.names[0], second)?.se.number())
+        }
         _ => None,
     };
     let mut row = vec![
@@ -303,29 +303,29 @@ fn finding(a: &Analysis, f: &Finding) -> Vec<String> {
     row
 }
 
-fn model(a: &Analysis, m: &Model) -> Option<Vec<String>> {
-    let get = |what: &str| {
-        let id = format!("{}/{what}", m.group);
-        a.values.number(&id).filter(|_| !what.is_empty())
-    };
-    let p = get(m.p)?;
-    let ci = a.values.interval(&format!("{}/{}", m.group, m.ci));
+/// The comparison of a pair.
+fn compared<'a>(a: &'a Analysis, first: &str, second: &str) -> Option<&'a PairTest> {
+    let tests = a.results.evidence.pairs.as_ref()?;
+    tests.compared.get(&PairName::of(first, second))
+}
+
+fn model(m: &Model) -> Vec<String> {
     let mut row = vec![m.question.to_owned(), m.test.to_owned(), String::new()];
     row.extend(
         [
-            get(m.estimate),
-            get(m.std_error),
-            get(m.statistic),
-            get(m.df[0]),
-            get(m.df[1]),
-            Some(p),
-            ci.map(|c| c.0),
-            ci.map(|c| c.1),
+            m.estimate,
+            m.std_error,
+            m.statistic,
+            m.df[0],
+            m.df[1],
+            m.p,
+            m.ci.map(|c| c.0),
+            m.ci.map(|c| c.1),
             None,
             None,
         ]
         .map(number),
     );
     row.extend(["false".to_owned(), String::new()]);
-    Some(row)
+    row
 }

@@ -4,7 +4,7 @@ use super::{Canvas, Drawn, Scene, drawn, head, name};
 use crate::apa::digits;
 use crate::chart::{Axis, Look, Mark, PALETTE, Panel, Span};
 use crate::chart::{MAX_LABEL, widest};
-use study_analysis::analyze::group_id;
+use study_analysis::analyze::results::{List, Number as _};
 
 /// Largest number of bins of a histogram.
 const MAX_BINS: usize = 21;
@@ -13,15 +13,15 @@ const MAX_BINS: usize = 21;
 const MAX_PANELS: usize = 24;
 
 pub(super) fn histograms(scene: &Scene<'_>) -> Option<Drawn> {
-    let v = &scene.a.values;
-    let first = v.number("desc_all/hist_from")?;
-    let bins = v.list("desc_all/hist")?.len();
+    let all = &scene.a.results.descriptives.desc_all;
+    let first = all.hist_from.number()?;
+    let bins = all.hist.as_ref()?.numbers()?.len();
     let counts: Vec<&[f64]> = scene
         .models
         .iter()
         .map(|m| {
-            v.list(&format!("{}/hist", group_id("desc", &[&m.id])))
-                .unwrap_or(&[])
+            let hist = scene.a.described(&m.id).and_then(|d| d.hist.as_ref());
+            hist.and_then(List::numbers).unwrap_or(&[])
         })
         .collect();
     let drawable = (1..=MAX_PANELS).contains(&scene.models.len());

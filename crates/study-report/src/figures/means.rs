@@ -3,6 +3,7 @@
 
 use super::{Along, Canvas, Drawn, Scene, cell, drawn, head, jitter, rows_height};
 use crate::chart::{Axis, Look, Mark, PALETTE, Whisker};
+use study_analysis::analyze::results::{Described, Number as _, Stat};
 
 /// What the error bars of the means are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,14 +39,12 @@ impl Bars {
         match self {
             Self::Within => Some(around(
                 scene.mean(model)?,
-                scene.number(model, "cousineau_morey/ci95_half")?,
+                (scene.a.described(model)?.cousineau_morey.as_ref())
+                    .map(|c| &c.ci95_half)
+                    .number()?,
             )),
-            Self::Adjusted => (scene.a.about("adjusted", &[model], "ci95_lo")).zip(scene.a.about(
-                "adjusted",
-                &[model],
-                "ci95_hi",
-            )),
-            Self::Deviation => Some(around(scene.mean(model)?, scene.number(model, "sd")?)),
+            Self::Adjusted => scene.a.adjusted(model)?.ci95.ends(),
+            Self::Deviation => Some(around(scene.mean(model)?, scene.number(model, |d| &d.sd)?)),
         }
     }
 
@@ -116,7 +115,8 @@ pub(super) fn fig10(scene: &Scene<'_>) -> Option<Drawn> {
     for m in &scene.models {
         let ends = bars.ends(scene, &m.id);
         let mut row = vec![m.id.clone()];
-        row.extend(["n", "mean", "sd"].map(|s| cell(scene.number(&m.id, s))));
+        let fields: [fn(&Described) -> &Stat; 3] = [|d| &d.n, |d| &d.mean, |d| &d.sd];
+        row.extend(fields.map(|field| cell(scene.number(&m.id, field))));
         row.push(cell(scene.mean(&m.id)));
         row.extend([ends.map(|e| e.0), ends.map(|e| e.1), m.vaf].map(cell));
         data.push(row);

@@ -68,7 +68,7 @@ pub(super) fn strips(scene: &Scene<'_>) -> Option<Drawn> {
         }
     }
     let medians: Vec<(f64, f64)> = (scene.models.iter().enumerate())
-        .filter_map(|(j, m)| Some((j as f64, scene.number(&m.id, "median")?)))
+        .filter_map(|(j, m)| Some((j as f64, scene.number(&m.id, |d| &d.median)?)))
         .flat_map(|(j, median)| {
             // A point that is not finite ends a line.
             [(j - 0.4, median), (j + 0.4, median), (f64::NAN, f64::NAN)]

@@ -7,6 +7,7 @@ use crate::chart::{
     for_names, text_width, widest,
 };
 use std::collections::BTreeMap;
+use study_analysis::analyze::results::Number as _;
 use study_stats::describe::mean;
 
 /// The means of all cells, as CSV rows.
@@ -183,9 +184,10 @@ pub(super) fn order(scene: &Scene<'_>) -> Option<Drawn> {
         return None;
     }
     let of = |model: &str, repetition: u32| by.get(&(model, repetition)).and_then(|x| mean(x));
+    let order = &scene.a.results.evidence.order;
     let over = |repetition: u32| {
-        let id = format!("order_repetition/{repetition}/mean");
-        scene.a.values.number(&id)
+        let all = &order.repetition;
+        all.get(&repetition).map(|r| &r.mean).number()
     };
     let mut data = vec![head(["model", "repetition", "mean"])];
     for m in &scene.models {
@@ -193,9 +195,9 @@ pub(super) fn order(scene: &Scene<'_>) -> Option<Drawn> {
             data.push(vec![m.id.clone(), k.to_string(), cell(of(&m.id, k))]);
         }
     }
-    let v = &scene.a.values;
-    let slope = v.number("order_trial/slope").zip(v.number("order_trial/p"));
-    let digits = apa::decimals(v.number("order_trial/se").unwrap_or(0.0), 3);
+    let trial = &order.trial;
+    let slope = trial.slope.number().zip(trial.p.number());
+    let digits = apa::decimals(trial.se.number().unwrap_or(0.0), 3);
     let slope = slope.map_or_else(String::new, |(b, p)| {
         format!(
             " Adjusted for participants and realizations, the rating changes by {} per trial, t test p {}.",

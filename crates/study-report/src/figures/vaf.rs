@@ -6,6 +6,7 @@ use crate::apa::digits;
 use crate::chart::{Axis, Color, Dash, Figure, Label, Look, Mark, PALETTE, Panel, Whisker};
 use crate::chart::{MAX_LABEL, SMALL, shortened, text_width};
 use study_analysis::analyze::Question;
+use study_analysis::analyze::results::Number as _;
 use study_stats::distribution::t_quantile;
 use study_stats::regression::{Line, line};
 
@@ -86,16 +87,16 @@ pub(super) fn against_vaf(scene: &Scene<'_>) -> Option<Drawn> {
     let each = scene.models.iter().enumerate();
     let dots: Vec<Dot> = each
         .filter_map(|(nth, m)| {
-            let get = |what: &str| {
-                (scene.a.about("adjusted", &[&m.id], what))
-                    .filter(|_| !scene.a.design.is_complete())
-                    .or_else(|| scene.number(&m.id, &format!("subject_mean/{what}")))
-            };
+            let adjusted = scene
+                .a
+                .adjusted(&m.id)
+                .filter(|_| !scene.a.design.is_complete());
+            let described = || scene.a.described(&m.id)?.subject_mean.ci95.ends();
             Some(Dot {
                 nth,
                 vaf: m.vaf?,
                 mean: scene.mean(&m.id)?,
-                ci95: get("ci95_lo").zip(get("ci95_hi")),
+                ci95: (adjusted.and_then(|m| m.ci95.ends())).or_else(described),
             })
         })
         .collect();
@@ -123,7 +124,7 @@ pub(super) fn against_vaf(scene: &Scene<'_>) -> Option<Drawn> {
         .a
         .finding(&Question::Vaf)
         .and_then(|f| f.test.as_ref());
-    let r = scene.a.values.number("corr_adjusted/pearson/r");
+    let r = scene.a.correlation().pearson.r.number();
     let found = r.map_or_else(String::new, |r| {
         let p = decided.map_or_else(String::new, |t| format!(", permutation p {}", apa::p(t.p)));
         format!(" r = {}{p}.", apa::r(r))

@@ -3,7 +3,8 @@
 
 use super::Details;
 use crate::{apa, sentences};
-use study_analysis::analyze::{Analysis, Better, PreregisteredRule, Question, TestKind, Value};
+use study_analysis::analyze::results::{Differences, Number};
+use study_analysis::analyze::{Analysis, Better, PreregisteredRule, Question, TestKind};
 use study_base::text::{capital, counted};
 use study_stats::permutation::DRAWS;
 
@@ -16,10 +17,10 @@ pub(super) fn paragraph(d: &Details, a: &Analysis) -> String {
     text.extend(exclusions(a));
     text.extend(tests(a));
     text.extend(complete_only(a));
-    let any = |what: &str| a.tested().any(|m| a.described(&m.id, what).is_some());
-    if any("sd") {
+    let described = || a.tested().filter_map(|m| a.described(&m.id));
+    if described().any(|d| d.sd.number().is_some()) {
         let sd = "Standard deviations are over all ratings of a realization (n − 1)";
-        let intervals = if any("subject_mean/ci95_lo") {
+        let intervals = if described().any(|d| d.subject_mean.ci95.ends().is_some()) {
             "; confidence intervals of means are t intervals over participants"
         } else {
             ""
@@ -37,16 +38,18 @@ pub(super) fn paragraph(d: &Details, a: &Analysis) -> String {
 /// The analyses restricted to participants who rated everything, unless all did.
 fn complete_only(a: &Analysis) -> Option<String> {
     let (all, complete) = (a.design.participants, a.design.complete);
-    let defined = |id: &str| a.values.number(id).is_some();
+    let evidence = &a.results.evidence;
+    let Differences {
+        rmanova, friedman, ..
+    } = &evidence.differences;
+    let shares = evidence.variance.share.as_ref().map(|s| &s.model);
+    let defined = |stat: &dyn Number| stat.number().is_some();
     let compared = a.design.uses_complete();
     let done: Vec<String> = [
-        (defined("rmanova/F") && compared, "the analysis of variance"),
-        (defined("friedman/chi2"), "Friedman's test"),
+        (defined(&rmanova.f) && compared, "the analysis of variance"),
+        (defined(&friedman.chi2), "Friedman's test"),
         (!a.pairs.is_empty() && compared, "the comparison of pairs"),
-        (
-            defined("variance/share/model") && compared,
-            "the variance components",
-        ),
+        (defined(&shares) && compared, "the variance components"),
     ]
     .into_iter()
     .filter(|(done, _)| *done)
@@ -175,8 +178,8 @@ fn ratings(d: &Details, a: &Analysis) -> String {
         n => format!(" {n} times each"),
     });
     let tested = a.tested().count();
-    let has_ratings = |id: &str| a.described(id, "n").is_some_and(|n| n > 0.0);
-    let rated = a.tested().filter(|m| has_ratings(&m.id)).count();
+    let described = a.tested().filter_map(|m| a.described(&m.id));
+    let rated = described.filter(|d| d.n.number() > Some(0.0)).count();
     let without = match c.participants - c.with_ratings {
         0 => String::new(),
         n => format!(" {n} more took part but gave no rating."),
@@ -268,8 +271,10 @@ fn differences(a: &Analysis) -> Option<String> {
     };
     let besides = match test.kind {
         TestKind::Friedman | TestKind::FriedmanExact => String::new(),
-        _ if a.values.number("friedman/chi2").is_some() => format!("; {friedman} is given besides"),
-        _ => String::new(),
+        _ => match a.results.evidence.differences.friedman.chi2.number() {
+            Some(_) => format!("; {friedman} is given besides"),
+            None => String::new(),
+        },
     };
     Some(format!(
         "Differences between realizations were tested by {by}{besides}."
@@ -292,13 +297,8 @@ fn disagreement(a: &Analysis) -> Option<String> {
 
 /// The tests whose results are defined.
 fn tests(a: &Analysis) -> Vec<String> {
-    let v = &a.values;
-    let defined = |id: &str| v.number(id).is_some();
-    let any = |start: &str, end: &str| {
-        v.iter().any(|(id, value)| {
-            id.starts_with(start) && id.ends_with(end) && matches!(value, Value::Number(_))
-        })
-    };
+    let evidence = &a.results.evidence;
+    let defined = |stat: &dyn Number| stat.number().is_some();
     let finding = |question: &Question| a.finding(question);
     let mut text = Vec::new();
     if let Some(test) = finding(&Question::Vaf).and_then(|f| f.test.as_ref()) {
@@ -318,7 +318,7 @@ fn tests(a: &Analysis) -> Vec<String> {
         ));
     }
     text.extend(differences(a));
-    let wilcoxon = any("posthoc/", "/p_wilcoxon_exact");
+    let wilcoxon = (a.results.posthoc.values()).any(|p| defined(&p.p_wilcoxon_exact));
     let test = finding(&Question::Pairs).and_then(|f| f.test.as_ref());
     let test = test.or_else(|| finding(&Question::Best)?.test.as_ref());
     if let Some(test) = test {
@@ -343,8 +343,9 @@ fn tests(a: &Analysis) -> Vec<String> {
         });
     }
     text.extend(disagreement(a));
-    if defined("lmm_vaf_crossed/slope") {
-        let effects = if defined("lmm_vaf_crossed/var_subject_model") {
+    let crossed = &evidence.crossed;
+    if defined(&crossed.coefficients.slope) {
+        let effects = if defined(&crossed.var_subject_model) {
             ", realizations and their combinations"
         } else {
             " and realizations"
@@ -354,9 +355,10 @@ fn tests(a: &Analysis) -> Vec<String> {
              was fitted by restricted maximum likelihood, with Satterthwaite's degrees of freedom."
         ));
     }
-    let between = defined("icc_subjects/ICC2")
+    let agreement = &a.results.agreement;
+    let between = defined(&agreement.icc_subjects.icc2.value)
         .then(|| "Agreement between participants is ICC(2,1) over cell means".to_owned());
-    let within = defined("icc_repetitions/ICC1")
+    let within = defined(&agreement.icc_repetitions.icc.icc1.value)
         .then(|| "consistency over repetitions is ICC(1,1)".to_owned());
     let iccs: Vec<String> = [between, within].into_iter().flatten().collect();
     if !iccs.is_empty() {
@@ -375,7 +377,8 @@ fn tests(a: &Analysis) -> Vec<String> {
             apa::listing(&a.sites)
         ));
     }
-    if any("reference/", "/p_tost") {
+    let mut references = evidence.references.reference.values().flatten();
+    if references.any(|(_, test)| defined(&test.p_tost)) {
         let margin = if a.changed(PreregisteredRule::Margin) {
             "a margin that was changed after the study began (see Deviations)"
         } else {
@@ -385,10 +388,9 @@ fn tests(a: &Analysis) -> Vec<String> {
             "Equivalence with the reference was tested by two one-sided t tests with {margin}."
         ));
     }
-    if let (Some(margin), true) = (
-        a.values.number("equivalence/r/margin"),
-        defined("equivalence/r/p"),
-    ) {
+    if let Some(equivalence) = &evidence.equivalence.r
+        && let (Some(margin), Some(_)) = (equivalence.margin.number(), equivalence.p.number())
+    {
         text.push(format!(
             "Whether the correlation with VAF lies within ± {} was tested by two one-sided tests of Fisher's \
              z (Goertzen & Cribbie, 2010).",

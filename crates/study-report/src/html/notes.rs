@@ -5,6 +5,7 @@ use super::{Details, lines, safe};
 use crate::table::MAX_ROWS;
 use crate::{Source, apa, tables};
 use maud::{Markup, html};
+use study_analysis::analyze::results::Number as _;
 use study_analysis::analyze::{Analysis, Comment, PreregisteredRule, Warning};
 use study_base::text::{counted, sentence};
 
@@ -45,7 +46,9 @@ fn noted(w: &Warning) -> String {
 
 /// The exclusion rules, their effects, and changes after the study began.
 fn rules(a: &Analysis) -> Markup {
-    let r = |id: &str| a.values.number(id).map(apa::r);
+    let with = a.results.evidence.corr.pearson.r.number().map(apa::r);
+    let before = a.results.before_exclusion.as_ref();
+    let without = before.map(|b| &b.corr.pearson.r).number().map(apa::r);
     let changed = a.changed(PreregisteredRule::Exclusions);
     html! {
         @if a.exclusions.is_empty() && changed {
@@ -54,7 +57,7 @@ fn rules(a: &Analysis) -> Markup {
             p { "No exclusion rule was preregistered." }
         } @else {
             (table(&tables::rules(a)))
-            @match (r("corr/pearson/r"), r("before_exclusion/corr/pearson/r")) {
+            @match (&with, &without) {
                 (Some(with), Some(without)) => p {
                     "With the exclusions mean rating and VAF correlate at r = " (with)
                     ", without them at r = " (without)
@@ -127,7 +130,7 @@ pub(super) fn comments(a: &Analysis, lang: Option<&str>) -> Markup {
 }
 
 fn comments_on_one(a: &Analysis, group: &[Comment], lang: Option<&str>) -> Markup {
-    let mean = a.described(&group[0].model, "mean");
+    let mean = a.described(&group[0].model).map(|d| &d.mean).number();
     html! {
         @let model = if group[0].model.is_empty() { "no realization" } else { &group[0].model };
         details open {

@@ -5,7 +5,8 @@ use super::{Details, methods, typeset};
 use crate::{apa, sentences};
 use maud::{Markup, html};
 use study_analysis::analyze::findings::Direction;
-use study_analysis::analyze::{Analysis, Finding, Question, Verdict, group_id};
+use study_analysis::analyze::results::{Coefficient, Number as _};
+use study_analysis::analyze::{Analysis, Finding, Question, Verdict};
 use study_session::outcome::Role;
 
 /// Realizations whose means are listed in a sentence, and pairs that differ.
@@ -36,9 +37,9 @@ fn results(a: &Analysis) -> String {
         text.extend(sentence(a, f));
     }
     text.extend(agreement(a));
-    let v = &a.values;
-    let before = v.number("before_exclusion/corr/pearson/r");
-    if let Some((before, r)) = before.zip(v.number("corr/pearson/r")) {
+    let before = a.results.before_exclusion.as_ref();
+    let before = before.map(|b| &b.corr.pearson.r).number();
+    if let Some((before, r)) = before.zip(a.results.evidence.corr.pearson.r.number()) {
         text.push(format!(
             "Without the exclusions the correlation would be r = {} instead of {}.",
             apa::r(before),
@@ -51,9 +52,12 @@ fn results(a: &Analysis) -> String {
 fn means(a: &Analysis) -> Option<String> {
     let means: Vec<String> = (a.tested())
         .filter_map(|m| {
-            let mean = apa::two(a.described(&m.id, "mean")?);
-            let sd = a.described(&m.id, "sd");
-            let sd = sd.map_or_else(String::new, |s| format!(", SD = {}", apa::two(s)));
+            let described = a.described(&m.id)?;
+            let mean = apa::two(described.mean.number()?);
+            let sd = described
+                .sd
+                .number()
+                .map_or_else(String::new, |s| format!(", SD = {}", apa::two(s)));
             Some(format!("{} (M = {mean}{sd})", m.id))
         })
         .collect();
@@ -68,12 +72,8 @@ fn adjusted_means(a: &Analysis) -> Option<String> {
     }
     let means: Vec<String> = (a.ranked().iter())
         .map(|(mean, name)| {
-            let id = format!("{}/ci95", group_id("adjusted", &[name]));
-            format!(
-                "{name} {}{}",
-                apa::two(*mean),
-                sentences::ci(a, &id, apa::two)
-            )
+            let ci = sentences::ci(a.adjusted(name).map(|m| &m.ci95), apa::two);
+            format!("{name} {}{ci}", apa::two(*mean))
         })
         .collect();
     (1..=MAX_LISTED).contains(&means.len()).then(|| {
@@ -87,12 +87,12 @@ fn adjusted_means(a: &Analysis) -> Option<String> {
 fn realistic(a: &Analysis) -> Option<String> {
     let from = a.realistic_from?;
     let (_, best) = *a.ranked().first()?;
-    let share = a.about("realistic", &[best], "share")?;
-    let ci = format!("{}/ci95", group_id("realistic", &[best]));
+    let found = a.realistic(best)?;
+    let share = found.share.number()?;
     Some(format!(
         "Of the ratings of {best}, {} were {from} or higher{}.",
         apa::percent(share),
-        sentences::ci(a, &ci, apa::percent)
+        sentences::ci(&found.ci95, apa::percent)
     ))
 }
 
@@ -199,7 +199,7 @@ fn sentence(a: &Analysis, f: &Finding) -> Option<String> {
             } else {
                 "A change of the ratings over the session was not shown"
             };
-            let se = a.values.number("order_trial/se").unwrap_or(0.0);
+            let se = a.results.evidence.order.trial.se.number().unwrap_or(0.0);
             let decimals = apa::decimals(se, 3);
             let b = f
                 .estimate
@@ -232,8 +232,8 @@ fn sentence(a: &Analysis, f: &Finding) -> Option<String> {
         }
         Question::Equivalence(reference) => {
             let best = f.names.first()?;
-            let id = group_id("reference", &[reference, best]);
-            let margin = a.values.number(&format!("{id}/margin"))?;
+            let equivalence = a.against(reference, best)?.equivalence.as_ref();
+            let margin = equivalence?.margin.number()?;
             let was = if yes {
                 "was equivalent"
             } else {
@@ -361,21 +361,22 @@ fn vaf(a: &Analysis, f: &Finding) -> String {
     let r = f
         .estimate
         .map_or_else(String::new, |e| sentences::estimate(&e, apa::r));
-    let rho = a.values.number("corr_adjusted/spearman/rho");
+    let correlation = a.correlation();
+    let rho = correlation.spearman.as_ref().map(|s| &s.rho).number();
     let rho = rho.map_or_else(String::new, |x| format!("; Spearman's ρ = {}", apa::r(x)));
     let mut text = format!(
         "{what}: over the {n} realizations the {} of {asked} correlated with VAF at r({}) = {r}{}{rho}.",
         sentences::mean(a),
         n.saturating_sub(2),
-        sentences::permutation_p(a, "pearson"),
+        sentences::permutation_p(a, correlation.pearson.permutation_p()),
     );
     for c in f.caveats.iter().filter(|c| c.code == "raw-and-adjusted") {
         text.push(' ');
         text.push_str(&sentences::caveat(c));
     }
-    let crossed = "lmm_vaf_crossed/slope_satterthwaite_p";
-    let tested = a.values.number(crossed).is_some();
-    if let Some(slope) = sentences::slope_on_vaf(a, "lmm_vaf_crossed").filter(|_| tested) {
+    let crossed = &a.results.evidence.crossed.coefficients;
+    let tested = crossed.slope_satterthwaite_p.number().is_some();
+    if let Some(slope) = sentences::slope_on_vaf(a, crossed).filter(|_| tested) {
         let singular = match a.no_variance_beside_vaf() {
             Some(true) => {
                 " (singular fit: besides VAF no variance between realizations is left, and p is too \
@@ -390,17 +391,17 @@ fn vaf(a: &Analysis, f: &Finding) -> String {
 }
 
 fn agreement(a: &Analysis) -> Vec<String> {
-    let icc = |group: &str, name: &str| {
-        let x = a.values.number(&format!("{group}/{name}"))?;
-        let ci = crate::tables::icc_interval(a, &format!("{group}/{name}"));
-        let ci = ci.map_or_else(String::new, |b| {
+    let all = &a.results.agreement;
+    let icc = |icc: &Coefficient| {
+        let x = icc.value.number()?;
+        let ci = crate::tables::icc_interval(icc).map_or_else(String::new, |b| {
             format!(", 95 % CI {}", apa::interval(b, |x| apa::share(x, 2)))
         });
         Some(format!("{}{ci}", apa::share(x, 2)))
     };
-    let between = icc("icc_subjects", "ICC2")
+    let between = icc(&all.icc_subjects.icc2)
         .map(|x| format!("Agreement between participants: ICC(2,1) = {x}."));
-    let within = icc("icc_repetitions", "ICC1")
+    let within = icc(&all.icc_repetitions.icc.icc1)
         .map(|x| format!("Consistency over repetitions: ICC(1,1) = {x}."));
     [between, within].into_iter().flatten().collect()
 }

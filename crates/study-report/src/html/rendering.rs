@@ -4,6 +4,7 @@ use super::tables::table;
 use super::{safe, typeset};
 use crate::{apa, tables};
 use maud::{Markup, html};
+use study_analysis::analyze::results::Number as _;
 use study_analysis::analyze::{Analysis, Question};
 use study_base::text::counted;
 
@@ -39,37 +40,32 @@ pub(super) fn section(a: &Analysis) -> Markup {
     }
 }
 
-fn number(a: &Analysis, id: &str, what: &str) -> Option<f64> {
-    a.values.number(&format!("{id}/{what}"))
-}
-
-/// "Of 150 trials …: the force was right in 148 …".
 fn summary(a: &Analysis) -> Option<String> {
-    let get = |what: &str| number(a, "rendering", what);
+    let judged = &a.results.evidence.rendering.as_ref()?.judged;
     let count = |n: f64, one: &str, many: &str| counted(n as usize, one, many);
-    let wrong = get("n_flag")? + get("n_fault")?;
-    let judged = get("n_ok")? + wrong;
+    let wrong = judged.n_flag.number()? + judged.n_fault.number()?;
+    let right = judged.n_ok.number()?;
     let mut text = format!(
         "The force was judged in {} that count: right in {}, marked in {wrong}",
-        count(judged, "trial", "trials"),
-        get("n_ok")?
+        count(right + wrong, "trial", "trials"),
+        right
     );
-    if let Some(share) = get("share_wrong") {
+    if let Some(share) = judged.share_wrong.number() {
         text.push_str(&format!(" ({})", apa::percent(share)));
     }
     text.push('.');
     for (n, why) in [
         (
-            get("n_too_little")?,
+            judged.n_too_little.number()?,
             "too little was felt or reported for a verdict",
         ),
-        (get("n_unverified")?, "it could not be verified"),
+        (judged.n_unverified.number()?, "it could not be verified"),
     ] {
         if n > 0.0 {
             text.push_str(&format!(" In {}, {why}.", count(n, "trial", "trials")));
         }
     }
-    let failed = get("n_failed_attempts")?;
+    let failed = judged.n_failed_attempts.number()?;
     if failed > 0.0 {
         text.push_str(&format!(
             " {} failed because of a wrong force and came again.",

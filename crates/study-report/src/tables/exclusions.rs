@@ -2,7 +2,8 @@
 
 use crate::apa::{self, bare_p, digits, plain, three, whole};
 use crate::table::{Builder, Cell, Format, Table, file, none, report};
-use study_analysis::analyze::{Analysis, PreregisteredRule, Value, group_id};
+use study_analysis::analyze::results::{BeforeExclusion, Correlation, Differences, Number};
+use study_analysis::analyze::{Analysis, PreregisteredRule, Value};
 
 /// The exclusion rules and their effects.
 pub(crate) fn rules(a: &Analysis) -> Table {
@@ -48,42 +49,81 @@ pub(crate) fn excluded(a: &Analysis) -> Table {
         .done()
 }
 
-/// The results that the report compares with and without the exclusions, besides the means.
-const HEADLINE: [(&str, &str, Format); 8] = [
-    ("participants", "design/n_subjects", whole),
-    ("r of mean rating and VAF", "corr/pearson/r", apa::r),
-    ("its p, exact", "corr/pearson/p_exact_two_sided", bare_p),
-    (
-        "its p, random permutations",
-        "corr/pearson/p_monte_carlo_two_sided",
-        bare_p,
-    ),
-    ("Spearman's ρ", "corr/spearman/rho", apa::r),
-    ("F of the realizations", "rmanova/F", three),
-    ("its p, Greenhouse–Geisser", "rmanova/p_gg", bare_p),
-    ("p of Friedman's test", "friedman/p", bare_p),
-];
-
 /// The main results with and without the exclusions.
 pub(crate) fn with_and_without(a: &Analysis) -> Table {
-    let before = |id: &str| a.values.number(&format!("before_exclusion/{id}"));
-    let headline = HEADLINE.map(|(what, id, format)| (what.to_owned(), id.to_owned(), format));
-    let means = a.realizations.iter().map(|m| {
-        let id = format!("{}/mean", group_id("desc", &[&m.id]));
-        (format!("mean of {}", apa::name(&m.id)), id, three as Format)
-    });
-    let all: Vec<(String, String, Format)> = headline.into_iter().chain(means).collect();
-    let defined = all.iter().filter(|row| before(&row.1).is_some());
+    let rows = a.results.before_exclusion.as_ref();
+    let rows = rows.map_or_else(Vec::new, |before| compared(a, before));
+    let defined = rows.iter().filter(|row| row.2.is_some());
     let caption = "Main results with and without the exclusions";
     Builder::new(caption, defined, &none)
         .text(report("statistic"), &|row| row.0.clone())
         .column(report("with the exclusions"), &|row| {
-            Cell::Number(a.values.number(&row.1), row.2)
+            Cell::Number(row.1, row.3)
         })
-        .column(report("without them"), &|row| {
-            Cell::Number(before(&row.1), row.2)
-        })
+        .column(report("without them"), &|row| Cell::Number(row.2, row.3))
         .done()
+}
+
+/// What is compared, with and without the exclusions, and its format.
+fn compared(
+    a: &Analysis,
+    before: &BeforeExclusion,
+) -> Vec<(String, Option<f64>, Option<f64>, Format)> {
+    let (evidence, descriptives) = (&a.results.evidence, &a.results.descriptives);
+    let row = |what: &str, with: &dyn Number, without: &dyn Number, format: Format| {
+        (what.to_owned(), with.number(), without.number(), format)
+    };
+    let (corr, was) = (&evidence.corr, &before.corr);
+    let permuted = |c: &Correlation| c.pearson.permuted.clone();
+    let exact = |c| permuted(c).map(|p| p.p_exact_two_sided);
+    let random = |c| permuted(c).map(|p| p.p_monte_carlo_two_sided);
+    let rho = |c: &Correlation| c.spearman.as_ref().map(|s| s.rho.clone());
+    let Differences {
+        rmanova, friedman, ..
+    } = &evidence.differences;
+    let (n, n_was) = (&descriptives.design.n_subjects, &before.design.n_subjects);
+    let (r, r_was) = (&corr.pearson.r, &was.pearson.r);
+    let mut rows = vec![
+        row("participants", n, n_was, whole),
+        row("r of mean rating and VAF", r, r_was, apa::r),
+        row("its p, exact", &exact(corr), &exact(was), bare_p),
+        row(
+            "its p, random permutations",
+            &random(corr),
+            &random(was),
+            bare_p,
+        ),
+        row("Spearman's ρ", &rho(corr), &rho(was), apa::r),
+        row(
+            "F of the realizations",
+            &rmanova.f,
+            &before.rmanova.f,
+            three,
+        ),
+        row(
+            "its p, Greenhouse–Geisser",
+            &rmanova.p_gg,
+            &before.rmanova.p_gg,
+            bare_p,
+        ),
+        row(
+            "p of Friedman's test",
+            &friedman.p,
+            &before.friedman.p,
+            bare_p,
+        ),
+    ];
+    rows.extend(a.realizations.iter().map(|m| {
+        let mean = a.described(&m.id).map(|d| &d.mean);
+        let mean_was = before.desc.get(m.id.as_str()).map(|d| &d.mean);
+        row(
+            &format!("mean of {}", apa::name(&m.id)),
+            &mean,
+            &mean_was,
+            three,
+        )
+    }));
+    rows
 }
 
 /// `with_and_without.csv`: the same of every statistic that is computed without the exclusions.

@@ -2,8 +2,9 @@
 
 use crate::apa::{self, bare_p, three, two, whole};
 use crate::sentences;
-use crate::table::{Builder, Table, file, none, report};
-use study_analysis::analyze::{Analysis, MAX_PAIRED, Pair, RealizationSummary, pair_id};
+use crate::table::{Builder, Table, file, none, page, report};
+use study_analysis::analyze::results::{Number as _, PairName, Posthoc, ReferenceTest, Stat};
+use study_analysis::analyze::{Analysis, MAX_PAIRED, Pair, RealizationSummary};
 use study_base::text::counted;
 use study_session::outcome::Role;
 
@@ -14,11 +15,11 @@ fn cancelled(x: f64) -> f64 {
 
 /// The comparisons that decide which pairs differ.
 pub(crate) fn pairs(a: &Analysis) -> Table {
-    let wilcoxon = |first: &str, second: &str| {
-        let id = pair_id("posthoc", first, second);
-        a.values.number(&format!("{id}/p_wilcoxon_exact_holm"))
+    let wilcoxon = |p: &Pair| {
+        let posthoc = a.results.posthoc.get(&PairName::of(&p.first, &p.second))?;
+        posthoc.p_wilcoxon_exact_holm.number()
     };
-    let any = (a.pairs.iter()).any(|p| wilcoxon(&p.first, &p.second).is_some());
+    let any = a.pairs.iter().any(|p| wilcoxon(p).is_some());
     let note = a.pairs.iter().find_map(|p| p.test.as_ref()).map(|test| {
         let means = match a.design.uses_complete() {
             true => "cell means over participants",
@@ -46,9 +47,7 @@ pub(crate) fn pairs(a: &Analysis) -> Table {
             let p = p.test.as_ref().map(|t| apa::p_beside(t.p, t.level));
             p.map_or_else(|| "–".to_owned(), |p| p.trim_start_matches("= ").to_owned())
         })
-        .number(report("p (Wilcoxon, Holm)").when(any), bare_p, &|p| {
-            wilcoxon(&p.first, &p.second)
-        })
+        .number(report("p (Wilcoxon, Holm)").when(any), bare_p, &wilcoxon)
         .notes(note)
 }
 
@@ -56,27 +55,34 @@ pub(crate) fn pairs(a: &Analysis) -> Table {
 pub(crate) fn posthoc(a: &Analysis) -> Table {
     let names: Vec<&str> = a.tested().map(|m| m.id.as_str()).collect();
     let few = names.len() <= MAX_PAIRED;
-    let get = |(first, second): (&str, &str), what: &str| {
-        let id = pair_id("posthoc", first, second);
-        a.values.number(&format!("{id}/{what}"))
-    };
     let all = names.iter().enumerate().filter(|_| few);
     let all = all.flat_map(|(i, first)| names[i + 1..].iter().map(move |second| (*first, *second)));
-    let defined = all.filter(|pair| get(*pair, "mean_diff").is_some());
-    Builder::new("", defined, &get)
-        .text(file("pair"), &|p| format!("{}|{}", p.0, p.1))
-        .in_file("mean_diff")
-        .in_file("t")
-        .in_file("p_t")
-        .in_file("p_t_holm")
-        .in_file("dz")
-        .in_file("d_av")
-        .in_file("wilcoxon_n")
-        .in_file("wilcoxon_Wplus")
-        .in_file("p_wilcoxon_exact")
-        .in_file("p_wilcoxon_exact_holm")
-        .in_file("p_wilcoxon_normal")
-        .in_file("rank_biserial")
+    let tests = all.filter_map(|(first, second)| {
+        let posthoc = a.results.posthoc.get(&PairName::of(first, second))?;
+        posthoc.mean_diff.number()?;
+        Some((first, second, posthoc))
+    });
+    type Column = (&'static str, fn(&Posthoc) -> &Stat);
+    let columns: [Column; 12] = [
+        ("mean_diff", |p| &p.mean_diff),
+        ("t", |p| &p.t),
+        ("p_t", |p| &p.p_t),
+        ("p_t_holm", |p| &p.p_t_holm),
+        ("dz", |p| &p.dz),
+        ("d_av", |p| &p.d_av),
+        ("wilcoxon_n", |p| &p.wilcoxon_n),
+        ("wilcoxon_Wplus", |p| &p.wilcoxon_w_plus),
+        ("p_wilcoxon_exact", |p| &p.p_wilcoxon_exact),
+        ("p_wilcoxon_exact_holm", |p| &p.p_wilcoxon_exact_holm),
+        ("p_wilcoxon_normal", |p| &p.p_wilcoxon_normal),
+        ("rank_biserial", |p| &p.rank_biserial),
+    ];
+    let mut table =
+        Builder::new("", tests, &none).text(file("pair"), &|p| format!("{}|{}", p.0, p.1));
+    for (name, of) in columns {
+        table = table.field(file(name), two, |p| of(p.2));
+    }
+    table
         .text(file("first"), &|p| p.0.to_owned())
         .text(file("second"), &|p| p.1.to_owned())
         .done()
@@ -97,36 +103,39 @@ pub(crate) fn against_references(a: &Analysis) -> Vec<Table> {
 fn against(a: &Analysis, r: &RealizationSummary) -> Table {
     let role = r.role.as_str().replace('-', " ");
     let caption = format!("Differences from {} ({role})", apa::name(&r.id));
-    let get = |t: &RealizationSummary, what: &str| a.about("reference", &[&r.id, &t.id], what);
-    let equivalence = a.tested().any(|t| get(t, "p_tost").is_some());
-    let compared = a.tested().filter(|t| get(t, "mean_diff").is_some());
-    Builder::new(&caption, compared, &get)
-        .name("realization", "model", &|t| t.id.clone())
-        .stat("n", "n", whole)
-        .stat("difference", "mean_diff", three)
-        .interval(report("95 % CI"), "ci95", two)
-        .stat("p (t, Holm)", "p_t_holm", bare_p)
-        .stat_as(
-            report("p (equivalence)").when(equivalence),
-            "p_tost",
-            bare_p,
-        )
+    let tests: Vec<(&str, &ReferenceTest)> = (a.tested())
+        .filter_map(|t| Some((t.id.as_str(), a.against(&r.id, &t.id)?)))
+        .filter(|(_, test)| test.mean_diff.number().is_some())
+        .collect();
+    let equivalence = tests.iter().any(|(_, test)| test.p_tost.number().is_some());
+    let equivalence = report("p (equivalence)").when(equivalence);
+    Builder::new(&caption, tests, &none)
+        .name("realization", "model", &|(name, _)| name.to_owned())
+        .field(page("n"), whole, |(_, t)| &t.n)
+        .field(page("difference"), three, |(_, t)| &t.mean_diff)
+        .ends(report("95 % CI"), two, &|(_, t)| t.ci95.ends())
+        .field(page("p (t, Holm)"), bare_p, |(_, t)| &t.p_t_holm)
+        .field(equivalence, bare_p, |(_, t)| &t.p_tost)
         .done()
 }
 
 /// Each hidden duplicate minus its original.
 pub(crate) fn repeats(a: &Analysis) -> Table {
-    let get = |(id, _): (&str, &str), what: &str| a.about("duplicate", &[id], what);
-    let all = a.realizations.iter();
-    let all = all.filter_map(|m| Some((m.id.as_str(), m.duplicate_of.as_deref()?)));
-    let compared = all.filter(|m| get(*m, "mean_diff").is_some());
+    let tests = &a.results.evidence.references.duplicate;
+    let all = a.realizations.iter().filter_map(|m| {
+        let test = tests.get(m.id.as_str())?;
+        Some((m.id.as_str(), m.duplicate_of.as_deref()?, test))
+    });
+    let compared = all.filter(|(_, _, test)| test.mean_diff.number().is_some());
     let caption = "Hidden duplicates minus their originals, over participants";
-    Builder::new(caption, compared, &get)
+    Builder::new(caption, compared, &none)
         .name("duplicate", "duplicate", &|m| m.0.to_owned())
         .name("of", "of", &|m| m.1.to_owned())
-        .stat("n", "n", whole)
-        .stat("difference", "mean_diff", three)
-        .interval(report("95 % CI"), "ci95", two)
-        .stat("mean |difference|", "mean_absolute_diff", three)
+        .field(page("n"), whole, |(_, _, t)| &t.n)
+        .field(page("difference"), three, |(_, _, t)| &t.mean_diff)
+        .ends(report("95 % CI"), two, &|(_, _, t)| t.ci95.ends())
+        .field(page("mean |difference|"), three, |(_, _, t)| {
+            &t.mean_absolute_diff
+        })
         .done()
 }

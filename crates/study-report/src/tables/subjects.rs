@@ -1,57 +1,72 @@
 //! The table of participants.
 
 use crate::apa::{self, two, whole};
-use crate::table::{Builder, Head, Table, file, report};
+use crate::table::{Builder, Table, file, none, page, report};
 use study_analysis::analyze::Analysis;
-
-/// Columns of designs with a reference, an anchor or a repeat.
-const EXTRA: [(&str, &str); 3] = [
-    ("hidden_reference_mean", "mean of the references"),
-    ("low_anchor_mean", "mean of the anchors"),
-    ("repeat_distance", "mean |difference| of duplicates"),
-];
+use study_analysis::analyze::results::{Number as _, ParticipantName, Screened, Stat};
 
 /// The included participants; empty if there are too many to list.
 pub(crate) fn subjects(a: &Analysis) -> Table {
-    let get = |s: &str, what: &str| a.about("subject", &[s], what);
-    let any = |what: &str| a.listed_subjects().any(|s| get(s, what).is_some());
+    type Row<'a> = (&'a ParticipantName, &'a Screened);
+    let all = &a.results.screening.subject;
+    let with_vaf = &a.results.over_participants.subject_corr.by_subject;
+    let with_vaf = |(name, _): Row<'_>| with_vaf.get(name.as_str());
     let has_vaf = a.realizations.iter().any(|m| m.vaf.is_some());
     // A correlation of two points is always ±1, so the report leaves it out.
     let enough = a.tested().count() > 2;
     let caption = "Screening of participants (nobody is excluded by it)";
-    let vaf = |what: &'static str| move |s: &str| a.about("subject_corr", &[s], what);
-    let mut table = Builder::new(caption, a.listed_subjects(), &get)
-        .name("participant", "subject", &str::to_owned)
-        .stat("n", "n", whole)
-        .stat("mean", "mean", two)
-        .stat("SD", "sd", two)
-        .stat("distinct", "distinct", whole)
-        .stat("longest run", "longest_run", whole)
-        .stat("SD within cells", "within_cell_sd", two)
-        .number(report("r with the others"), of_means, &|s| {
-            get(s, "leave_one_out_r").filter(|_| enough)
+    let column = |head: &str, name: &str| page(head).file(name);
+    let mut table = Builder::new(caption, all, &none)
+        .name("participant", "subject", &|s: Row<'_>| {
+            s.0.as_str().to_owned()
         })
-        .in_file("leave_one_out_r")
+        .field(column("n", "n"), whole, |(_, s)| &s.n)
+        .field(column("mean", "mean"), two, |(_, s)| &s.mean)
+        .field(column("SD", "sd"), two, |(_, s)| &s.sd)
+        .field(column("distinct", "distinct"), whole, |(_, s)| &s.distinct)
+        .field(column("longest run", "longest_run"), whole, |(_, s)| {
+            &s.longest_run
+        })
+        .field(
+            column("SD within cells", "within_cell_sd"),
+            two,
+            |(_, s)| &s.within_cell_sd,
+        )
+        .number(report("r with the others"), of_means, &|(_, s)| {
+            s.leave_one_out_r.number().filter(|_| enough)
+        })
+        .field(file("leave_one_out_r"), of_means, |(_, s)| {
+            &s.leave_one_out_r
+        })
         .number(report("r with VAF").when(has_vaf), of_means, &|s| {
-            vaf("r")(s).filter(|_| enough)
+            with_vaf(s)?.r.number().filter(|_| enough)
         });
-    for (id, what) in EXTRA {
-        let head = if any(id) {
-            report(what)
-        } else {
-            Head::default()
-        };
-        table = table.stat_as(head.file(id), id, two);
+    // Columns of designs with a reference, an anchor or a repeat.
+    let extra: [(_, _, fn(&Screened) -> &Option<Stat>); 3] = [
+        ("hidden_reference_mean", "mean of the references", |s| {
+            &s.hidden_reference_mean
+        }),
+        ("low_anchor_mean", "mean of the anchors", |s| {
+            &s.low_anchor_mean
+        }),
+        ("repeat_distance", "mean |difference| of duplicates", |s| {
+            &s.repeat_distance
+        }),
+    ];
+    for (name, what, of) in extra {
+        let known = all.values().any(|s| of(s).number().is_some());
+        let head = report(what).when(known).file(name);
+        table = table.field(head, two, |(_, s)| of(s).as_ref());
     }
-    let about = (a.listed_subjects().next().is_some()).then(|| {
+    let about = (!all.is_empty()).then(|| {
         "Over all ratings of a participant. Distinct: number of different ratings; longest run: number of \
          consecutive trials with the same rating; SD within cells: of the repetitions; r with the others: \
          correlation of the participant's means with those of all others, over realizations."
             .to_owned()
     });
     table
-        .number(file("r_with_vaf"), of_means, &vaf("r"))
-        .number(file("slope_on_vaf"), two, &vaf("slope"))
+        .field(file("r_with_vaf"), of_means, |s| with_vaf(s).map(|v| &v.r))
+        .field(file("slope_on_vaf"), two, |s| with_vaf(s).map(|v| &v.slope))
         .notes(about)
 }
 
