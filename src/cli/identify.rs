@@ -2,6 +2,7 @@
 
 mod args;
 mod files;
+mod loops;
 mod output;
 mod plan;
 
@@ -43,14 +44,11 @@ struct Results<'a> {
 
 impl Results<'_> {
     /// The recording whose VAF is to be reported: the first --test recording, or the
-    /// first --validate recording without one.
-    fn reported(&self) -> usize {
-        let validations = self.args.validate.len();
-        if validations < self.recordings.len() {
-            validations
-        } else {
-            0
-        }
+    /// first --validate recording without one, or that of the training.
+    fn reported(&self) -> &Recording {
+        let test = self.recordings.get(self.args.validate.len());
+        let found = test.or(self.recordings.first());
+        found.map_or(&self.training[0].1, |(_, recording)| recording)
     }
 }
 
@@ -109,6 +107,12 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let recordings: Vec<(&NamedPath, &Recording)> =
         recordings.iter().map(|(n, r)| (*n, r)).collect();
     let ceilings = ceilings(&recordings, &repeats)?;
+    if args.validate.is_empty() && plan.methods.len() * plan.dx_mm.len() > 1 {
+        return Err(Failure::usage(
+            "several realizations need --validate, on which one is selected",
+        )
+        .hint("or ask for one, such as --method passive --dx 0.05"));
+    }
 
     let mut cells = identify(args, &plan, &training, &recordings)
         .map_err(|e| Failure::input(format!("{}: {e}", args.training[0].path.display())))?;

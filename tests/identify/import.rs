@@ -102,3 +102,60 @@ fn what_is_no_curve_is_refused_with_file_and_line() {
         .code(1)
         .stderr(contains("already exists"));
 }
+
+/// A curve and the same with a tenth more force: two loops that differ by a tenth of the force.
+#[test]
+fn repeated_curves_say_how_much_a_model_can_know() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
+    let (stronger, recording, figures) = (path("b.csv"), path("r.csv"), path("figures"));
+    let mut text = String::from("force,displacement\n");
+    for row in fs::read_to_string(CLICKIEZ).unwrap().lines().skip(1) {
+        let cells: Vec<&str> = row.split(',').collect();
+        let _ = writeln!(
+            text,
+            "{},{}",
+            1.1 * cells[0].parse::<f64>().unwrap(),
+            cells[1]
+        );
+    }
+    fs::write(&stronger, text).unwrap();
+    study(&[
+        "import",
+        "force-curve",
+        CLICKIEZ,
+        &stronger,
+        "-o",
+        &recording,
+    ])
+    .success();
+    let one = [
+        "identify", &recording, "--method", "passive", "--dx", "0.05",
+    ];
+    let with = |more: &[&str]| study(&[&one[..], more].concat()).success();
+    let said = with(&["--figures", &figures]);
+    let said = String::from_utf8_lossy(&said.get_output().stdout).into_owned();
+    assert!(said.contains("2 loops differ by 0.0"), "{said}");
+    assert!(said.contains("no VAF: there is no --validate"), "{said}");
+    let json = with(&["--json"]);
+    let json: serde_json::Value = serde_json::from_slice(&json.get_output().stdout).unwrap();
+    let found = &json["force_curve"];
+    assert_eq!(found["loops"], 2);
+    let number = |key: &str| found[key].as_f64().unwrap();
+    // the mean force is 1.05 times the first one, from which both differ by a tenth of it
+    let csv = fs::read_to_string(format!("{figures}/force-displacement.csv")).unwrap();
+    assert!(csv.starts_with(
+        "x_mm,press_n,release_n,played_press_n,played_release_n,press_difference_n,release_difference_n\n"
+    ));
+    for row in csv.lines().skip(10).take(80) {
+        let cells: Vec<f64> = row.split(',').map(|cell| cell.parse().unwrap()).collect();
+        assert!((cells[5] - 0.1 / 1.05 * cells[1]).abs() < 1e-4, "{row}");
+        // a table between both: its error is at most half of their difference, and a little
+        assert!((cells[3] - cells[1]).abs() < 0.03, "{row}");
+    }
+    assert!(number("ceiling_vaf") > 0.9 && number("ceiling_vaf") < 0.99);
+    assert!(number("played_difference_n") < 0.5 * number("repetition_difference_n"));
+    study(&["identify", &recording, "--method", "passive"])
+        .code(2)
+        .stderr(contains("several realizations need --validate"));
+}

@@ -5,6 +5,7 @@ mod cli;
 mod estimators_switches;
 mod estimators_tables;
 mod evidence;
+mod force_curves;
 mod golden;
 mod grid;
 mod import;

@@ -39,6 +39,7 @@ pub mod mechanism;
 pub mod method;
 mod passive;
 mod problem;
+pub mod repetition;
 pub mod resample;
 pub mod samples;
 pub mod signal;

@@ -112,6 +112,11 @@ impl Recording {
         format!("{scale_mm:.0e}").parse().unwrap_or(scale_mm)
     }
 
+    /// Whether it is a slow press and release, or several: the header says so.
+    pub fn is_force_curve(&self) -> bool {
+        self.header_line("measured force curve:").is_some()
+    }
+
     /// How the time of a recording that was measured without one was made up: the text of the header
     /// line `quasi-static: …`. `None` if it was measured.
     pub fn quasi_static(&self) -> Option<&str> {

@@ -5,11 +5,13 @@
 //! Each figure comes with its data as a CSV, in the units of its axes. Nothing is
 //! identified or selected here.
 
+mod displacement;
 mod mechanism;
 mod parameters;
 mod spectrum;
 mod surface;
 
+pub use displacement::displacement;
 pub use mechanism::mechanism;
 pub use parameters::{map, parameters};
 pub use surface::{GridCell, Row, surface};

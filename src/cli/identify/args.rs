@@ -100,8 +100,8 @@ pub(in crate::cli) struct Args {
     #[arg(value_name = "TRAINING", required = true)]
     pub(super) training: Vec<NamedPath>,
 
-    /// Recordings on which lambda and dx are selected; NAME=PATH sets the name in model files
-    #[arg(long, value_name = "REC", num_args = 1.., required = true)]
+    /// Recordings on which lambda and dx are selected, needed for more than one realization; NAME=PATH sets the name in model files
+    #[arg(long, value_name = "REC", num_args = 1..)]
     pub(super) validate: Vec<NamedPath>,
 
     /// Recordings that are not used for selection: their VAF is the one to report

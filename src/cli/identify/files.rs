@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use study_base::text::{ModelId, Untrusted};
 use study_haptics::identify::grid::Cell;
 use study_haptics::model::file;
+use study_haptics::recording::Recording;
 use study_report::identification::{self, Drawing, GridCell, Row, Shown};
 use study_report::picture::png::Painter;
 
@@ -87,7 +88,6 @@ pub(super) fn figures(
         .args
         .units()
         .map_or(Shown::LINEAR, |(units, lever_mm)| Shown { units, lever_mm });
-    let (selected_on, _) = results.recordings[0];
     let lambdas = (results.cells.iter()).any(|c| c.realization.provenance.lambda.is_some());
     let row = if lambdas { Row::Lambda } else { Row::Delta };
     let places: Vec<GridCell> = results
@@ -107,7 +107,11 @@ pub(super) fn figures(
         })
         .collect();
     let whole = places.len() == results.cells.len();
-    let name = Untrusted(&selected_on.name).to_string();
+    let selected_on = results
+        .recordings
+        .first()
+        .map_or("", |(named, _)| &named.name);
+    let name = Untrusted(selected_on).to_string();
     let best = results.best.filter(|_| whole);
     match identification::surface(row, &places, best, &name, shown) {
         Some(drawing) => drawings.push(drawing),
@@ -116,13 +120,15 @@ pub(super) fn figures(
         }
     }
     if let Some(cell) = results.cells.get(results.best.unwrap_or(0)) {
-        let recording = results.recordings[results.reported()].1;
+        let recording = results.reported();
         let realization = &cell.realization;
         let mechanism = identification::mechanism(realization, recording, shown);
         let is_table = mechanism.is_none();
         drawings.push(mechanism.unwrap_or_else(|| identification::parameters(realization, shown)));
         drawings.push(identification::force(realization, recording, shown));
         drawings.push(identification::spectra(realization, recording, shown));
+        let training: Vec<&Recording> = results.training.iter().map(|(_, r)| r).collect();
+        drawings.extend(identification::displacement(realization, &training, shown));
         let dx = realization.provenance.dx_mm;
         let same_dx: Vec<_> = results
             .cells

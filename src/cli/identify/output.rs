@@ -2,6 +2,7 @@
 
 use super::Results;
 use super::args::NamedPath;
+use super::loops;
 use serde_json::{Map, Value, json};
 use std::fmt::Write as _;
 use study_base::text::Untrusted;
@@ -110,6 +111,7 @@ pub(super) fn json(results: &Results<'_>) -> String {
         "recordings": recordings,
         "best": results.best,
         "validation": validation,
+        "force_curve": loops::json(results),
         "cells": cells,
     });
     format!("{document:#}\n")
@@ -236,30 +238,30 @@ fn start_and_sort(method: Method) -> [Option<&'static str>; 2] {
 
 /// Lengths and forces as the recording has them: a turning handle in angles and torques.
 #[derive(Clone, Copy)]
-struct Printed {
+pub(super) struct Printed {
     units: Units,
     lever_mm: f64,
 }
 
 impl Printed {
-    fn of(results: &Results<'_>) -> Self {
+    pub(super) fn of(results: &Results<'_>) -> Self {
         let (units, lever_mm) = results.args.units().unwrap_or((Units::Linear, 1.0));
         Self { units, lever_mm }
     }
 
-    fn length(self, mm: f64) -> f64 {
+    pub(super) fn length(self, mm: f64) -> f64 {
         self.units.of_mm(mm, self.lever_mm)
     }
 
-    fn force(self, n: f64) -> f64 {
+    pub(super) fn force(self, n: f64) -> f64 {
         self.units.of_n(n, self.lever_mm)
     }
 
-    fn x(self) -> &'static str {
+    pub(super) fn x(self) -> &'static str {
         self.units.names()[0]
     }
 
-    fn f(self) -> &'static str {
+    pub(super) fn f(self) -> &'static str {
         self.units.names()[1]
     }
 }
@@ -301,7 +303,8 @@ pub(super) fn table(results: &Results<'_>) -> String {
     out.push('\n');
     match surface(results) {
         Some(rows) => {
-            let name = Untrusted(&results.recordings[0].0.name);
+            let name = (results.recordings.first()).map_or("", |(named, _)| &named.name);
+            let name = Untrusted(name);
             let x = p.x();
             let _ = writeln!(
                 out,
@@ -319,6 +322,7 @@ pub(super) fn table(results: &Results<'_>) -> String {
     out.push('\n');
     out.push_str(&selection(results));
     out.push_str(&best_in_detail(results));
+    out.push_str(&loops::text(results));
     for (warning, cells) in warnings(results) {
         let _ = writeln!(out, "warning: {warning} ({cells})");
     }
@@ -533,6 +537,9 @@ fn selection(results: &Results<'_>) -> String {
             .collect::<Vec<_>>()
             .join(", ")
     };
+    if results.recordings.is_empty() {
+        return "no VAF: there is no --validate or --test recording\n".into();
+    }
     if results.cells.len() == 1 {
         return format!("VAF {}\n", list(0, results.recordings.len()));
     }
@@ -575,7 +582,7 @@ fn warnings(results: &Results<'_>) -> Vec<(String, String)> {
 }
 
 /// Columns as wide as their widest entry, right-aligned.
-fn align(rows: &[Vec<String>]) -> String {
+pub(super) fn align(rows: &[Vec<String>]) -> String {
     let columns = rows.first().map_or(0, Vec::len);
     let widths: Vec<usize> = (0..columns)
         .map(|i| rows.iter().map(|row| row[i].width()).max().unwrap_or(0))

@@ -458,12 +458,16 @@ fn cell(
 }
 
 /// The index of the cell with the highest mean VAF over the first `validations`
-/// recordings, the first one of equals; `None` if no cell has a finite VAF.
+/// recordings, the first one of equals; `None` if no cell has a finite VAF. A cell that is the only one is
+/// the best without any.
 pub fn best(cells: &[Cell], validations: usize) -> Option<usize> {
     let mean = |cell: &Cell| {
         let scores = &cell.scores[..validations.min(cell.scores.len())];
         scores.iter().map(|s| s.vaf).sum::<f64>() / scores.len() as f64
     };
+    if validations == 0 && cells.len() == 1 {
+        return Some(0);
+    }
     let mut best: Option<(usize, f64)> = None;
     for (i, cell) in cells.iter().enumerate() {
         let vaf = mean(cell);
