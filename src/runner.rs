@@ -25,6 +25,7 @@ use study_base::text::{ModelId, PartId, ParticipantId};
 use study_device::{Device, Report, Stimulus, manual, rendering_of};
 use study_haptics::identify::delivery::Delivery;
 use study_haptics::model::Realization;
+use study_haptics::safe_play;
 use study_plan::protocol::fingerprint::Fingerprints;
 use study_plan::protocol::{DeviceKind, FileOrders, ModelEntry, Protocol, Trial};
 use study_session::outcome::{Channel, Event, Fidelity, Playback, Sample, Verdict};
@@ -140,6 +141,8 @@ pub struct Runner {
     last_report: Option<Duration>,
     /// The code on the physical sample of each realization.
     codes: BTreeMap<ModelId, String>,
+    /// Of each table: [`playback_limits`] plays a mechanism for a moment.
+    limits: BTreeMap<ModelId, Limits>,
     /// Whether the current playback reports telemetry.
     has_telemetry: bool,
     /// Samples of the current playback, for its judgement.
@@ -155,6 +158,10 @@ impl Runner {
         let (session, effects) =
             Session::new(setup.protocol.clone(), setup.orders.clone(), config, at);
         let codes = sample_codes(&setup.protocol);
+        let limits = |table: &Realization| playback_limits(&setup.protocol, Some(table));
+        let limits = (setup.models.iter())
+            .map(|(id, table)| (id.clone(), limits(table)))
+            .collect();
         let only_flags = !setup.study.manifest().judges_rendering;
         let mut runner = Self {
             setup,
@@ -168,6 +175,7 @@ impl Runner {
             loaded_due: None,
             last_report: None,
             codes,
+            limits,
             has_telemetry: false,
             samples: Vec::new(),
             only_flags,
@@ -366,7 +374,8 @@ impl Runner {
                 "the realization has no table for this device".to_owned(),
             ));
         }
-        let limits = playback_limits(protocol, table);
+        let limits = self.limits.get(model).copied();
+        let limits = limits.unwrap_or(protocol.device.limits);
         self.has_telemetry = !by_hand && self.setup.device.identity().telemetry;
         self.samples.clear();
         let stimulus = Stimulus {
@@ -453,7 +462,9 @@ impl Runner {
         let Some(table) = self.setup.models.get(model) else {
             return Fidelity::unverified("the realization has no table");
         };
-        let limits = playback_limits(protocol, Some(table)).capped_at(device.limits);
+        let limits = self.limits.get(model).copied();
+        let limits = limits.unwrap_or(protocol.device.limits);
+        let limits = limits.capped_at(device.limits);
         let others: Vec<_> = (self.setup.models.iter())
             .filter(|(id, _)| *id != model)
             .map(|(id, table)| (id.clone(), rendering_of(table)))
@@ -563,12 +574,15 @@ pub fn sample_codes(protocol: &Protocol) -> BTreeMap<ModelId, String> {
 }
 
 /// The playback limits for a table: those of the protocol. A table that fails its
-/// certificate can put energy into a hand; its force is also limited by the
-/// protocol's `uncertified` permission.
+/// certificate or is not safe to play can put energy into a hand; its force is also limited by
+/// the protocol's `uncertified` permission.
 pub fn playback_limits(protocol: &Protocol, table: Option<&Realization>) -> Limits {
     let mut limits = protocol.device.limits;
     if let Some(uncertified) = &protocol.device.uncertified
-        && table.is_some_and(|table| !table.certificate().passes())
+        && table.is_some_and(|table| {
+            let device = safe_play::Device::default();
+            !table.certificate().passes() || safe_play::refusal(table, &device).is_some()
+        })
     {
         limits.force_n = limits.force_n.capped_at(uncertified.force_n);
     }

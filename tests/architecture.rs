@@ -54,22 +54,23 @@ analyze: protocol procedure outcome stats
 power: protocol procedure outcome analyze stats
 export: protocol outcome analyze
 preregister: protocol outcome analyze
-load: family identify model preregister protocol recording schedule store wire
+load: family identify model preregister protocol recording safe_play schedule store wire
 study: analyze load outcome preregister protocol store
 model: wire
 family: model wire
+safe_play: model wire
 trajectory: wire
 plant: trajectory wire
 identify: model recording wire
 device: outcome model plant wire
 rater: protocol model plant wire
 rehearsal: analyze device load protocol rater runner store
-runner: session device store identify outcome protocol rendering model rater wire
+runner: session device store identify outcome protocol rendering model rater safe_play wire
 report: analyze stats identify load model outcome power preregister procedure protocol recording store study
 tui: runner page session outcome protocol
 plain: runner page session outcome protocol tui
 screen: runner page session outcome protocol
-cli: analyze device export identify load model outcome plain plant power procedure protocol rater recording rehearsal rendering report runner schedule screen session stats store study trajectory tui wire
+cli: analyze device export identify load model outcome plain plant power procedure protocol rater recording rehearsal rendering report runner safe_play schedule screen session stats store study trajectory tui wire
 main: cli
 certificate: predict
 predict: real

@@ -9,8 +9,10 @@ use study_base::apa;
 use study_base::diagnostic::{Findings, Severity};
 use study_base::text::{ModelId, Untrusted, counted};
 use study_haptics::model::Realization;
+use study_haptics::safe_play::{self, Danger};
 use study_plan::protocol::{DeviceKind, ModelEntry, Protocol, check};
 use study_stats::power::detectable_correlation;
+use study_wire::predict::Direction;
 
 /// Arguments of `study check`.
 #[derive(Debug, clap::Args)]
@@ -92,6 +94,8 @@ struct Certified<'a> {
     /// Null where the spring force jumps.
     stiffness_n_per_mm: f64,
     damping_n_s_per_mm: f64,
+    /// What an adversary makes of a realization that passes; null if it found nothing.
+    danger: Option<String>,
 }
 
 #[derive(Debug, Serialize)]
@@ -198,9 +202,25 @@ fn certified(loaded: &load::Loaded) -> Vec<Certified<'_>> {
                 negative_damping: certificate.negative_damping,
                 stiffness_n_per_mm: certificate.stiffness_n_per_mm,
                 damping_n_s_per_mm: certificate.damping_n_s_per_mm,
+                danger: danger(realization).map(|danger| danger.to_string()),
             }
         })
         .collect()
+}
+
+/// What is not safe about a realization that passes its certificate.
+fn danger(realization: &Realization) -> Option<Danger> {
+    let device = safe_play::Device::default();
+    let by_sign = realization.direction == Direction::Sign;
+    let chatter = || {
+        by_sign
+            .then(|| safe_play::chatter(realization, &device))
+            .flatten()
+    };
+    let passes = realization.certificate().passes();
+    passes
+        .then(|| safe_play::refusal(realization, &device).or_else(chatter))
+        .flatten()
 }
 
 /// A line for each table that is played, with its certificate and, if `verbose`, its
@@ -208,6 +228,7 @@ fn certified(loaded: &load::Loaded) -> Vec<Certified<'_>> {
 fn certificates(loaded: &load::Loaded, verbose: bool) -> String {
     let mut out = String::new();
     let (mut failing, mut tables) = (0, 0);
+    let mut dangers = Vec::new();
     for (id, realization) in played(loaded) {
         tables += 1;
         let certificate = realization.certificate();
@@ -219,7 +240,9 @@ fn certificates(loaded: &load::Loaded, verbose: bool) -> String {
             let verdict = if certificate.passes() { "PASS" } else { "FAIL" };
             out += &format!("{id}: {verdict}\n");
         }
+        dangers.extend(danger(realization).map(|danger| format!("note: `{id}`: {danger}\n")));
     }
+    out += &dangers.concat();
     if let (1.., Some(permission)) = (failing, &loaded.protocol.device.uncertified) {
         out += &format!(
             "note: {failing} of {} fail their certificate; `uncertified` permits playback at up to {} N: {}\n",

@@ -23,7 +23,9 @@ use study_haptics::identify::mechanism::Progress;
 use study_haptics::identify::signal::{self, Acceleration, Excitation, filter};
 use study_haptics::identify::validation::{self, Ceiling, Validation};
 use study_haptics::identify::{IdentifyError, Training};
+use study_haptics::model::Realization;
 use study_haptics::recording::{self, Names, Recording, RecordingError, RecordingFault};
+use study_haptics::safe_play::{self, Danger};
 use study_wire::certificate::{Certificate, SERVO_RATES_HZ};
 
 /// The results of an identification, for [`output`] and [`files`].
@@ -196,6 +198,16 @@ pub(super) fn required_damping(certificate: &Certificate) -> String {
         1000.0 * certificate.damping_n_s_per_mm,
         SERVO_RATES_HZ.map(at).join(", ")
     )
+}
+
+/// What an adversary makes on a device of a realization that passes its certificate.
+fn dangers(realization: &Realization) -> String {
+    if !realization.certificate().passes() {
+        return String::new();
+    }
+    let found = safe_play::search(realization, &safe_play::Device::default());
+    let line = |danger: &Danger| format!("warning: on a device, {danger}\n");
+    found.iter().map(line).collect()
 }
 
 /// What is subtracted from all positions, mm, or forces, N, before identification: 0 unless the

@@ -153,6 +153,44 @@ fn a_table_that_fails_its_certificate_is_refused_without_permission() {
     assert_eq!(run(dir.path(), &["check", "."]).0, 1);
 }
 
+/// A mechanism of an older version has 33 N at an edge that no data reached: it passes its
+/// certificate and is refused, or named where the protocol permits it.
+#[test]
+fn a_mechanism_that_is_not_safe_to_play_is_refused_without_permission() {
+    let dir = tempfile::tempdir().unwrap();
+    let from = Path::new("protocols/turn-signal-passive");
+    fs::create_dir(dir.path().join("models")).unwrap();
+    for entry in fs::read_dir(from.join("models")).unwrap() {
+        let path = entry.unwrap().path();
+        let to = dir.path().join("models").join(path.file_name().unwrap());
+        fs::copy(path, to).unwrap();
+    }
+    let old = "crates/study-haptics/tests/data/edge.toml";
+    fs::copy(old, dir.path().join("models/mechanism.toml")).unwrap();
+    let text = fs::read_to_string(from.join("protocol.toml")).unwrap();
+    let path = dir.path().join("protocol.toml");
+    fs::write(&path, &text).unwrap();
+    let (code, out, err) = run(dir.path(), &["check", "."]);
+    assert_eq!(code, 0, "{err}");
+    assert!(
+        out.contains("note: `mechanism`: 12.00 N at rest at 1.53 mm"),
+        "{out}"
+    );
+    // friction by the sign of the speed is named, too
+    assert!(
+        out.contains("note: `static`: 320 reversals a second"),
+        "{out}"
+    );
+    fs::write(&path, text.replace("play = true", "play = false")).unwrap();
+    for command in [&["check", "."][..], &["run", "."]] {
+        let (code, _, err) = run(dir.path(), command);
+        assert_eq!(code, 1, "{err}");
+        assert!(err.contains("`mechanism` is not safe to play"), "{err}");
+        assert!(err.contains("after a stroke of 83 mm/s"), "{err}");
+        assert!(err.contains("identify it anew, or permit it"), "{err}");
+    }
+}
+
 /// A sample mounted by hand has no force: no certificate is shown and no permission is
 /// needed. Played on a device with `--device`, it needs permission.
 #[test]

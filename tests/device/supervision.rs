@@ -202,6 +202,13 @@ fn the_cap_applies_to_uncertified_tables_only_and_never_raises_the_limit() {
     assert_eq!(force_n(Some(9.0), None), 12.0);
     assert_eq!(force_n(Some(15.0), Some(&uncertified)), 12.0);
     assert_eq!(force_n(None, Some(&uncertified)), 12.0);
+    // what is not safe to play is capped, although it passes its certificate
+    let text = std::fs::read_to_string("crates/study-haptics/tests/data/edge.toml").unwrap();
+    let edge = study_haptics::model::file::parse("edge.toml", &text)
+        .0
+        .unwrap();
+    assert!(edge.certificate().passes());
+    assert_eq!(force_n(Some(9.0), Some(&edge)), 9.0);
     let limits = playback_limits(&protocol(Some(9.0)), Some(&uncertified));
     assert_eq!(limits.velocity_mm_s.get(), 1000.0);
 }

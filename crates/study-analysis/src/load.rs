@@ -19,6 +19,7 @@ use std::path::{Path, PathBuf};
 use study_base::diagnostic::{Fault, Findings, Severity};
 use study_base::text::ModelId;
 use study_haptics::model::{Realization, Units};
+use study_haptics::safe_play::{self, Danger};
 use study_plan::protocol::file::{self, Named, Parsed};
 use study_plan::protocol::fingerprint::{self, Fingerprints, Parts, family_file};
 use study_plan::protocol::{DeviceKind, FileOrders, ModelEntry, Order, Protocol, check};
@@ -40,6 +41,9 @@ const MAX_ORDERS_BYTES: usize = 64 * 1024 * 1024;
 /// Hint for a table that fails its certificate.
 const PERMIT: &str = "identify it with m, b >= 0, or permit it in [device]: uncertified = { play = true, force_n = ..., reason = \"...\" }";
 
+/// Hint for a realization that is not safe to play.
+const ANEW: &str = "its file is of an older version or from too little data: identify it anew, or permit it in [device]: uncertified = { play = true, force_n = ..., reason = \"...\" }";
+
 /// File name of a protocol in its folder.
 pub const FILE_NAME: &str = "protocol.toml";
 
@@ -59,7 +63,7 @@ fn first(findings: &[Findings]) -> String {
 }
 
 /// A realization that a device cannot play or must not play.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Unplayable {
     /// It has no table, and the device needs one.
     #[error("realization `{0}` has no table for a {device} device", device = .1.as_str())]
@@ -69,6 +73,9 @@ pub enum Unplayable {
         "the table of `{0}` can put energy into a hand, which the protocol, made for samples mounted by hand, does not permit"
     )]
     NotPermitted(ModelId),
+    /// It is not safe to play, and the protocol does not permit that.
+    #[error("`{0}` is not safe to play: {1}")]
+    NotSafe(ModelId, Danger),
 }
 
 impl Unplayable {
@@ -79,6 +86,7 @@ impl Unplayable {
                 "add its `file`; only a child program or a sample mounted by hand needs none"
             }
             Self::NotPermitted(_) => PERMIT,
+            Self::NotSafe(..) => ANEW,
         }
     }
 }
@@ -134,6 +142,11 @@ impl Loaded {
                 None if kind != DeviceKind::Process => return Err(Unplayable::NoTable(id(), kind)),
                 Some(table) if !permitted && !table.certificate().passes() => {
                     return Err(Unplayable::NotPermitted(id()));
+                }
+                Some(table) if !permitted => {
+                    if let Some(danger) = safe_play::refusal(table, &safe_play::Device::default()) {
+                        return Err(Unplayable::NotSafe(id(), danger));
+                    }
                 }
                 _ => {}
             }

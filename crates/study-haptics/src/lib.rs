@@ -15,7 +15,8 @@
 //! * [`plant`]: a simulated target, probe and hand;
 //! * [`recording`]: position, velocity, acceleration and force over time, as CSV;
 //! * [`identify`]: filters, estimators and validation;
-//! * [`model`]: the realization and its model file.
+//! * [`model`]: the realization and its model file;
+//! * [`safe_play`]: what an adversary makes of it on a device.
 //!
 //! # Units
 //!
@@ -39,4 +40,5 @@ pub mod identify;
 pub mod model;
 pub mod plant;
 pub mod recording;
+pub mod safe_play;
 pub mod trajectory;

@@ -405,13 +405,11 @@ impl fmt::Display for Certificate {
                 Condition::Damping => ("b less what m needs", 5),
                 Condition::Hysteresis => ("least S+ - S-", 3),
             };
-            write!(
-                f,
-                "{before}{name} {:.digits$} {} at {:.2} mm",
-                margin.value,
-                condition.unit(),
-                margin.at_mm
-            )?;
+            let (value, unit, at_mm) = (margin.value, condition.unit(), margin.at_mm);
+            match value.is_finite() {
+                true => write!(f, "{before}{name} {value:.digits$} {unit} at {at_mm:.2} mm")?,
+                false => write!(f, "{before}{name} has no bound at {at_mm:.2} mm")?,
+            }
             before = ", ";
         }
         Ok(())

@@ -420,7 +420,7 @@ fn best_in_detail(results: &Results<'_>) -> String {
     let filter = provenance.filter.as_deref().unwrap_or("unknown");
     let mechanism = (cell.fitted.as_deref()).map_or(String::new(), mechanism_in_detail);
     format!(
-        "\nthe {} cell in detail; JND: just noticeable difference, {JUST_NOTICEABLE_N} N\nsignals: {filter}\n{}{ceilings}{mechanism}certificate {}\n    {}\n    m < 0 at {:.0} % of the nodes, b < 0 at {:.0} %\n",
+        "\nthe {} cell in detail; JND: just noticeable difference, {JUST_NOTICEABLE_N} N\nsignals: {filter}\n{}{ceilings}{mechanism}certificate {}\n    {}\n    m < 0 at {:.0} % of the nodes, b < 0 at {:.0} %\n{}",
         if results.cells.len() == 1 {
             "only"
         } else {
@@ -431,6 +431,7 @@ fn best_in_detail(results: &Results<'_>) -> String {
         super::required_damping(&cell.certificate),
         100.0 * cell.certificate.negative_mass,
         100.0 * cell.certificate.negative_damping,
+        super::dangers(&cell.realization),
     )
 }
 

@@ -3,6 +3,7 @@
 use super::OtherFiles;
 use study_base::diagnostic::{Fault, Findings, Severity, did_you_mean};
 use study_base::text::Untrusted;
+use study_haptics::safe_play;
 use study_plan::protocol::check::Spans;
 use study_plan::protocol::{Assigned, DeviceKind, FileOrders, Order, Protocol, Role};
 use study_plan::schedule::balance::balances;
@@ -99,7 +100,8 @@ pub(super) fn vaf(
     }
 }
 
-/// Reports tables that fail their certificate unless the protocol permits them.
+/// Reports realizations that fail their certificate or are not safe to play, unless the protocol
+/// permits them.
 pub(super) fn certificates(
     protocol: &Protocol,
     others: &OtherFiles<'_>,
@@ -118,20 +120,27 @@ pub(super) fn certificates(
         if protocol.device_of(entry) == DeviceKind::Manual {
             continue;
         }
-        let certificate = realization.certificate();
-        if certificate.passes() || seen.contains(&entry.file.as_ref()) {
+        if seen.contains(&entry.file.as_ref()) {
             continue;
         }
+        let certificate = realization.certificate();
+        let danger = || safe_play::refusal(realization, &safe_play::Device::default());
+        let fault = if !certificate.passes() {
+            let message = format!("the table of `{}` can put energy into a hand", entry.id);
+            Fault::error(message)
+                .label(certificate.to_string())
+                .hint(super::PERMIT)
+        } else if let Some(danger) = danger() {
+            let message = format!("`{}` is not safe to play", entry.id);
+            Fault::error(message)
+                .label(danger.to_string())
+                .hint(super::ANEW)
+        } else {
+            continue;
+        };
         seen.push(entry.file.as_ref());
-        findings.faults.push(
-            Fault::error(format!(
-                "the table of `{}` can put energy into a hand",
-                entry.id
-            ))
-            .at(spans.get(&format!("models[{i}].file")).cloned())
-            .label(certificate.to_string())
-            .hint(super::PERMIT),
-        );
+        let place = spans.get(&format!("models[{i}].file")).cloned();
+        findings.faults.push(fault.at(place));
     }
 }
 

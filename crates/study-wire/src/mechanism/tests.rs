@@ -155,6 +155,14 @@ fn parameters_that_are_no_passive_mechanism_are_refused() {
         mechanism(scalars(), &detent, &steep).check(300.0),
         Err(Flaw::Friction)
     );
+    // the certificate has the margin of what fails and of nothing else
+    let said = mechanism(scalars(), &detent, &steep).certificate(300.0);
+    assert_eq!(said.to_string(), "FAIL: least S+ - S- -0.160 N at 0.00 mm");
+    let said = mechanism(scalars(), &detent, &negative).certificate(300.0);
+    assert_eq!(
+        said.to_string(),
+        "FAIL: least S+ - S- has no bound at 4.00 mm"
+    );
     assert_eq!(
         mechanism(scalars(), &detent[..1], &friction).check(300.0),
         Err(Flaw::Profile)
