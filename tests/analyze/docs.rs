@@ -1,75 +1,343 @@
-//! Every identifier that an analysis prints is explained in `docs/statistics*.md`.
+//! The identifiers in `docs/statistics*.md` and in the JSON Schema are those of the declared
+//! statistics. `UPDATE_DOCS=1 cargo test --test analyze docs` writes them.
 #![allow(clippy::unwrap_used)]
 
-use std::collections::BTreeSet;
+use crate::schema::{begins, fits};
+use serde_json::{Map, Value, json};
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
 use std::fs::{self, File};
 use std::io::BufReader;
 use std::path::Path;
+use study_analysis::analyze::results::{Declared, Results};
 use study_analysis::analyze::{Rules, analyze};
 use study_session::outcome::ratings::Ratings;
 
-/// The words in the documents' code spans, split at `/`, with `a_{b,c}` and `a/{b,c}`
-/// expanded. A word that ends in `*` stands for all words with that prefix.
-fn explained() -> BTreeSet<String> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
-    let mut words = BTreeSet::new();
-    for name in ["statistics", "statistics-mixed", "statistics-ordinal"] {
-        let text = fs::read_to_string(root.join(format!("{name}.md"))).unwrap();
-        // Every second piece is code, which may contain a line break.
-        for code in text.split('`').skip(1).step_by(2) {
-            let code: String = code.split_whitespace().collect();
-            for whole in expanded(&code) {
-                words.extend(whole.split(['/', ',']).map(str::to_owned));
+const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+const START: &str = "<!-- The statistics: written by a test from their declarations. -->\n";
+const END: &str = "<!-- End of the statistics. -->\n";
+
+/// The document that defines the statistics of a group.
+fn document(id: &str) -> &'static str {
+    match id {
+        _ if id.starts_with("lmm_") || id == "slope_variance" => "statistics-mixed",
+        _ if id.starts_with("clm") => "statistics-ordinal",
+        _ => "statistics",
+    }
+}
+
+/// A table of the statistics whose identifiers begin alike, and where each record is.
+struct Section {
+    id: String,
+    about: Vec<String>,
+    rows: Vec<(String, String)>,
+}
+
+/// The sections of the documents, in the order of the declarations.
+#[derive(Default)]
+struct Sections {
+    all: Vec<Section>,
+    /// Where each record is in full.
+    written: BTreeMap<&'static str, String>,
+}
+
+impl Sections {
+    /// The section of an identifier.
+    fn section(&mut self, id: &str) -> &mut Section {
+        let first = |id: &str| id.split('/').next().unwrap().to_owned();
+        let at = self.all.iter().position(|s| first(&s.id) == first(id));
+        let at = at.unwrap_or_else(|| {
+            self.all.push(Section {
+                id: id.to_owned(),
+                about: Vec::new(),
+                rows: Vec::new(),
+            });
+            self.all.len() - 1
+        });
+        &mut self.all[at]
+    }
+
+    /// Adds declarations of the record with this identifier.
+    fn add(&mut self, of: &str, declared: &[Declared]) {
+        let mut rest = declared;
+        while let [first, after @ ..] = rest {
+            rest = after;
+            match first {
+                Declared::Statistic { id, doc, list } => {
+                    let list = if *list { " (a list)" } else { "" };
+                    self.row(id, &format!("{}{list}", line(doc)));
+                }
+                Declared::Group { id, own: count, .. } => {
+                    let (own, after) = rest.split_at(*count);
+                    rest = after;
+                    match id.as_str() {
+                        "" => self.add("", own),
+                        _ => self.group(of, first, own),
+                    }
+                }
             }
         }
     }
-    words
+
+    /// Adds a group; `of` is the identifier of the record that has it.
+    fn group(&mut self, of: &str, group: &Declared, own: &[Declared]) {
+        let Declared::Group {
+            id,
+            doc,
+            about,
+            record,
+            ..
+        } = group
+        else {
+            return;
+        };
+        let (doc, about) = (line(doc), line(about));
+        let is_first = self.section(id).id == *id && of != id;
+        if let Some(written) = self.written.get(record) {
+            let text = format!("{doc}: as `{written}/…`");
+            let names = own.iter().filter_map(|declared| match declared {
+                Declared::Statistic { id, .. } => Some(id.as_str()),
+                Declared::Group { .. } => None,
+            });
+            return match (is_first, of == id) {
+                (true, _) => self.section(id).about.push(text),
+                (false, true) => self.row(&names.collect::<Vec<_>>().join(" "), &text),
+                (false, false) => self.row(&format!("{id}/…"), &text),
+            };
+        }
+        self.written.insert(record, id.clone());
+        let about = match doc.to_lowercase() == about.to_lowercase() {
+            true => about,
+            false => format!("{}. {about}", doc.trim_end_matches('?')),
+        };
+        match is_first {
+            true => self.section(id).about.push(about),
+            false => self.row(&format!("{id}/…"), &about),
+        }
+        self.add(id, own);
+    }
+
+    fn row(&mut self, id: &str, text: &str) {
+        let section = self.section(id);
+        // The ends of an interval are one row.
+        if let (Some((last, before)), Some(stem)) =
+            (section.rows.last_mut(), id.strip_suffix("_hi"))
+            && before == text
+            && *last == format!("{stem}_lo")
+        {
+            *last = format!("{last} {id}");
+            return;
+        }
+        section.rows.push((id.to_owned(), text.to_owned()));
+    }
 }
 
-fn expanded(code: &str) -> Vec<String> {
-    let Some((before, rest)) = code.split_once('{') else {
-        return vec![code.to_owned()];
-    };
-    let Some((inside, after)) = rest.split_once('}') else {
-        return vec![code.to_owned()];
-    };
-    let one = |part: &str| expanded(&format!("{before}{part}{after}"));
-    inside.split(',').flat_map(one).collect()
+fn line(doc: &str) -> String {
+    let doc = doc.split_whitespace().collect::<Vec<_>>().join(" ");
+    doc.trim_end_matches('.').to_owned()
 }
 
-/// Whether a word is a name from the data: a realization, subject, pair, threshold or
-/// repetition.
-fn is_from_the_data(word: &str, ratings: &Ratings) -> bool {
-    ratings.models.iter().any(|m| m.id == word)
-        || ratings.subjects.iter().any(|s| s.id == word)
-        || word.contains('|')
-        || word.parse::<u32>().is_ok()
+/// The sections of a document.
+fn page(name: &str) -> String {
+    let mut sections = Sections::default();
+    sections.add("", &Results::declared());
+    let mut out = String::new();
+    for section in &sections.all {
+        let group = section.id.split('/').next().unwrap();
+        if document(group) != name {
+            continue;
+        }
+        let _ = writeln!(out, "\n### `{group}`\n");
+        for about in &section.about {
+            let _ = writeln!(out, "{}.\n", capital(about));
+        }
+        if !section.rows.is_empty() {
+            out.push_str("| identifier | what it is |\n|---|---|\n");
+        }
+        for (ids, text) in &section.rows {
+            let ids: Vec<String> = ids.split(' ').map(|id| format!("`{id}`")).collect();
+            let [ids, text] = [&ids.join(", "), text].map(|cell| cell.replace('|', "\\|"));
+            let _ = writeln!(out, "| {ids} | {text} |");
+        }
+    }
+    out.push('\n');
+    out
+}
+
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().map(|c| c.to_uppercase().to_string());
+    first.unwrap_or_default() + letters.as_str()
+}
+
+fn statistics() -> Vec<(String, &'static str, bool)> {
+    let all = Results::declared().into_iter();
+    all.filter_map(|declared| match declared {
+        Declared::Statistic { id, doc, list } => Some((id, doc, list)),
+        Declared::Group { .. } => None,
+    })
+    .collect()
+}
+
+/// Regular expressions of the identifiers of a statistic.
+fn patterns(id: &str) -> Vec<String> {
+    let part = |part: &str| match part {
+        "M" | "R" | "D" | "S" | "NAME" | "SITE" => "[^/]+".to_owned(),
+        "a|b" | "j|k" => r"[^/|]+\|[^/|]+".to_owned(),
+        word => word.to_owned(),
+    };
+    let parts: Vec<String> = id.split('/').map(part).collect();
+    let pattern = format!("^{}$", parts.join("/"));
+    // Some questions are about something with a name.
+    let question = |form: &str| pattern.replace("QUESTION", form);
+    match pattern.contains("QUESTION") {
+        true => vec![question("[^/]+"), question("[^/]+/[^/]+")],
+        false => vec![pattern],
+    }
+}
+
+fn all_patterns() -> Vec<String> {
+    statistics().iter().flat_map(|s| patterns(&s.0)).collect()
+}
+
+/// The part of the schema that describes the statistics.
+fn described() -> Value {
+    let schemas = statistics().into_iter().flat_map(|(id, doc, list)| {
+        let of = if list { "list" } else { "statistic" };
+        let schema = json!({ "$ref": format!("#/$defs/{of}"), "description": line(doc) });
+        let of = move |pattern| (pattern, schema.clone());
+        patterns(&id).into_iter().map(of)
+    });
+    json!({
+        "type": "object",
+        "description": "statistics by identifier; null if undefined",
+        "patternProperties": schemas.collect::<Map<_, _>>(),
+        "additionalProperties": false,
+    })
+}
+
+/// JSON of which a line has what fits.
+fn printed(value: &Value, indent: usize) -> String {
+    let whole = value.to_string();
+    if indent + whole.len() <= 120 {
+        return whole;
+    }
+    let inside = " ".repeat(indent + 2);
+    let (parts, [open, close]) = match value {
+        Value::Object(object) => {
+            let part =
+                |(key, value)| format!("{inside}{}: {}", json!(key), printed(value, indent + 2));
+            (object.iter().map(part).collect(), ["{", "}"])
+        }
+        Value::Array(list) => {
+            let part = |value| format!("{inside}{}", printed(value, indent + 2));
+            (list.iter().map(part).collect::<Vec<_>>(), ["[", "]"])
+        }
+        _ => return whole,
+    };
+    format!(
+        "{open}\n{}\n{}{close}",
+        parts.join(",\n"),
+        " ".repeat(indent)
+    )
+}
+
+/// Compares a file with what it should be, or writes it.
+fn compare(path: &Path, wanted: &str) {
+    if std::env::var_os("UPDATE_DOCS").is_some() {
+        fs::write(path, wanted).unwrap();
+    }
+    assert!(
+        fs::read_to_string(path).unwrap() == wanted,
+        "{} differs from the declared statistics: `UPDATE_DOCS=1 cargo test --test analyze docs` \
+         writes it again",
+        path.display()
+    );
 }
 
 #[test]
-fn every_identifier_is_in_the_documents() {
-    let explained = explained();
-    let known = |word: &str| {
-        explained.contains(word)
-            || explained.iter().any(|e| {
-                e.strip_suffix('*')
-                    .is_some_and(|stem| stem.len() > 3 && word.starts_with(stem))
-            })
-    };
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/data");
-    let mut unknown = BTreeSet::new();
+fn the_documents_have_the_declared_statistics() {
+    for name in ["statistics", "statistics-mixed", "statistics-ordinal"] {
+        let path = Path::new(ROOT).join(format!("docs/{name}.md"));
+        let text = fs::read_to_string(&path).unwrap();
+        let (before, rest) = text.split_once(START).unwrap();
+        let (_, after) = rest.split_once(END).unwrap();
+        compare(&path, &format!("{before}{START}{}{END}{after}", page(name)));
+    }
+}
+
+#[test]
+fn the_schema_has_the_declared_statistics() {
+    let mut schema = study_report::json::schema();
+    schema["properties"]["values"] = described();
+    schema["$defs"] = json!({
+        "statistic": { "type": ["number", "null"] },
+        "list": { "type": ["array", "null"], "items": { "type": "number" } },
+    });
+    let path = Path::new(ROOT).join("docs/study-analysis-1.schema.json");
+    compare(&path, &(printed(&schema, 0) + "\n"));
+}
+
+#[test]
+fn what_an_analysis_has_is_declared() {
+    let patterns = all_patterns();
     for set in ["sim_paper", "sim_one_rep", "nist_norris", "nist_numacc1"] {
-        let file = File::open(root.join(set).join("data.csv")).unwrap();
-        let ratings = Ratings::read_csv(set, BufReader::new(file), None).unwrap();
+        let path = Path::new(ROOT).join(format!("tests/golden/data/{set}/data.csv"));
+        let file = BufReader::new(File::open(path).unwrap());
+        let ratings = Ratings::read_csv(set, file, None).unwrap();
         let rules = Rules {
             realistic_from: Some(5.0),
             ..Rules::default()
         };
         for (id, _) in analyze(&ratings, &rules).values.iter() {
-            // A realization's name may contain a slash; those of these data sets do not.
-            let words = id.split('/').filter(|w| !is_from_the_data(w, &ratings));
-            unknown.extend(words.filter(|w| !known(w)).map(|w| format!("{w} in {id}")));
+            assert!(patterns.iter().any(|p| fits(p, id)), "{id} of {set}");
         }
     }
+}
+
+/// The script of `study export --to r` computes statistics under their identifiers.
+#[test]
+fn the_identifiers_in_the_r_script_are_declared() {
+    let path = Path::new(ROOT).join("crates/study-analysis/src/export/analysis.R");
+    let script = fs::read_to_string(path).unwrap();
+    let written = script.split("value[\"").skip(1);
+    let ids: Vec<&str> = written.filter_map(|rest| rest.split('"').next()).collect();
+    assert!(ids.len() > 10, "{ids:?}");
+    let patterns = all_patterns();
+    for id in ids {
+        assert!(patterns.iter().any(|p| fits(p, id)), "{id}");
+    }
+}
+
+/// Code spans of the documents that begin with the name of a group are identifiers, or the
+/// beginning of some.
+#[test]
+fn the_identifiers_in_the_documents_are_declared() {
+    let patterns = all_patterns();
+    let first = |id: &str| id.split('/').next().unwrap_or_default().to_owned();
+    let groups: BTreeSet<String> = statistics().iter().map(|s| first(&s.0)).collect();
+    let mut seen = 0;
+    let mut unknown = BTreeSet::new();
+    for entry in fs::read_dir(Path::new(ROOT).join("docs")).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_none_or(|e| e != "md") {
+            continue;
+        }
+        let text = fs::read_to_string(&path).unwrap();
+        for id in text.split('`').skip(1).step_by(2) {
+            let word = |c: char| c.is_ascii_alphanumeric() || "_/|-".contains(c);
+            if !id.contains('/') || !id.chars().all(word) || !groups.contains(&first(id)) {
+                continue;
+            }
+            seen += 1;
+            let known = |id: &str| patterns.iter().any(|p| begins(p, id));
+            // The name of a question begins like a group.
+            let is_question = id == "equivalence/R";
+            if !known(id) && !known(&format!("{id}_lo")) && !is_question {
+                unknown.insert(format!("{id} in {}", path.display()));
+            }
+        }
+    }
+    assert!(seen > 100, "{seen}");
     assert!(unknown.is_empty(), "{unknown:#?}");
 }

@@ -9,7 +9,7 @@ use std::path::Path;
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 
 /// The keywords of JSON Schema that the file uses; any other one is an error.
-const KEYWORDS: [&str; 14] = [
+const KEYWORDS: [&str; 15] = [
     "$schema",
     "$defs",
     "$ref",
@@ -17,6 +17,7 @@ const KEYWORDS: [&str; 14] = [
     "description",
     "type",
     "properties",
+    "patternProperties",
     "required",
     "additionalProperties",
     "items",
@@ -29,6 +30,29 @@ const KEYWORDS: [&str; 14] = [
 pub(crate) fn schema() -> Value {
     let text = fs::read_to_string(Path::new(ROOT).join("docs/study-analysis-1.schema.json"));
     serde_json::from_str(&text.unwrap()).unwrap()
+}
+
+/// Whether an identifier has the form of a pattern of the schema, such as `^desc/[^/]+/mean$`.
+pub(crate) fn fits(pattern: &str, id: &str) -> bool {
+    begins(pattern, id) && id.split('/').count() == parts(pattern).split('/').count()
+}
+
+/// Whether identifiers of this form begin with these parts.
+pub(crate) fn begins(pattern: &str, id: &str) -> bool {
+    let part = |(wanted, given): (&str, &str)| match wanted {
+        "*" => !given.is_empty(),
+        "*|*" => given.split('|').filter(|name| !name.is_empty()).count() == 2,
+        word => word == given,
+    };
+    let wanted = parts(pattern);
+    id.split('/').count() <= wanted.split('/').count()
+        && wanted.split('/').zip(id.split('/')).all(part)
+}
+
+/// A pattern with `*` for any name.
+fn parts(pattern: &str) -> String {
+    let bare = pattern.trim_start_matches('^').trim_end_matches('$');
+    bare.replace(r"[^/|]+\|[^/|]+", "*|*").replace("[^/]+", "*")
 }
 
 /// The first place at which a document differs from a schema.
@@ -101,7 +125,10 @@ pub(crate) fn check(
             }
         }
         for (key, value) in object {
-            let own = schema["properties"].get(key);
+            let patterns = schema["patternProperties"].as_object();
+            let mut patterns = patterns.into_iter().flatten();
+            let by_pattern = || Some(patterns.find(|(pattern, _)| fits(pattern, key))?.1);
+            let own = schema["properties"].get(key).or_else(by_pattern);
             if let Some(schema) = own.or(schema.get("additionalProperties")) {
                 check(root, schema, value, &format!("{place}/{key}"))?;
             }
@@ -159,4 +186,5 @@ fn a_document_that_differs_from_the_schema_is_found() {
     assert!(said(|d| d["findings"][0]["verdict"] = json!("no")).contains("/verdict: "));
     assert!(said(|d| d["findings"][0]["test"]["p"] = json!("1")).contains("/test: "));
     assert!(said(|d| d["values"]["corr/pearson/r"] = json!("1")).starts_with("/values/corr"));
+    assert!(said(|d| d["values"]["corr/pearson/s"] = json!(1)).contains("not described"));
 }

@@ -1,6 +1,5 @@
 //! How a study compares with its preregistration.
 
-use serde_json::{Value as Json, json};
 use study_analysis::preregister::Comparison;
 
 /// How the study compares, in a sentence.
@@ -17,15 +16,4 @@ pub fn sentence(c: &Comparison) -> String {
         "Preregistered on {} (SHA-256 {hash}…){first}; {verdict}.",
         c.date
     )
-}
-
-/// As in `--json`.
-pub(super) fn json(c: &Comparison) -> Json {
-    json!({
-        "date": c.date.to_string(),
-        "sha256": c.sha256,
-        "first_session": c.first_session.map(|at| at.to_rfc3339()),
-        "matches": c.deviations.is_empty(),
-        "deviations": c.deviations,
-    })
 }

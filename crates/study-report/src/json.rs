@@ -1,45 +1,57 @@
 //! The analysis as one JSON document, `study-analysis/1`, with unrounded numbers.
 
-use super::Source;
+mod object;
+
+use super::{Site, SiteDevice, Source};
+use object::{
+    Answer, Answered, Decisive, Device, Document, End, Estimated, Format, IfAny, Member as _, Note,
+    Numbers, Part, Place, Preregistered, Realization, RoleWord, Rule, Statistics, Study, Way,
+};
 use serde_json::{Map, Value as Json, json};
-use study_analysis::analyze::findings::{Direction, Estimate};
+use study_analysis::analyze::findings::Estimate;
 use study_analysis::analyze::psychophysics::PartAnalysis;
-use study_analysis::analyze::{Analysis, Applied, Finding, Value, Values, Warning};
+use study_analysis::analyze::{
+    Analysis, Applied, Finding, RealizationSummary, Value, Values, Warning,
+};
+use study_analysis::preregister::Comparison;
 
 /// Name and version of the format.
 pub const FORMAT: &str = "study-analysis/1";
 
-fn estimate(e: &Estimate) -> Json {
-    json!({"name": e.name, "value": e.value, "ci95": e.ci95.map(|(low, high)| [low, high])})
+fn estimate(e: &Estimate) -> Estimated {
+    Estimated {
+        name: e.name.to_owned(),
+        value: e.value,
+        ci95: e.ci95.map(|(low, high)| vec![low, high]),
+    }
 }
 
-fn finding<Q>(f: &Finding<Q>, question: &str) -> Json {
+fn finding<Q>(f: &Finding<Q>, question: String) -> Answered {
     let test = f.test.as_ref().map(|t| {
         let statistic = t.statistic.as_ref();
-        json!({
-            "name": t.kind.as_str(),
-            "symbol": statistic.map(|s| s.symbol),
-            "statistic": statistic.map(|s| s.value),
-            "df": statistic.map(|s| &s.df),
-            "p": t.p,
-            "level": t.level,
-            "comparisons": t.comparisons,
-        })
+        Decisive {
+            name: t.kind.as_str().to_owned(),
+            symbol: statistic.map(|s| s.symbol.to_owned()),
+            statistic: statistic.map(|s| s.value),
+            df: statistic.map(|s| s.df.clone()),
+            p: t.p,
+            level: t.level,
+            comparisons: t.comparisons,
+        }
     });
-    json!({
-        "question": question,
-        "verdict": f.verdict.as_str(),
-        "undefined_because": f.reason(),
-        "direction": f.direction.map(Direction::as_str),
-        "realizations": f.names,
-        "test": test,
-        "n_participants": f.participants,
-        "n_realizations": f.realizations,
-        "estimate": f.estimate.as_ref().map(estimate),
-        "effect": f.effect.as_ref().map(estimate),
-        "caveats": f.caveats.iter()
-            .map(|w| json!({"code": w.code, "text": w.text})).collect::<Vec<_>>(),
-    })
+    Answered {
+        question,
+        verdict: Answer(f.verdict.as_str()),
+        undefined_because: f.reason().map(str::to_owned),
+        direction: f.direction.map(|d| Way(d.as_str())),
+        realizations: f.names.clone(),
+        test,
+        n_participants: f.participants,
+        n_realizations: f.realizations,
+        estimate: f.estimate.as_ref().map(estimate),
+        effect: f.effect.as_ref().map(estimate),
+        caveats: notes(&f.caveats),
+    }
 }
 
 /// Statistics by identifier, null if undefined, and the reasons of those.
@@ -74,19 +86,20 @@ pub fn trials(path: &str, task: &str, rows: usize, of: &Values) -> String {
     format!("{document:#}\n")
 }
 
-fn warnings(all: &[Warning]) -> Vec<Json> {
-    let one = |w: &Warning| json!({"code": w.code, "text": w.text});
+fn notes(all: &[Warning]) -> Vec<Note> {
+    let one = |w: &Warning| Note {
+        code: w.code.to_owned(),
+        text: w.text.clone(),
+    };
     all.iter().map(one).collect()
 }
 
-fn exclusions(all: &[Applied]) -> Vec<Json> {
-    let one = |e: &Applied| {
-        json!({
-            "rule": e.rule.to_string(),
-            "rows": e.rows,
-            "participants": e.participants,
-            "problem": e.problem,
-        })
+fn exclusions(all: &[Applied]) -> Vec<Rule> {
+    let one = |e: &Applied| Rule {
+        rule: e.rule.to_string(),
+        rows: e.rows,
+        participants: e.participants,
+        problem: e.problem.map(str::to_owned),
     };
     all.iter().map(one).collect()
 }
@@ -103,9 +116,9 @@ fn part(part: &PartAnalysis) -> Json {
         "undefined": undefined,
         "participants": part.participants,
         "alpha": part.alpha,
-        "findings": part.findings.iter().map(|f| finding(f, &f.question.id())).collect::<Vec<_>>(),
-        "warnings": warnings(&part.warnings),
-        "exclusions": exclusions(&part.exclusions),
+        "findings": part.findings.iter().map(|f| finding(f, f.question.id())).collect::<Vec<_>>().json(),
+        "warnings": notes(&part.warnings).json(),
+        "exclusions": exclusions(&part.exclusions).json(),
     })
 }
 
@@ -119,69 +132,105 @@ pub fn parts(source: &Source, parts: &[PartAnalysis]) -> String {
         "parts": parts.iter().map(part).collect::<Vec<_>>(),
     });
     if let Some(comparison) = &source.preregistration {
-        document["preregistration"] = super::comparison::json(comparison);
+        document["preregistration"] = json!(preregistered(comparison).json());
     }
     format!("{document:#}\n")
 }
 
+fn preregistered(c: &Comparison) -> Preregistered {
+    Preregistered {
+        date: c.date.to_string(),
+        sha256: c.sha256.clone(),
+        first_session: c.first_session.map(|at| at.to_rfc3339()),
+        matches: c.deviations.is_empty(),
+        deviations: c.deviations.clone(),
+    }
+}
+
+fn place(site: &Site) -> Place {
+    let device = |d: &SiteDevice| Device {
+        kind: d.kind.clone(),
+        id: d.id.clone(),
+        sessions: d.sessions,
+        check: d.check.as_ref().map(|c| c.0.clone()),
+        check_age_days: d.check.as_ref().and_then(|c| c.1),
+    };
+    Place {
+        name: site.name.clone(),
+        path: site.path.clone(),
+        participants: site.participants,
+        days: (site.days.as_ref()).map(|(first, last)| vec![first.clone(), last.clone()]),
+        devices: site.devices.iter().map(device).collect(),
+    }
+}
+
+/// The JSON Schema of [`document`]; it says of statistics only that they are an object.
+pub fn schema() -> Json {
+    let mut schema = Document::schema();
+    schema["$schema"] = json!("https://json-schema.org/draft/2020-12/schema");
+    schema["title"] = json!(FORMAT);
+    schema["description"] = json!(
+        "An analysis of ratings, as `study analyze --json` prints it. docs/statistics.md defines the statistics."
+    );
+    schema
+}
+
 /// The document, with a final line feed.
-pub fn document(source: &Source, analysis: &Analysis) -> String {
-    let (values, undefined) = statistics(&analysis.values);
-    let c = &analysis.counts;
-    let mut document = json!({
-        "format": FORMAT,
-        "tool_version": env!("CARGO_PKG_VERSION"),
-        "study": {
-            "id": source.study,
-            "title": source.title,
-            "protocol_version": source.protocol_version,
-            "path": source.path,
+pub fn document(source: &Source, a: &Analysis) -> String {
+    let (values, undefined) = statistics(&a.values);
+    let c = &a.counts;
+    let realization = |m: &RealizationSummary| Realization {
+        id: m.id.clone(),
+        role: RoleWord(m.role.as_str()),
+        duplicate_of: m.duplicate_of.clone(),
+        vaf: m.vaf,
+    };
+    let parts: Vec<Part> = a.parts.iter().map(part).map(Part).collect();
+    let sites: Vec<Place> = source.sites.iter().map(place).collect();
+    let document = Document {
+        format: Format(FORMAT),
+        tool_version: env!("CARGO_PKG_VERSION").to_owned(),
+        study: Study {
+            id: source.study.clone(),
+            title: source.title.clone(),
+            protocol_version: source.protocol_version,
+            path: source.path.clone(),
         },
-        "question": analysis.question,
-        "realistic_from": analysis.realistic_from,
-        "values": values,
-        "undefined": undefined,
-        "warnings": warnings(&analysis.warnings),
-        "realizations": analysis.realizations.iter()
-            .map(|m| json!({
-                "id": m.id,
-                "role": m.role.as_str(),
-                "duplicate_of": m.duplicate_of,
-                "vaf": m.vaf,
-            })).collect::<Vec<_>>(),
-        "alpha": analysis.alpha,
-        "better": analysis.better.as_str(),
-        "findings": analysis.findings.iter().map(|f| finding(f, &f.question.id())).collect::<Vec<_>>(),
-        "exclusions": exclusions(&analysis.exclusions),
-        "deviations": analysis.deviations.iter().map(|d| &d.text).collect::<Vec<_>>(),
-        "counts": {
-            "rows": c.rows,
-            "rated": c.rated,
-            "without_rating": c.without_rating,
-            "failed": c.failed,
-            "declined": c.declined,
-            "missing": c.missing,
-            "corrected": c.corrected,
-            "repeated": c.repeated,
-            "practice": c.practice,
-            "excluded": c.excluded,
-            "participants": c.participants,
-            "finished": c.finished,
-            "excluded_participants": c.excluded_participants,
-            "planned": c.planned,
-            "pilots": c.pilots,
-            "simulated": c.simulated,
-            "interim": c.interim(),
+        question: a.question.clone(),
+        realistic_from: a.realistic_from,
+        alpha: a.alpha,
+        better: End(a.better.as_str()),
+        values: Statistics(values),
+        undefined,
+        warnings: notes(&a.warnings),
+        realizations: a.realizations.iter().map(realization).collect(),
+        findings: (a.findings.iter())
+            .map(|f| finding(f, f.question.id()))
+            .collect(),
+        exclusions: exclusions(&a.exclusions),
+        deviations: a.deviations.iter().map(|d| d.text.clone()).collect(),
+        counts: Numbers {
+            rows: c.rows,
+            rated: c.rated,
+            without_rating: c.without_rating,
+            failed: c.failed,
+            declined: c.declined,
+            missing: c.missing,
+            corrected: c.corrected,
+            repeated: c.repeated,
+            practice: c.practice,
+            excluded: c.excluded.clone(),
+            participants: c.participants,
+            finished: c.finished,
+            excluded_participants: c.excluded_participants,
+            planned: c.planned,
+            pilots: c.pilots,
+            simulated: c.simulated,
+            interim: c.interim(),
         },
-    });
-    if !analysis.parts.is_empty() {
-        document["parts"] = analysis.parts.iter().map(part).collect();
-    }
-    if let Some(comparison) = &source.preregistration {
-        document["preregistration"] = super::comparison::json(comparison);
-    }
-    if !source.sites.is_empty() {
-        document["sites"] = super::sites::json(&source.sites);
-    }
-    format!("{document:#}\n")
+        parts: IfAny(Some(parts).filter(|all| !all.is_empty())),
+        sites: IfAny(Some(sites).filter(|all| !all.is_empty())),
+        preregistration: IfAny(source.preregistration.as_ref().map(preregistered)),
+    };
+    format!("{:#}\n", document.json().unwrap_or_default())
 }

@@ -1,7 +1,6 @@
 //! The sites of a pooled analysis and their devices, side by side.
 
 use super::{Site, SiteDevice};
-use serde_json::{Value as Json, json};
 use study_base::text::counted;
 
 /// What a device was tested for before its sessions.
@@ -46,27 +45,4 @@ pub(super) fn days(site: &Site) -> String {
         Some((first, last)) => format!(", {first} to {last}"),
         None => String::new(),
     }
-}
-
-/// As in `--json`.
-pub(super) fn json(sites: &[Site]) -> Json {
-    let device = |d: &SiteDevice| {
-        json!({
-            "kind": d.kind,
-            "id": d.id,
-            "sessions": d.sessions,
-            "check": d.check.as_ref().map(|c| &c.0),
-            "check_age_days": d.check.as_ref().and_then(|c| c.1),
-        })
-    };
-    let site = |s: &Site| {
-        json!({
-            "name": s.name,
-            "path": s.path,
-            "participants": s.participants,
-            "days": s.days.as_ref().map(|(first, last)| [first, last]),
-            "devices": s.devices.iter().map(device).collect::<Vec<_>>(),
-        })
-    };
-    sites.iter().map(site).collect()
 }

@@ -120,7 +120,7 @@ statistics! {
     pub struct MixedByModel {
         /// fixed effects
         model: ByModel as "",
-        /// of the random intercepts
+        /// of the random intercepts, in logits
         sd_subject: Option<Stat>,
         /// 1 if `sd_subject` is 0
         boundary: Option<Stat>,
@@ -130,7 +130,7 @@ statistics! {
     pub struct MixedByVaf {
         /// fixed effects
         model: ByVaf as "",
-        /// of the random intercepts
+        /// of the random intercepts, in logits
         sd_subject: Option<Stat>,
         /// 1 if `sd_subject` is 0
         boundary: Option<Stat>,
@@ -166,13 +166,13 @@ statistics! {
         clm_model: ByModel,
         /// by Laplace's method
         clmm_model_laplace: MixedByModel,
-        /// by adaptive Gauss–Hermite quadrature
+        /// by adaptive Gauss–Hermite quadrature with 60 nodes
         clmm_model_quad: MixedByModel,
         /// all ratings taken as independent
         clm_vaf: FixedByVaf,
         /// by Laplace's method
         clmm_vaf_laplace: MixedByVaf,
-        /// by adaptive Gauss–Hermite quadrature
+        /// by adaptive Gauss–Hermite quadrature with 60 nodes
         clmm_vaf_quad: MixedByVaf,
         /// the one that generalizes to other realizations
         clmm_vaf_crossed: CrossedByVaf,

@@ -151,8 +151,14 @@ pub enum Declared {
     Group {
         /// Its identifier, with placeholders for names: `desc/M`.
         id: String,
-        /// What it is.
+        /// What it is here.
         doc: &'static str,
+        /// What such a record is.
+        about: &'static str,
+        /// The type of the record.
+        record: &'static str,
+        /// How many of the declarations after it are its own.
+        own: usize,
     },
     /// A statistic of the group before it.
     Statistic {
@@ -454,12 +460,23 @@ macro_rules! statistics {
                 all: &mut Vec<$crate::analyze::record::Declared>,
             ) {
                 use $crate::analyze::record::{Declared, Field, join};
-                all.push(Declared::Group { id: id.to_owned(), doc });
+                let at = all.len();
+                all.push(Declared::Group {
+                    id: id.to_owned(),
+                    doc,
+                    about: concat!($($about, "\n"),+),
+                    record: std::any::type_name::<Self>(),
+                    own: 0,
+                });
                 $(<$type as Field>::declare(
                     &join(id, $crate::analyze::record::name_of!($field $($name)?)),
                     concat!($($doc, "\n"),+),
                     all,
                 );)*
+                let after = all.len();
+                if let Some(Declared::Group { own, .. }) = all.get_mut(at) {
+                    *own = after - at - 1;
+                }
             }
         }
     )*};
