@@ -5,6 +5,7 @@ mod files;
 mod loops;
 mod output;
 mod plan;
+mod printed;
 
 pub(super) use args::Args;
 

@@ -2,7 +2,7 @@
 //! realization plays their force.
 
 use super::Results;
-use super::output::{Printed, align};
+use super::printed::{Printed, align};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use study_haptics::identify::repetition::{BINS, Curve, Loops, WITHIN};

@@ -3,6 +3,7 @@
 use super::Results;
 use super::args::NamedPath;
 use super::loops;
+use super::printed::{Printed, align};
 use serde_json::{Map, Value, json};
 use std::fmt::Write as _;
 use study_base::text::Untrusted;
@@ -14,7 +15,6 @@ use study_haptics::identify::validation::{Accuracy, JUST_NOTICEABLE_N};
 use study_haptics::model::Units;
 use study_haptics::recording::Recording;
 use study_wire::certificate::Certificate;
-use unicode_width::UnicodeWidthStr as _;
 
 /// Most cells shown as a list; more are shown as rows of lambda and columns of dx.
 const MAX_ROWS: usize = 30;
@@ -233,36 +233,6 @@ fn start_and_sort(method: Method) -> [Option<&'static str>; 2] {
     match method {
         Method::Ewls(options) => [Some(options.start.as_str()), Some(options.sort.as_str())],
         _ => [None; 2],
-    }
-}
-
-/// Lengths and forces as the recording has them: a turning handle in angles and torques.
-#[derive(Clone, Copy)]
-pub(super) struct Printed {
-    units: Units,
-    lever_mm: f64,
-}
-
-impl Printed {
-    pub(super) fn of(results: &Results<'_>) -> Self {
-        let (units, lever_mm) = results.args.units().unwrap_or((Units::Linear, 1.0));
-        Self { units, lever_mm }
-    }
-
-    pub(super) fn length(self, mm: f64) -> f64 {
-        self.units.of_mm(mm, self.lever_mm)
-    }
-
-    pub(super) fn force(self, n: f64) -> f64 {
-        self.units.of_n(n, self.lever_mm)
-    }
-
-    pub(super) fn x(self) -> &'static str {
-        self.units.names()[0]
-    }
-
-    pub(super) fn f(self) -> &'static str {
-        self.units.names()[1]
     }
 }
 
@@ -580,24 +550,4 @@ fn warnings(results: &Results<'_>) -> Vec<(String, String)> {
         .into_iter()
         .map(|(text, count)| (text, format!("{count} of {} cells", results.cells.len())))
         .collect()
-}
-
-/// Columns as wide as their widest entry, right-aligned.
-pub(super) fn align(rows: &[Vec<String>]) -> String {
-    let columns = rows.first().map_or(0, Vec::len);
-    let widths: Vec<usize> = (0..columns)
-        .map(|i| rows.iter().map(|row| row[i].width()).max().unwrap_or(0))
-        .collect();
-    let mut out = String::new();
-    for row in rows {
-        let mut line = String::new();
-        for (i, (cell, width)) in row.iter().zip(&widths).enumerate() {
-            let blanks = " ".repeat(width - cell.width());
-            let gap = if i == 0 { " " } else { "  " };
-            let _ = write!(line, "{blanks}{cell}{gap}");
-        }
-        out.push_str(line.trim_end());
-        out.push('\n');
-    }
-    out
 }
