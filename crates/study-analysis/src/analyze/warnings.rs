@@ -340,11 +340,12 @@ fn ends(
     cells: &Cells<'_>,
     ends: &BTreeMap<RealizationName, Ends>,
 ) {
-    let shares: [(_, fn(&Ends) -> &Stat, _, _); 2] = [
-        ("floor", |e| &e.share_low, "lowest", "below"),
-        ("ceiling", |e| &e.share_high, "highest", "above"),
-    ];
-    for (code, share, end, beyond) in shares {
+    type Share = fn(&Ends) -> &Stat;
+    let (low, high): (Share, Share) = (|e| &e.share_low, |e| &e.share_high);
+    for (code, share, end, beyond) in [
+        ("floor", low, "lowest", "below"),
+        ("ceiling", high, "highest", "above"),
+    ] {
         let tested = cells.tested().into_iter().map(|m| cells.model_name(m));
         let most = |name: &&str| {
             share(ends.get(*name)?)

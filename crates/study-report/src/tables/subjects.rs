@@ -42,7 +42,8 @@ pub(crate) fn subjects(a: &Analysis) -> Table {
             with_vaf(s)?.r.number().filter(|_| enough)
         });
     // Columns of designs with a reference, an anchor or a repeat.
-    let extra: [(_, _, fn(&Screened) -> &Option<Stat>); 3] = [
+    type Extra = (&'static str, &'static str, fn(&Screened) -> &Option<Stat>);
+    let extra: [Extra; 3] = [
         ("hidden_reference_mean", "mean of the references", |s| {
             &s.hidden_reference_mean
         }),
