@@ -10,10 +10,13 @@
 //! * [`rng`]: random streams that are named, independent and the same on every
 //!   machine.
 //!
-//! Nothing here opens a file or knows the time. Begin with
+//! * [`child`]: a program that exchanges lines with this one.
+//!
+//! Apart from [`child`], nothing here does input or output or knows the time. Begin with
 //! `examples/streams.rs`.
 
 pub mod apa;
+pub mod child;
 pub mod diagnostic;
 pub mod hex;
 pub mod limits;

@@ -4,35 +4,31 @@
 //! `docs/devices.md` is the specification. Separate threads read and write, so nothing
 //! waits for the program. A program that does not read, violates the specification,
 //! sends too much or ends is killed and counts as a lost device; it is restarted after a
-//! second. `child` contains the threads, `messages` the messages.
+//! second. [`study_base::child`] contains the threads, `messages` the messages.
 //!
 //! The host cannot switch off the force of a program that it cannot reach. It therefore
 //! sends `limp`, sends `alive` as long as it polls, and closes the program's input when
 //! it ends. The program has to go limp when it receives `limp`, when `alive` stays away,
 //! and at the end of its input.
 
-mod child;
 mod messages;
 
 use super::host::Arrivals;
 use super::table::TableError;
 use super::{Device, DeviceError, Identity, Report, Stimulus};
-use child::{ChildFailure, Running};
 use messages::{ChildMessage, Hello, MessageError};
 use std::time::{Duration, Instant};
+use study_base::child::{ChildFailure, RESTART_DELAY, Running};
 use study_base::limits::Limits;
 use study_session::outcome::{Playback, Sample};
 
 pub use messages::FORMAT;
+pub use study_base::child::HELLO_TIMEOUT;
 
 /// Largest number of lines processed per poll.
 const MAX_LINES_PER_POLL: usize = 2048;
 /// Time between two `alive` messages.
 const ALIVE_INTERVAL: Duration = Duration::from_millis(20);
-/// Time that a program has from its start to its `hello`.
-pub const HELLO_TIMEOUT: Duration = Duration::from_secs(10);
-/// Time between the loss of a program and its restart.
-const RESTART_DELAY: Duration = Duration::from_secs(1);
 
 /// A controller program, connected by its standard streams.
 #[derive(Debug)]
@@ -52,6 +48,13 @@ pub struct ProcessDevice {
     reports: Vec<Report>,
     /// Last reported reason why no program is running.
     reported_loss: Option<String>,
+}
+
+/// Waits at most `wait` for the next message of a program.
+fn message(child: &mut Running, wait: Duration) -> Result<Option<ChildMessage>, ChildFailure> {
+    let line = child.receive(wait)?;
+    let message = line.map(|line| messages::read(&line)).transpose();
+    message.map_err(|why| child.invalid(why))
 }
 
 /// A program that was started and has not sent its `hello`.
@@ -84,7 +87,7 @@ impl Opening {
     /// # Errors
     /// [`DeviceError::Lost`] if the program ends, sends something else or is too slow.
     pub fn hello(mut self, wait: Duration) -> Result<Opened, DeviceError> {
-        let hello = match self.child.receive(wait) {
+        let hello = match message(&mut self.child, wait) {
             Ok(None) if self.since.elapsed() < HELLO_TIMEOUT => return Ok(Opened::NotYet(self)),
             Ok(None) => Err(ChildFailure::no_hello()),
             Ok(Some(message)) => message.hello().map_err(ChildFailure::from),
@@ -193,7 +196,7 @@ impl ProcessDevice {
     fn receive(&mut self, at: Duration) {
         for _ in 0..MAX_LINES_PER_POLL {
             let Some(child) = &mut self.child else { return };
-            let result = match child.receive(Duration::ZERO) {
+            let result = match message(child, Duration::ZERO) {
                 Ok(None) => return,
                 Ok(Some(message)) => self.handle(message, at).map_err(ChildFailure::from),
                 Err(failure) => Err(failure),

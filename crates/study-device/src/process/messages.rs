@@ -3,15 +3,14 @@
 use crate::Stimulus;
 use serde::Deserialize;
 use serde_json::{Value, json};
+use study_base::child::{ChildFailure, MAX_TEXT};
 use study_base::limits::Limits;
-use study_base::text::Untrusted;
+use study_base::text::{Untrusted, beginning};
 use study_session::outcome::{Playback, Sample};
 
 /// Version of the messages, stated in the program's `hello`.
 pub const FORMAT: &str = "study-process/1";
 
-/// Longest text of a program that is kept, characters.
-const MAX_TEXT: usize = 200;
 /// Longest device id, characters.
 const MAX_ID: usize = 64;
 /// Largest number of samples in one line.
@@ -38,6 +37,12 @@ pub(super) enum MessageError {
         message: &'static str,
         state: &'static str,
     },
+}
+
+impl From<MessageError> for ChildFailure {
+    fn from(error: MessageError) -> Self {
+        Self::Violation(error.to_string())
+    }
 }
 
 /// A message of a program.
@@ -193,15 +198,6 @@ pub(super) fn read(line: &[u8]) -> Result<ChildMessage, MessageError> {
 /// The beginning of a program's text.
 pub(super) fn short_text(text: &str) -> String {
     beginning(text, MAX_TEXT)
-}
-
-/// The first `max` characters of a text.
-pub(super) fn beginning(text: &str, max: usize) -> String {
-    let mut short: String = text.chars().take(max).collect();
-    if short.len() < text.len() {
-        short.push('…');
-    }
-    short
 }
 
 fn line(value: &Value) -> String {

@@ -1,14 +1,14 @@
-//! A running program with the threads that read and write, and how it ended.
+//! A program that exchanges lines on its standard streams, with the threads that read and
+//! write, and how it ended. What the lines say is the matter of those who use it.
 
-use super::HELLO_TIMEOUT;
-use super::messages::{self, ChildMessage, MessageError};
+use crate::text::{Untrusted, beginning};
+use std::fmt::Display;
 use std::io::{BufRead as _, BufReader, Read, Write as _};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
-use study_base::text::Untrusted;
 
 /// Longest line of a program, bytes.
 const MAX_LINE: u64 = 256 * 1024;
@@ -28,10 +28,16 @@ const STDERR_KEPT: usize = 1024;
 const POLL_INTERVAL: Duration = Duration::from_millis(5);
 /// Longest part of the command in messages, characters.
 const MAX_NAME: usize = 60;
+/// Longest text of a program in messages, characters.
+pub const MAX_TEXT: usize = 200;
+/// Time that a program has from its start to its first line, in which it says who it is.
+pub const HELLO_TIMEOUT: Duration = Duration::from_secs(10);
+/// Time between the loss of a program and its restart.
+pub const RESTART_DELAY: Duration = Duration::from_secs(1);
 
 /// Why a program is no longer usable.
 #[derive(Debug)]
-pub(super) enum ChildFailure {
+pub enum ChildFailure {
     /// It has closed its input or output.
     Closed,
     /// It violates the specification; how.
@@ -39,25 +45,23 @@ pub(super) enum ChildFailure {
 }
 
 impl ChildFailure {
-    pub(super) fn no_hello() -> Self {
+    /// It has not said who it is in [`HELLO_TIMEOUT`].
+    pub fn no_hello() -> Self {
         let timeout = HELLO_TIMEOUT.as_secs();
         Self::Violation(format!("it has sent no hello within {timeout} s"))
     }
 }
 
-impl From<MessageError> for ChildFailure {
-    fn from(error: MessageError) -> Self {
-        Self::Violation(error.to_string())
-    }
-}
-
 /// Why a program cannot be started.
 #[derive(Debug, thiserror::Error)]
-pub(super) enum StartError {
+pub enum StartError {
+    /// No program is named.
     #[error("the command is empty")]
     NoProgram,
+    /// The system does not start it.
     #[error("the program `{program}` cannot be started: {reason}", program = Untrusted(.0), reason = spawn_failure(.1))]
     Spawn(String, std::io::Error),
+    /// It cannot be talked to.
     #[error("the program has no standard streams")]
     NoStreams,
 }
@@ -72,7 +76,7 @@ fn spawn_failure(error: &std::io::Error) -> String {
 
 /// A running program with the threads that read and write.
 #[derive(Debug)]
-pub(super) struct Running {
+pub struct Running {
     /// The command, as shown in messages.
     name: String,
     child: Child,
@@ -95,7 +99,11 @@ enum OutputLine {
 }
 
 impl Running {
-    pub(super) fn start(command: &[String]) -> Result<Self, StartError> {
+    /// Starts a program with its arguments; no shell is involved.
+    ///
+    /// # Errors
+    /// [`StartError`].
+    pub fn start(command: &[String]) -> Result<Self, StartError> {
         let (program, arguments) = command.split_first().ok_or(StartError::NoProgram)?;
         let mut child = Command::new(program)
             .args(arguments)
@@ -141,7 +149,7 @@ impl Running {
             }
         });
         Ok(Self {
-            name: messages::beginning(&command.join(" "), MAX_NAME),
+            name: beginning(&command.join(" "), MAX_NAME),
             child,
             lines,
             input: input_sender,
@@ -151,22 +159,32 @@ impl Running {
         })
     }
 
-    /// Waits at most `wait` for the next message.
-    pub(super) fn receive(&mut self, wait: Duration) -> Result<Option<ChildMessage>, ChildFailure> {
-        let line = match self.lines.recv_timeout(wait) {
-            Ok(OutputLine::Line(line)) => line,
-            Ok(OutputLine::Last(failure)) => return Err(failure),
-            Err(RecvTimeoutError::Timeout) => return Ok(None),
-            Err(RecvTimeoutError::Disconnected) => return Err(ChildFailure::Closed),
-        };
-        self.lines_read += 1;
-        messages::read(&line).map(Some).map_err(|e| {
-            ChildFailure::Violation(format!("its line {} is invalid: {e}", self.lines_read))
-        })
+    /// Waits at most `wait` for the next line.
+    ///
+    /// # Errors
+    /// [`ChildFailure`] if there will be none.
+    pub fn receive(&mut self, wait: Duration) -> Result<Option<Vec<u8>>, ChildFailure> {
+        match self.lines.recv_timeout(wait) {
+            Ok(OutputLine::Line(line)) => {
+                self.lines_read += 1;
+                Ok(Some(line))
+            }
+            Ok(OutputLine::Last(failure)) => Err(failure),
+            Err(RecvTimeoutError::Timeout) => Ok(None),
+            Err(RecvTimeoutError::Disconnected) => Err(ChildFailure::Closed),
+        }
+    }
+
+    /// The last line violates the specification; why.
+    pub fn invalid(&self, why: impl Display) -> ChildFailure {
+        ChildFailure::Violation(format!("its line {} is invalid: {why}", self.lines_read))
     }
 
     /// Queues a line for the program without waiting.
-    pub(super) fn send(&mut self, line: String) -> Result<(), ChildFailure> {
+    ///
+    /// # Errors
+    /// [`ChildFailure`] if it takes none.
+    pub fn send(&mut self, line: String) -> Result<(), ChildFailure> {
         self.input.try_send(line).map_err(|e| match e {
             TrySendError::Full(_) => {
                 ChildFailure::Violation("it does not read its input".to_owned())
@@ -177,7 +195,7 @@ impl Running {
 
     /// Ends the program if necessary. Returns a description of the failure with the exit
     /// status and the last line of its standard error, safe to print.
-    pub(super) fn end(&mut self, failure: &ChildFailure) -> String {
+    pub fn end(&mut self, failure: &ChildFailure) -> String {
         let wait = match failure {
             ChildFailure::Closed => STATUS_TIMEOUT,
             ChildFailure::Violation(_) => Duration::ZERO,
@@ -196,7 +214,7 @@ impl Running {
             text += &format!(": {}", Untrusted(reason));
         }
         if let Some(last) = self.last_line() {
-            let last = messages::short_text(&last);
+            let last = beginning(&last, MAX_TEXT);
             text.push_str(&format!("; its last error message: {}", Untrusted(&last)));
         }
         text
