@@ -46,6 +46,7 @@
 //!   mass, damping, stiffness, offset force. The paper's symbols.
 
 pub mod cli;
+pub mod front;
 pub mod plain;
 pub mod rater;
 pub mod rehearsal;

@@ -8,6 +8,7 @@
 //!
 //! [`rehearsal`] runs the same loop on a virtual clock.
 
+pub mod beside;
 pub mod clock;
 mod loading;
 pub mod rehearsal;

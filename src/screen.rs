@@ -1,31 +1,26 @@
 //! A page of the participant's own, in the browser of a tablet or a second screen.
 //!
-//! [`Screen`] serves the page, and [`Both`] is an operator like [`crate::tui::Tui`]: it
-//! gives the terminal's inputs and those of the page. Nothing of the page is stored; the
-//! journal is the same. [`study_session::page`] says what the page shows, [`replies`] what
-//! an answer means; the other files are the server. docs/screen.md describes the limits.
+//! [`Screen`] serves the page beside a terminal ([`crate::runner::beside`]). Nothing of the page
+//! is stored; the journal is the same. [`study_session::page`] says what the page shows and what
+//! a reply means; the files here are the server. docs/screen.md describes the limits.
 
 mod access;
 mod board;
 mod code;
 mod http;
-pub mod replies;
 mod server;
 
-use crate::runner::{Operator, OperatorError};
-use board::{Board, Outcome};
-use serde::Serialize;
+pub use access::secret;
+
+use crate::runner::beside::Own;
+use board::Board;
 use server::Server;
 use std::net::SocketAddr;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use study_plan::protocol::phrases::Words;
-use study_session::outcome::Channel;
-use study_session::page::{self, Page, same_page};
 use study_session::session::{Input, View};
 
-/// How long the terminal is asked before the page is.
-const SLICE: Duration = Duration::from_millis(8);
 /// A page that asks for nothing in this time has lost its connection.
 const SILENCE: Duration = Duration::from_secs(20);
 
@@ -96,36 +91,6 @@ impl std::str::FromStr for Address {
 pub struct Screen {
     server: Server,
     board: Arc<Board>,
-    /// The part of pages' ids that no other run has.
-    run: String,
-    pages: u64,
-    shown: Option<Shown>,
-    /// The reply whose input the session has.
-    pending: Option<Pending>,
-}
-
-/// The page that is shown.
-#[derive(Debug)]
-struct Shown {
-    id: String,
-    page: Page,
-    screen: study_session::session::Screen,
-}
-
-/// A reply that the session has.
-#[derive(Debug)]
-struct Pending {
-    key: String,
-    /// The screen that must be gone once it is accepted.
-    leaves: Option<study_session::session::Screen>,
-}
-
-/// A page with its id.
-#[derive(Serialize)]
-struct Named<'a> {
-    id: &'a str,
-    #[serde(flatten)]
-    page: &'a Page,
 }
 
 impl Screen {
@@ -134,16 +99,9 @@ impl Screen {
     /// # Errors
     /// [`ScreenError`].
     pub fn open(at: Address, lang: Option<&str>, words: &Words) -> Result<Self, ScreenError> {
-        let board = Arc::new(Board::default());
+        let board = Arc::new(Board::new(secret()?));
         let server = Server::open(at, lang, words, board.clone())?;
-        Ok(Self {
-            server,
-            board,
-            run: access::secret()?,
-            pages: 0,
-            shown: None,
-            pending: None,
-        })
+        Ok(Self { server, board })
     }
 
     /// The link that opens the page, once.
@@ -160,126 +118,20 @@ impl Screen {
     pub fn is_open(&self) -> bool {
         self.server.is_open()
     }
+}
 
-    /// The page and a terminal as one operator.
-    pub fn beside(self, terminal: Box<dyn Operator>) -> Both {
-        Both {
-            screen: self,
-            terminal,
-            by_page: false,
-        }
-    }
-
-    /// Shows a view.
+impl Own for Screen {
     fn show(&mut self, view: &View) {
-        self.settle(view);
-        let Some(page) = page::participant(view) else {
-            return;
-        };
-        let same = self.shown.as_ref().is_some_and(|shown| {
-            same_page(&shown.screen, &view.screen) && shown.page.still() == page.still()
-        });
-        if same && self.shown.as_ref().is_some_and(|s| s.page == page) {
-            return;
-        }
-        let id = match self.shown.take().filter(|_| same) {
-            Some(shown) => shown.id,
-            None => {
-                self.pages += 1;
-                format!("{}.{}", self.run, self.pages)
-            }
-        };
-        let named = Named {
-            id: &id,
-            page: &page,
-        };
-        // A page consists of texts and numbers, which JSON has.
-        self.board
-            .show(&serde_json::to_string(&named).unwrap_or_default());
-        self.shown = Some(Shown {
-            id,
-            page,
-            screen: view.screen.clone(),
-        });
+        self.board.with(|exchange| exchange.show(view));
     }
 
-    /// Tells the page what became of its last reply, once everything is on disk.
-    fn settle(&mut self, view: &View) {
-        let done = view.line.all_saved && view.unsaved.is_empty();
-        let Some(pending) = self.pending.take_if(|_| done) else {
-            return;
-        };
-        let stays = |screen| same_page(screen, &view.screen);
-        let outcome = match pending.leaves.as_ref().is_some_and(stays) {
-            true => Outcome::Refused(String::new()),
-            false => Outcome::Saved,
-        };
-        self.board.settle(&pending.key, outcome);
+    fn inputs(&mut self, view: &View) -> Vec<Input> {
+        let input = self.board.with(|exchange| exchange.input(view));
+        input.into_iter().collect()
     }
 
-    /// The input of the page, if there is one. The view is the one that was shown last.
-    fn input(&mut self, view: &View) -> Option<Input> {
-        if self.board.take_stop() {
-            return Some(Input::Stop);
-        }
-        let shown = self.shown.as_ref().filter(|_| self.pending.is_none())?;
-        let reply = self.board.take()?;
-        if reply.page != shown.id || !same_page(&shown.screen, &view.screen) {
-            self.board.settle(&reply.key, Outcome::Stale);
-            return None;
-        }
-        match replies::input(&reply, &shown.page, view) {
-            Err(why) => {
-                self.board.settle(&reply.key, Outcome::Refused(why));
-                None
-            }
-            Ok(input) => {
-                let leaves = matches!(input, Input::Answer(_) | Input::Consent(_) | Input::Back);
-                self.pending = Some(Pending {
-                    key: reply.key,
-                    leaves: leaves.then(|| view.screen.clone()),
-                });
-                Some(input)
-            }
-        }
-    }
-}
-
-/// A terminal and the participant's page.
-pub struct Both {
-    screen: Screen,
-    terminal: Box<dyn Operator>,
-    /// Whether the last input was that of the page.
-    by_page: bool,
-}
-
-impl Operator for Both {
-    fn channel(&self) -> Option<Channel> {
-        match self.by_page {
-            true => Some(Channel::Page),
-            false => self.terminal.channel(),
-        }
-    }
-
-    fn next(&mut self, view: &View, timeout: Duration) -> Result<Vec<Input>, OperatorError> {
-        let until = Instant::now() + timeout;
-        self.screen.show(view);
-        let mut seen = view.clone();
-        let silent = self.screen.board.silent_for();
-        if seen.notice.is_none() && silent.is_some_and(|time| time > SILENCE) {
-            seen.notice = Some("the participant's page has no connection".to_owned());
-        }
-        loop {
-            self.by_page = false;
-            if let Some(input) = self.screen.input(view) {
-                self.by_page = true;
-                return Ok(vec![input]);
-            }
-            let left = until.saturating_duration_since(Instant::now());
-            let inputs = self.terminal.next(&seen, left.min(SLICE))?;
-            if !inputs.is_empty() || left.is_zero() {
-                return Ok(inputs);
-            }
-        }
+    fn notice(&self) -> Option<String> {
+        let silent = self.board.silent_for()?;
+        (silent > SILENCE).then(|| "the participant's page has no connection".to_owned())
     }
 }

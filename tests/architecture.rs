@@ -69,8 +69,9 @@ runner: session device store identify outcome protocol rendering model rater saf
 report: analyze stats identify load model outcome power preregister procedure protocol recording store study
 tui: runner page session outcome protocol
 plain: runner page session outcome protocol tui
-screen: runner page session outcome protocol
-cli: analyze device export identify load model outcome plain plant power procedure protocol rater recording rehearsal rendering report runner safe_play schedule screen session stats store study trajectory tui wire
+screen: runner page session protocol
+front: runner page session protocol
+cli: analyze device export front identify load model outcome plain plant power procedure protocol rater recording rehearsal rendering report runner safe_play schedule screen session stats store study trajectory tui wire
 main: cli
 certificate: predict
 predict: real
@@ -88,8 +89,10 @@ const WITH_IO: &[&str] = &[
     "tui",
     "plain",
     "screen",
+    "front",
     "runner",
     "cli",
+    "child",
     "device/link",
     "device/process",
 ];

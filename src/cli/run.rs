@@ -10,6 +10,7 @@ use super::device::record;
 use super::device_selection::{self, DeviceArgs, WaitDisplay};
 use super::{Console, Failure, Kind, study_folder};
 use crate::plain::Plain;
+use crate::runner::beside::{Beside, Own};
 use crate::runner::clock::{Clock, HurriedClock, RealClock};
 use crate::runner::{Operator, Runner, Setup};
 use crate::screen::Address;
@@ -71,6 +72,10 @@ pub(super) struct Args {
     #[arg(long, value_name = "ADDR", num_args = 0..=1, require_equals = true,
           default_missing_value = "127.0.0.1")]
     screen: Option<Address>,
+    /// A front of your own for the participant: a program and its arguments, separated by
+    /// spaces, that shows the pages of docs/page.md
+    #[arg(long, value_name = "COMMAND", conflicts_with = "screen")]
+    front: Option<String>,
     /// Do not use the mouse
     #[arg(long)]
     no_mouse: bool,
@@ -145,9 +150,15 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     };
     let address = &args.device.address;
     let plain = args.plain || wants_plain(|name| std::env::var(name).ok());
-    let screen = match args.screen {
-        Some(at) => Some(page::open(at, &loaded.protocol, plain, console)?),
-        None => None,
+    let mut simulated = false;
+    let own: Option<Box<dyn Own>> = match (args.screen, &args.front) {
+        (Some(at), _) => Some(Box::new(page::open(at, &loaded.protocol, plain, console)?)),
+        (None, Some(command)) => {
+            let front = page::start(command, &loaded.protocol)?;
+            simulated = front.hello().is_some_and(|hello| hello.simulated);
+            Some(Box::new(front))
+        }
+        (None, None) => None,
     };
     let mut waiting = match plain {
         true => WaitDisplay::in_a_line(console),
@@ -172,7 +183,9 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     };
     // A person feels nothing on the simulated device: such data are never real.
     let overridden = kind != loaded.protocol.device.kind;
-    let seats = if args.pilot || overridden || device.identity().simulated || times > 1 {
+    let seats = if simulated {
+        SeatKind::Simulated
+    } else if args.pilot || overridden || device.identity().simulated || times > 1 {
         SeatKind::Pilot
     } else {
         SeatKind::Real
@@ -183,8 +196,8 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         true => Box::new(Plain::open(args.live, times).map_err(unusable)?),
         false => Box::new(Tui::open(options).map_err(unusable)?),
     };
-    if let Some(screen) = screen {
-        operator = Box::new(screen.beside(operator));
+    if let Some(own) = own {
+        operator = Box::new(Beside::new(own, operator));
     }
     let study = match begun {
         Some(study) => study,
@@ -284,7 +297,8 @@ fn roster(
 ) -> Roster {
     let newcomer = match kind {
         SeatKind::Real => next_row(rows, sessions).map_or(Newcomer::NoRow, Newcomer::Row),
-        SeatKind::Pilot | SeatKind::Simulated => Newcomer::Pilot,
+        SeatKind::Pilot => Newcomer::Pilot,
+        SeatKind::Simulated => Newcomer::Simulated,
     };
     let mut roster = Roster::new(&participants(sessions), newcomer);
     let of_one = sessions.chunk_by(|a, b| a.participant == b.participant);
@@ -426,6 +440,8 @@ fn resume_command(args: &Args, participant: &str) -> String {
         }
     }
     command.extend(args.screen.map(|at| format!("--screen={at}")));
+    let front = args.front.iter();
+    command.extend(front.flat_map(|front| ["--front".to_owned(), front.clone()]));
     shell_command(&command)
 }
 

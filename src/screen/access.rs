@@ -13,7 +13,7 @@ const STRANGERS: (f64, f64) = (20.0, 60.0);
 ///
 /// # Errors
 /// The system has no randomness.
-pub(super) fn secret() -> Result<String, getrandom::Error> {
+pub fn secret() -> Result<String, super::ScreenError> {
     let mut bytes = [0; BYTES];
     getrandom::fill(&mut bytes)?;
     Ok(study_base::hex::hex(&bytes))

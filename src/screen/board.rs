@@ -1,83 +1,58 @@
-//! What the session's thread and the server's threads share: the page that is shown, and
-//! the replies to it.
+//! What the session's thread and the server's threads share: the pages and the replies.
 
-use super::replies::Reply;
-use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
+use study_session::page::reply::{Exchange, Outcome, Reply, Sent};
 
-/// How many replies are remembered: a repeated one must not count twice.
-const REMEMBERED: usize = 512;
-/// How many replies may wait at a time.
-const WAITING: usize = 8;
 /// How many requests may wait for another page at a time.
 const WATCHING: usize = 4;
 
-/// What became of a reply.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Outcome {
-    /// It was taken, and everything is on disk.
-    Saved,
-    /// It is for another page than the one that is shown.
-    Stale,
-    /// It is not accepted, with what can be done instead.
-    Refused(String),
-}
-
 /// The shared state.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Board {
     state: Mutex<State>,
     changed: Condvar,
 }
 
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct State {
-    /// The page as JSON.
-    shown: String,
-    revision: u64,
-    replies: VecDeque<Known>,
+    exchange: Exchange,
     watching: usize,
     /// When the page was last asked for.
     seen: Option<Instant>,
-    /// Whether a stop was requested.
-    stop: bool,
     closed: bool,
 }
 
-/// A reply that has arrived.
-#[derive(Debug)]
-struct Known {
-    key: String,
-    /// Until it is taken.
-    reply: Option<Reply>,
-    outcome: Option<Outcome>,
-}
-
 impl Board {
+    /// `run` is a word that no other run has.
+    pub(super) fn new(run: String) -> Self {
+        Self {
+            state: Mutex::new(State {
+                exchange: Exchange::new(run),
+                watching: 0,
+                seen: None,
+                closed: false,
+            }),
+            changed: Condvar::new(),
+        }
+    }
+
     fn lock(&self) -> MutexGuard<'_, State> {
         // The state is whole between any two statements that change it.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Shows a page, as JSON without its revision.
-    pub(super) fn show(&self, page: &str) {
+    /// Does something with the pages and replies, and tells those who wait for a change.
+    pub(super) fn with<T>(&self, act: impl FnOnce(&mut Exchange) -> T) -> T {
         let mut state = self.lock();
-        state.revision += 1;
-        let begin = page.strip_prefix('{').unwrap_or(page);
-        state.shown = format!("{{\"revision\":{},{begin}", state.revision);
+        let before = state.exchange.changes();
+        let done = act(&mut state.exchange);
+        let changed = state.exchange.changes() != before;
         drop(state);
-        self.changed.notify_all();
-    }
-
-    /// Requests a stop, which waits for nothing.
-    pub(super) fn stop(&self) {
-        self.lock().stop = true;
-    }
-
-    /// Whether a stop was requested since the last call.
-    pub(super) fn take_stop(&self) -> bool {
-        std::mem::take(&mut self.lock().stop)
+        if changed {
+            self.changed.notify_all();
+        }
+        done
     }
 
     /// Ends all waiting.
@@ -100,18 +75,21 @@ impl Board {
         })
     }
 
-    /// The page once it is newer than a revision, at the latest after a time.
+    /// The page as JSON once it is newer than a revision, at the latest after a time; empty
+    /// before the first one.
     pub(super) fn newer(&self, than: u64, at_most: Duration) -> String {
         let mut state = self.lock();
         if state.watching < WATCHING {
             state.watching += 1;
-            let same = |s: &mut State| s.revision == than && !s.closed;
+            let same = |s: &mut State| s.exchange.revision() == than && !s.closed;
             let waited = self.changed.wait_timeout_while(state, at_most, same);
             state = waited.unwrap_or_else(PoisonError::into_inner).0;
             state.watching -= 1;
         }
         state.seen = Some(Instant::now());
-        state.shown.clone()
+        // A page consists of texts and numbers, which JSON has.
+        let json = |page| serde_json::to_string(&page).unwrap_or_default();
+        state.exchange.page().map_or_else(String::new, json)
     }
 
     /// Hands a reply over and waits for what becomes of it. A key that is known gives the
@@ -119,47 +97,12 @@ impl Board {
     pub(super) fn reply(&self, reply: Reply, at_most: Duration) -> Option<Outcome> {
         let key = reply.key.clone();
         let mut state = self.lock();
-        if !state.replies.iter().any(|known| known.key == key) {
-            let waiting = state.replies.iter().filter(|k| k.outcome.is_none()).count();
-            if waiting >= WAITING {
-                return None;
-            }
-            if state.replies.len() >= REMEMBERED {
-                let done = state.replies.iter().position(|k| k.outcome.is_some());
-                done.and_then(|at| state.replies.remove(at));
-            }
-            state.replies.push_back(Known {
-                key: key.clone(),
-                reply: Some(reply),
-                outcome: None,
-            });
+        if !state.exchange.arrive(Sent::Reply(reply)) {
+            return None;
         }
-        let outcome = |state: &State| {
-            let known = state.replies.iter().find(|known| known.key == key)?;
-            known.outcome.clone()
-        };
-        let open = |s: &mut State| outcome(s).is_none() && !s.closed;
+        let open = |state: &mut State| state.exchange.outcome(&key).is_none() && !state.closed;
         let waited = self.changed.wait_timeout_while(state, at_most, open);
-        outcome(&waited.unwrap_or_else(PoisonError::into_inner).0)
-    }
-
-    /// The first reply that was not taken yet.
-    pub(super) fn take(&self) -> Option<Reply> {
-        let mut state = self.lock();
-        state
-            .replies
-            .iter_mut()
-            .find_map(|known| known.reply.take())
-    }
-
-    /// Tells what became of a reply.
-    pub(super) fn settle(&self, key: &str, outcome: Outcome) {
-        let mut state = self.lock();
-        let known = state.replies.iter_mut().find(|known| known.key == key);
-        if let Some(known) = known {
-            known.outcome = Some(outcome);
-        }
-        drop(state);
-        self.changed.notify_all();
+        let state = waited.unwrap_or_else(PoisonError::into_inner).0;
+        state.exchange.outcome(&key).cloned()
     }
 }

@@ -1,9 +1,8 @@
 //! The server of the participant's page: its threads, its addresses, its limits.
 
 use super::access::{Access, secret};
-use super::board::{Board, Outcome};
+use super::board::Board;
 use super::http::{self, Request, Response};
-use super::replies::Reply;
 use super::{Address, ScreenError};
 use maud::{DOCTYPE, html};
 use std::io;
@@ -12,7 +11,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use study_plan::protocol::phrases::{Phrase, Words, is_right_to_left};
-use study_session::page::Does;
+use study_session::page::reply::{Outcome, Sent};
 
 /// How many connections are served at a time. One more ends the oldest whose request has
 /// not arrived.
@@ -21,10 +20,6 @@ const CONNECTIONS: usize = 24;
 const WATCH: Duration = Duration::from_secs(15);
 /// How long a reply waits until it is saved.
 const SAVE: Duration = Duration::from_secs(10);
-/// A reply sooner after its page appeared is a repeated tap, ms.
-const UNREAD_MS: u64 = 250;
-/// Longest key of a reply, bytes.
-const MOST_KEY: usize = 64;
 const STACK: usize = 256 * 1024;
 
 const STYLE: &str = include_str!("page.css");
@@ -280,19 +275,14 @@ impl Shared {
     }
 
     fn reply(&self, request: &Request) -> Response {
-        let Ok(reply) = serde_json::from_slice::<Reply>(&request.body) else {
-            return Response::empty(400);
+        let reply = match Sent::read(&request.body) {
+            Ok(Sent::Reply(reply)) => reply,
+            Ok(stop) => {
+                self.board.with(|exchange| exchange.arrive(stop));
+                return Response::empty(200);
+            }
+            Err(_) => return Response::empty(400),
         };
-        if reply.key.is_empty() || reply.key.len() > MOST_KEY {
-            return Response::empty(400);
-        }
-        if reply.does == Does::Stop {
-            self.board.stop();
-            return Response::empty(200);
-        }
-        if reply.shown_ms < UNREAD_MS {
-            return Response::empty(409);
-        }
         match self.board.reply(reply, SAVE) {
             Some(Outcome::Saved) => Response::empty(200),
             Some(Outcome::Stale) => Response::empty(409),

@@ -2,7 +2,7 @@
 //! statistics. `UPDATE_DOCS=1 cargo test --test analyze docs` writes them.
 #![allow(clippy::unwrap_used)]
 
-use crate::schema::{begins, fits};
+use crate::json_schema::{begins, fits};
 use serde_json::{Map, Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;

@@ -7,6 +7,8 @@ mod designs;
 mod docs;
 mod findings;
 mod golden;
+#[path = "../support/json_schema.rs"]
+mod json_schema;
 mod mixed;
 mod nist;
 mod odd;

@@ -1,7 +1,8 @@
 //! `study analyze --pool`: several sites of one study.
 #![allow(clippy::unwrap_used)]
 
-use crate::schema::{check, schema};
+use crate::json_schema::check;
+use crate::schema::schema;
 use serde_json::Value as Json;
 use std::fs;
 use std::path::Path;

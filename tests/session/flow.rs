@@ -7,6 +7,7 @@ mod blinding;
 mod device;
 mod exposure;
 mod forms;
+mod interpreters;
 mod parts;
 mod random;
 mod resume;

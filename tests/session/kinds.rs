@@ -6,18 +6,18 @@ use crossterm::event::{Event, KeyCode, KeyEvent, KeyModifiers};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use study::plain::dialogue::Dialogue;
-use study::screen::replies::{self, Reply};
 use study::tui::{ColorDepth, Surface};
 use study_base::text::QuestionId;
 use study_plan::protocol::kinds::{Draws, KINDS};
 use study_plan::protocol::phrases::{Words, languages};
 use study_plan::protocol::{Answer, Control, Given, Question};
+use study_session::page::reply::{self, Reply};
 use study_session::page::{Does, participant};
 use study_session::session::view::Correctable;
 use study_session::session::{Input, View};
 
 /// A question of each kind in each of its forms, with a name.
-fn questions(required: bool) -> Vec<(String, Question)> {
+pub(crate) fn questions(required: bool) -> Vec<(String, Question)> {
     let mut all = Vec::new();
     for known in KINDS {
         let examples = (known.examples)();
@@ -140,7 +140,7 @@ fn on_the_page(view: &View, given: Option<&Given>) -> Sent {
         answers,
         reason: String::new(),
     };
-    let input = replies::input(&reply, &participant(view).unwrap(), view);
+    let input = reply::input(&reply, &participant(view).unwrap(), view);
     input.and_then(|input| sent(vec![input], String::new))
 }
 

@@ -13,7 +13,10 @@ mod devices;
 mod dying_disk;
 mod exposure;
 mod flow;
+mod front;
 mod groups;
+#[path = "../support/json_schema.rs"]
+mod json_schema;
 mod kill;
 mod kinds;
 mod languages;

@@ -9,8 +9,10 @@
 //!
 //! docs/page.md specifies the JSON of a participant's page.
 
+pub mod front;
 mod of_view;
 mod question;
+pub mod reply;
 
 pub use of_view::{attending, page};
 pub use question::{Asked, Field};
@@ -237,6 +239,8 @@ pub fn participant(view: &View) -> Option<Page> {
         _ => {}
     }
     page.progress = page.done.take().or(page.progress);
+    // It shows `clock` and `wait`; what it does not show must not make it another page.
+    (page.playback, page.wait_clock) = (None, None);
     if let Some(interval) = &page.interval {
         // An interval is the heading.
         if page.title.is_empty() {

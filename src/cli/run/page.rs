@@ -1,7 +1,8 @@
-//! The participant's page: its link and its code, before the session.
+//! The participant's screen before the session: link and code of the page, or a front's hello.
 
 use super::super::{Console, Failure, Kind};
-use crate::screen::{Address, Screen, ScreenError};
+use crate::front::Front;
+use crate::screen::{Address, Screen, ScreenError, secret};
 use crossterm::event::{self, Event, KeyCode};
 use std::io::IsTerminal as _;
 use std::time::Duration;
@@ -18,12 +19,7 @@ pub(super) fn open(
     plain: bool,
     console: &mut Console,
 ) -> Result<Screen, Failure> {
-    if protocol.session.entry == Entry::Experimenter {
-        return Err(Failure::input(
-            "in this study the experimenter types the answers, so that a page of the participant's own has no use",
-        )
-        .hint("run it without --screen, or set `entry = \"participant\"` in [session]"));
-    }
+    has_use(protocol, "--screen")?;
     let words = protocol.text.phrases();
     let opened = Screen::open(at, protocol.text.lang.as_deref(), &words);
     let screen = opened.map_err(|e| unusable(&e))?;
@@ -42,6 +38,30 @@ pub(super) fn open(
     ))?;
     while std::io::stdin().is_terminal() && !screen.is_open() && !enter_pressed() {}
     Ok(screen)
+}
+
+/// Starts a front and waits until it says who it is.
+pub(super) fn start(command: &str, protocol: &Protocol) -> Result<Front, Failure> {
+    has_use(protocol, "--front")?;
+    let words = protocol.text.phrases();
+    let command = command.split_whitespace().map(str::to_owned).collect();
+    let run = secret().map_err(|e| unusable(&e))?;
+    let front = Front::open(command, run, protocol.text.lang.as_deref(), &words);
+    front.map_err(|error| {
+        Failure::new(Kind::Usage, &error)
+            .hint("--front \"PROGRAM ARGUMENTS\" names a program that speaks docs/page.md")
+    })
+}
+
+/// Refuses a screen of the participant's own where the experimenter types the answers.
+fn has_use(protocol: &Protocol, option: &str) -> Result<(), Failure> {
+    if protocol.session.entry != Entry::Experimenter {
+        return Ok(());
+    }
+    Err(Failure::input(
+        "in this study the experimenter types the answers, so that a page of the participant's own has no use",
+    )
+    .hint(format!("run it without {option}, or set `entry = \"participant\"` in [session]")))
 }
 
 /// Whether Enter was pressed; a terminal that cannot be read is reported by the session.

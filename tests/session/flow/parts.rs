@@ -26,14 +26,14 @@ steps = 41
 const STAIRCASE: &str = r#"{ rule = "staircase", up = 1, down = 3, start = 2.0, steps = [0.2, 0.1], stop = { reversals = 4, max_trials = 60 } }"#;
 const QUEST: &str = r#"{ rule = "quest+", trials = 16, lapse = [0.02], slope = [2, 4] }"#;
 
-fn read(text: &str) -> Protocol {
+pub(super) fn read(text: &str) -> Protocol {
     let parsed = parse("p", &format!("{HEAD}{text}"));
     let shown = parsed.findings.render(false);
     parsed.protocol.unwrap_or_else(|| panic!("{shown}"))
 }
 
 /// One track of a method; `more` is added to the track.
-fn track(method: &str, procedure: &str, more: &str) -> Protocol {
+pub(super) fn track(method: &str, procedure: &str, more: &str) -> Protocol {
     read(&format!(
         r#"
 [analysis]
@@ -54,7 +54,7 @@ procedure = {procedure}
     ))
 }
 
-fn pairs(more: &str) -> Protocol {
+pub(super) fn pairs(more: &str) -> Protocol {
     read(&format!(
         r#"
 [analysis]
@@ -69,7 +69,7 @@ repetitions = 2
     ))
 }
 
-fn beside_a_reference() -> Protocol {
+pub(super) fn beside_a_reference() -> Protocol {
     let head = HEAD.replace(
         "file = \"a.toml\" }",
         "file = \"a.toml\", role = \"hidden-reference\" }",

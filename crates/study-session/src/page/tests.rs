@@ -1,6 +1,7 @@
 use super::*;
 use crate::outcome::FormId;
-use crate::session::view::{DeviceState, StatusLine};
+use crate::session::Input;
+use crate::session::view::{DeviceState, MessageKind, StatusLine};
 use std::sync::Arc;
 use study_plan::protocol::kinds::{QuestionKind, Rating};
 use study_plan::protocol::{DeviceKind, Entry, Exposure, Question, example};
@@ -144,4 +145,91 @@ fn a_clock_shows_any_number() {
     assert_eq!(clock(3600.0), "1:00:00");
     assert_eq!(clock(f64::NAN), "0:00");
     assert_eq!(clock(-1.0), "0:00");
+}
+
+/// A playback is one page however long it lasts, and is told again only when its clock moves.
+#[test]
+fn a_playback_is_one_page() {
+    let mut exchange = reply::Exchange::new("run".to_owned());
+    let mut shown = |since_s| {
+        exchange.show(&view(Screen::Playing {
+            since_s,
+            keep_exploring: since_s < 1.5,
+            exposure: Exposure::default(),
+            interval: None,
+        }));
+        let page = exchange.page().unwrap();
+        (page.id.to_owned(), page.revision)
+    };
+    assert_eq!(shown(0.1), ("run.1".to_owned(), 1));
+    assert_eq!(shown(0.9), ("run.1".to_owned(), 1));
+    assert_eq!(shown(1.1), ("run.1".to_owned(), 2));
+    assert_eq!(shown(1.6), ("run.1".to_owned(), 3));
+}
+
+/// A front that was lost comes back under its name, is told the page again, and may use keys that
+/// the one before has used; what that one sent last counts no more.
+#[test]
+fn a_front_begins_again() {
+    let message = view(Screen::Message {
+        kind: MessageKind::Welcome,
+        text: "Hello.".to_owned(),
+    });
+    let hello = br#"{"format":"study-page/1","front":"a 1"}"#;
+    let advance = br#"{"page":"run.1","key":"1","shown_ms":300,"does":"advance"}"#;
+    let mut talk = front::Talk::new("run".to_owned(), Some("ar"), &Words::default());
+    talk.show(&message);
+    assert_eq!(talk.says(), [""; 0], "nobody has said who it is");
+    talk.hears(hello).unwrap();
+    let said = talk.says();
+    assert!(
+        said[0].contains(r#""dir":"rtl""#) && said[1].contains("run.1"),
+        "{said:?}"
+    );
+    assert_eq!(talk.says(), [""; 0]);
+    talk.hears(advance).unwrap();
+    talk.begin_again();
+    assert_eq!(talk.input(&message), None);
+    let other = br#"{"format":"study-page/1","front":"a 1","simulated":true}"#;
+    assert!(talk.hears(other).is_err() && !talk.is_open());
+    talk.hears(hello).unwrap();
+    assert_eq!(talk.says(), said);
+    talk.hears(advance).unwrap();
+    assert_eq!(talk.input(&message), Some(Input::Advance));
+    // Not before everything is on disk.
+    let mut unsaved = message.clone();
+    unsaved.line.all_saved = false;
+    talk.show(&unsaved);
+    assert_eq!(talk.says(), [""; 0]);
+    talk.show(&message);
+    assert_eq!(
+        talk.says(),
+        ["{\"say\":\"settled\",\"key\":\"1\",\"outcome\":\"saved\"}\n"]
+    );
+}
+
+/// Whatever else it says, a request to stop is taken, before all replies.
+#[test]
+fn a_stop_is_always_taken() {
+    use reply::Sent;
+    let view = asks(false, rating(7));
+    let mut exchange = reply::Exchange::new("run".to_owned());
+    exchange.show(&view);
+    for key in 0..9 {
+        let tap = format!(r#"{{"page":"run.1","key":"{key}","shown_ms":300,"does":"answer"}}"#);
+        assert_eq!(
+            exchange.arrive(Sent::read(tap.as_bytes()).unwrap()),
+            key < 8
+        );
+    }
+    for stop in [
+        r#"{"does":"stop"}"#,
+        r#"{"page":5,"key":"","does":"stop","shown_ms":-1,"new":[]}"#,
+    ] {
+        assert!(exchange.arrive(Sent::read(stop.as_bytes()).unwrap()));
+        assert_eq!(exchange.input(&view), Some(Input::Stop));
+    }
+    for wrong in ["{}", "[]", "stop", r#"{"does":"go"}"#, "\"stop\""] {
+        assert!(Sent::read(wrong.as_bytes()).is_err(), "{wrong}");
+    }
 }

@@ -27,6 +27,8 @@ pub enum Newcomer {
     NoRow,
     /// A pilot.
     Pilot,
+    /// Simulated: no person.
+    Simulated,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -117,6 +119,7 @@ impl Roster {
                 Newcomer::Row(row) => format!("new, row {row}"),
                 Newcomer::NoRow => "new, but no row is free".to_owned(),
                 Newcomer::Pilot => "new, a pilot".to_owned(),
+                Newcomer::Simulated => "new, simulated".to_owned(),
             },
             Some(Known { state, .. }) => state.as_str().to_owned(),
         })
