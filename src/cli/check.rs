@@ -223,6 +223,23 @@ fn danger(realization: &Realization) -> Option<Danger> {
         .flatten()
 }
 
+/// A hand moves a handle so fast, mm/s.
+const HAND_MM_S: f64 = 200.0;
+/// A hand that is this many times as fast as the recordings feels what no data support.
+const MUCH_FASTER: f64 = 4.0;
+
+/// What a hand may do beyond the recordings of a realization.
+fn beyond(realization: &Realization) -> Option<String> {
+    let trained = realization.trained.v_mm_s;
+    let factor = HAND_MM_S / trained;
+    (factor > MUCH_FASTER).then(|| {
+        let digits = if trained < 10.0 { 2 } else { 0 };
+        format!(
+            "trained up to {trained:.digits$} mm/s; a hand of {HAND_MM_S} mm/s is {factor:.0} times as fast"
+        )
+    })
+}
+
 /// A line for each table that is played, with its certificate and, if `verbose`, its
 /// margins; notes about tables that fail theirs and about samples mounted by hand.
 fn certificates(loaded: &load::Loaded, verbose: bool) -> String {
@@ -240,7 +257,9 @@ fn certificates(loaded: &load::Loaded, verbose: bool) -> String {
             let verdict = if certificate.passes() { "PASS" } else { "FAIL" };
             out += &format!("{id}: {verdict}\n");
         }
-        dangers.extend(danger(realization).map(|danger| format!("note: `{id}`: {danger}\n")));
+        let danger = danger(realization).map(|danger| danger.to_string());
+        let notes = danger.into_iter().chain(beyond(realization));
+        dangers.extend(notes.map(|note| format!("note: `{id}`: {note}\n")));
     }
     out += &dangers.concat();
     if let (1.., Some(permission)) = (failing, &loaded.protocol.device.uncertified) {

@@ -181,6 +181,14 @@ fn a_mechanism_that_is_not_safe_to_play_is_refused_without_permission() {
         out.contains("note: `static`: 320 reversals a second"),
         "{out}"
     );
+    // a recording so slow that it says nothing of a hand is named with the factor
+    let slow = fs::read_to_string(from.join("models/passive.toml")).unwrap();
+    let slow = slow.replace("v_mm_s = 138.1611", "v_mm_s = 0.2");
+    fs::write(dir.path().join("models/passive.toml"), slow).unwrap();
+    let out = run(dir.path(), &["check", "."]).1;
+    let words =
+        "note: `passive`: trained up to 0.20 mm/s; a hand of 200 mm/s is 1000 times as fast";
+    assert!(out.contains(words), "{out}");
     fs::write(&path, text.replace("play = true", "play = false")).unwrap();
     for command in [&["check", "."][..], &["run", "."]] {
         let (code, _, err) = run(dir.path(), command);

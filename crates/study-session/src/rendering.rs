@@ -11,6 +11,7 @@
 mod comparable;
 mod moments;
 mod predicted;
+mod scale;
 mod shares;
 
 use crate::outcome::{Defect, Fidelity, Sample, Verdict};
@@ -19,6 +20,7 @@ use comparable::{
 };
 use moments::{Moments, best_lag};
 use predicted::{Predicted, predicted};
+use scale::Scale;
 use shares::{Share, largest_share};
 use study_base::text::ModelId;
 use study_plan::protocol::{OnFault, RenderingRules};
@@ -36,9 +38,6 @@ const LONGEST_DELAY_S: f64 = 0.06;
 const ROUNDING_N: f64 = 0.01;
 /// A measured force exceeds its limit if it does so by this factor and this force, N.
 const MEASURED_EXCESS: (f64, f64) = (1.1, 0.5);
-/// Two tables whose forces differ by less, rms, are not told apart, N: what a person just
-/// notices.
-const DISTINCT_N: f64 = 0.1;
 /// Largest error of the speed, and of the time of the samples.
 const SPEED_ERROR: f64 = 0.1;
 const TIME_ERROR: f64 = 0.05;
@@ -86,6 +85,7 @@ pub fn judge(played: &Played<'_>, rules: &RenderingRules) -> Fidelity {
         fidelity.because = Some("no samples".to_owned());
         return fidelity;
     };
+    let scale = Scale::of(played);
     let forces = with_doubt(played, &samples);
     let known = direction_known(played, &samples, &forces, interval_s);
     let keep = comparable(played, &samples, &forces, &known);
@@ -104,7 +104,7 @@ pub fn judge(played: &Played<'_>, rules: &RenderingRules) -> Fidelity {
     fidelity.rendered_gain = commanded.slope();
     fidelity.rendered_bias_n = commanded.bias();
     fidelity.rendered_error_n = lasting_error(played, &samples, &forces, &known);
-    let share = largest_share(&samples, &forces, &keep, interval_s);
+    let share = largest_share(&samples, &forces, &keep, interval_s, scale);
     fidelity.rendered_error_share = share.map(|share| share.beyond_doubt);
     limits(played, &samples, interval_s, &mut fidelity);
     measured(&samples, &mut fidelity);
@@ -115,7 +115,7 @@ pub fn judge(played: &Played<'_>, rules: &RenderingRules) -> Fidelity {
     let nearest = nearest(played, &samples[..searched], &keep, interval_s);
     fidelity.nearest_model = nearest.as_ref().map(|near| near.model.clone());
 
-    let too_little = too_little(&samples, &keep, interval_s, &commanded);
+    let too_little = too_little(&samples, &keep, interval_s, &commanded, scale);
     let unsure = |share: &Share| share.apart > rules.max_error_share;
     let open = too_little
         .or_else(|| too_coarse(&forces, &keep, &commanded))
@@ -468,7 +468,7 @@ fn nearest<'a>(
         model: played.model,
         explains: false,
     };
-    let distinct = own > DISTINCT_N * DISTINCT_N;
+    let distinct = own > Scale::of(played).force_n.powi(2);
     let mut least = own;
     for (model, what) in played.others {
         if let Some((far, vaf)) = score(what)

@@ -2,6 +2,7 @@
 
 use super::moments::Moments;
 use super::predicted::{APART, Predicted, acceleration, predicted};
+use super::scale::Scale;
 use super::{Played, REST_MM_S, ROUNDING_N};
 use crate::outcome::Sample;
 use study_wire::predict::Direction;
@@ -11,10 +12,6 @@ use study_wire::servo::Law;
 const LEAST_S: f64 = 0.5;
 /// Least time of motion in each direction, s.
 const LEAST_MOTION_S: f64 = 0.1;
-/// Least distance, mm.
-const LEAST_TRAVEL_MM: f64 = 5.0;
-/// Least standard deviation of the table's force, N.
-const LEAST_SD_N: f64 = 0.1;
 /// Telemetry with longer intervals is too slow for a verdict, s.
 pub(super) const SLOW_S: f64 = 0.0025;
 /// Time after the ramp before forces are compared, s.
@@ -152,6 +149,7 @@ pub(super) fn too_little(
     keep: &[bool],
     interval_s: f64,
     commanded: &Moments,
+    scale: Scale,
 ) -> Option<&'static str> {
     let compared = || {
         samples
@@ -175,11 +173,11 @@ pub(super) fn too_little(
         .all(|sign| lasting(moving(*sign), LEAST_MOTION_S))
     {
         Some("too little motion in one of the directions")
-    } else if travel_mm < LEAST_TRAVEL_MM {
+    } else if travel_mm < scale.travel_mm {
         Some("too little travel")
     } else if commanded
         .var_x()
-        .is_none_or(|var| var < LEAST_SD_N * LEAST_SD_N)
+        .is_none_or(|var| var < scale.force_n.powi(2))
     {
         Some("too little change of the force")
     } else {

@@ -3,14 +3,13 @@
 //! direction only, or that turns wrong late, is right on average.
 
 use super::predicted::Predicted;
+use super::scale::Scale;
 use crate::outcome::Sample;
 
 /// Duration of a stretch, s.
 const STRETCH_S: f64 = 2.0;
 /// Parts with less comparable time are not judged by themselves, s.
 const LEAST_S: f64 = 0.5;
-/// A weaker force counts as this one, rms, N.
-const LEAST_N: f64 = 0.1;
 
 /// Sums of squares, N².
 #[derive(Clone, Copy, Default)]
@@ -38,9 +37,9 @@ impl Squares {
         self.beyond_doubt += force.apart_n(sample).powi(2);
     }
 
-    fn share(&self) -> Share {
+    fn share(&self, scale: Scale) -> Share {
         let n = self.n as f64;
-        let force_n = (self.force / n).sqrt().max(LEAST_N);
+        let force_n = (self.force / n).sqrt().max(scale.force_n);
         Share {
             apart: (self.apart / n).sqrt() / force_n,
             beyond_doubt: (self.beyond_doubt / n).sqrt() / force_n,
@@ -55,6 +54,7 @@ pub(super) fn largest_share(
     forces: &[Predicted],
     keep: &[bool],
     interval_s: f64,
+    scale: Scale,
 ) -> Option<Share> {
     let stretch = (STRETCH_S / interval_s).ceil() as usize;
     let [mut all, mut forwards, mut backwards, mut latest] = [Squares::default(); 4];
@@ -77,7 +77,7 @@ pub(super) fn largest_share(
     (stretches.into_iter())
         .chain([all, forwards, backwards, latest])
         .filter(|part| part.n as f64 * interval_s >= LEAST_S)
-        .map(|part| part.share())
+        .map(|part| part.share(scale))
         .reduce(|a, b| Share {
             apart: a.apart.max(b.apart),
             beyond_doubt: a.beyond_doubt.max(b.beyond_doubt),

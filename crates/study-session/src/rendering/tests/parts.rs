@@ -125,3 +125,29 @@ fn a_turn_among_lost_samples_accuses_nobody() {
         assert_eq!(said(&weak).verdict, Verdict::Flag);
     }
 }
+
+/// A keyboard switch: 0.26 to 0.64 N over 4 mm, at its own speed. The standard deviation is
+/// below 0.1 N.
+#[test]
+fn a_key_of_four_millimetres_is_judged() {
+    let key = Table {
+        x_mm: [13.0, 17.0],
+        m_kg: [0.0; 2],
+        b_n_s_per_mm: [0.0; 2],
+        k_n_per_mm: [0.05; 2],
+        f0_n: [[-0.2; 2], [-0.3; 2]],
+    };
+    let scaled = |gain: f64| {
+        let mut samples = played(&key.what(), 1.8, 5.0);
+        samples.iter_mut().for_each(|s| s.force_command_n *= gain);
+        let told = |played: &mut Played<'_>| {
+            played.what.range_mm = [13.0, 17.0];
+            played.what.trained_mm_s = 20.0;
+        };
+        verdict_about(&key, &samples, told, |_| ())
+    };
+    let right = scaled(1.0);
+    assert_eq!((right.verdict, right.because), (Verdict::Ok, None));
+    let half = scaled(0.5);
+    assert!(half.verdict == Verdict::Flag && half.defects.contains(&Defect::Gain));
+}
