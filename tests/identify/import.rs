@@ -159,3 +159,59 @@ fn repeated_curves_say_how_much_a_model_can_know() {
         .code(2)
         .stderr(contains("several realizations need --validate"));
 }
+
+/// The eight realizations of `protocols/keyboard` from the measured curves, byte for byte.
+#[test]
+fn the_keyboard_switches_are_reproduced() {
+    let dir = tempfile::tempdir().unwrap();
+    Command::new("sh")
+        .arg("protocols/keyboard/identify.sh")
+        .env("STUDY", assert_cmd::cargo::cargo_bin!("study"))
+        .env("MODELS", dir.path())
+        .assert()
+        .success();
+    let mut switches = 0;
+    for entry in fs::read_dir("protocols/keyboard/models").unwrap() {
+        let shipped = entry.unwrap().path();
+        let made = dir.path().join(shipped.file_name().unwrap());
+        let same = fs::read(&shipped).unwrap() == fs::read(made).unwrap();
+        assert!(same, "{}", shipped.display());
+        switches += 1;
+    }
+    assert_eq!(switches, 8);
+}
+
+/// The four commands of the README: a raw file of the instrument becomes a session.
+#[test]
+fn from_a_raw_file_to_a_session_in_four_commands() {
+    let dir = tempfile::tempdir().unwrap();
+    let [_, table, _] = layouts(CLICKIEZ, dir.path());
+    let path = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
+    let (keys, curve, results) = (path("my-keys"), path("curve.csv"), path("results"));
+    let copied = std::process::Command::new("cp")
+        .args(["-r", "protocols/keyboard", &keys])
+        .status();
+    assert!(copied.unwrap().success());
+    study(&[
+        "import",
+        "force-curve",
+        table.to_str().unwrap(),
+        "-o",
+        &curve,
+    ])
+    .success();
+    let models = format!("{keys}/models");
+    let one = ["--method", "passive", "--dx", "0.05", "--id", "clickiez"];
+    study(
+        &[
+            &["identify", &curve][..],
+            &one,
+            &["--out", &models, "--force"],
+        ]
+        .concat(),
+    )
+    .success();
+    let with = fs::read_to_string(format!("{models}/clickiez.toml")).unwrap();
+    assert!(with.contains("measured force curve: an unnamed target"));
+    study(&["rehearse", &keys, "--participants", "1", "--out", &results]).success();
+}
