@@ -1,6 +1,7 @@
 //! A front that takes part by itself: `study run STUDY --front target/debug/examples/front`.
 //! It prints each page to standard error, and answers as soon as somebody could have read it.
 //! docs/page.md specifies the lines. A front for people shows Stop whenever `stop` is not null.
+#![allow(clippy::print_stderr, reason = "an example prints")]
 
 use serde_json::{Value, json};
 use std::io::{BufRead as _, Write as _};
@@ -29,8 +30,7 @@ fn main() -> std::io::Result<()> {
             Some("ping") => say(&json!({"does": "pong"}))?,
             Some("page") => front.show(line)?,
             Some("settled") => front.settled(&line)?,
-            // Lines of a later minor version.
-            _ => {}
+            _ => {} // Lines of a later minor version.
         }
     }
     Ok(())
@@ -91,7 +91,6 @@ fn answer(question: &Value, n: u32) -> Value {
     }
 }
 
-/// Says a line.
 fn say(line: &Value) -> std::io::Result<()> {
     let mut out = std::io::stdout().lock();
     writeln!(out, "{line}")?;
