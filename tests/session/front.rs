@@ -91,9 +91,6 @@ impl Session {
 
 impl Drop for Session {
     fn drop(&mut self) {
-        if std::thread::panicking() {
-            println!("{}", self.said());
-        }
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
@@ -285,10 +282,11 @@ impl Relay {
 
     /// What became of the last reply; pages that come meanwhile are shown.
     fn settled(&mut self) -> Value {
+        let key = json!(self.replies.to_string());
         loop {
             let line = self.line();
             match line["say"].as_str() {
-                Some("settled") if line["key"] == self.replies.to_string() => return line,
+                Some("settled") if line["key"] == key => return line,
                 Some("page") => self.page = line,
                 _ => {}
             }
