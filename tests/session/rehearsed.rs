@@ -111,6 +111,23 @@ fn a_study_of_yes_and_no_is_rehearsed_and_counted() {
     assert!(!out.contains("VAF"), "{out}");
 }
 
+/// Realizations of 0.6 N over 4 mm are played, rated and compared; who measured them is credited.
+#[test]
+fn measured_keyboard_switches_are_rehearsed_and_analyzed() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    rehearse(folder, "protocols/keyboard", &["--participants", "2"]);
+    let attempts = fs::read_to_string(folder.join("r/keyboard/attempts.csv")).unwrap();
+    assert!(!attempts.contains("device-fault"), "{attempts}");
+    let (code, out, err) = study(&["analyze", "r", "--include", "simulated"], folder);
+    assert_eq!(code, 0, "{err}");
+    for word in ["pleasantness", "preferred", "clickiez"] {
+        assert!(out.contains(word), "{word}\n{out}");
+    }
+    let report = fs::read_to_string(folder.join("r/keyboard/analysis/report.html")).unwrap();
+    assert!(report.contains("ThereminGoat"));
+}
+
 #[test]
 fn a_study_with_a_failing_device_ends_and_is_whole() {
     let folder = tempfile::tempdir().unwrap();
