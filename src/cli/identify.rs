@@ -1,6 +1,7 @@
 //! `study identify`
 
 mod args;
+mod comparison;
 mod files;
 mod loops;
 mod output;
@@ -19,11 +20,12 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 use study_base::text::Untrusted;
+use study_haptics::identify::compare::{self, Candidate, Comparison};
 use study_haptics::identify::grid::{self, Cell, Plan};
 use study_haptics::identify::mechanism::Progress;
 use study_haptics::identify::signal::{self, Acceleration, Excitation, filter};
 use study_haptics::identify::validation::{self, Ceiling, Validation};
-use study_haptics::identify::{IdentifyError, Training};
+use study_haptics::identify::{IdentifyError, Method, Training};
 use study_haptics::model::Realization;
 use study_haptics::recording::{self, Names, Recording, RecordingError, RecordingFault};
 use study_haptics::safe_play::{self, Danger};
@@ -37,6 +39,8 @@ struct Results<'a> {
     recordings: Vec<(&'a NamedPath, &'a Recording)>,
     cells: Vec<Cell>,
     best: Option<usize>,
+    /// Where methods were compared, `cells` has only the recommended one.
+    comparison: Option<Comparison>,
     /// The accuracy of the best cell on each of `recordings`.
     validations: Vec<Option<Validation>>,
     /// The ceiling of VAF on each of `recordings` that has a repetition.
@@ -110,14 +114,14 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let recordings: Vec<(&NamedPath, &Recording)> =
         recordings.iter().map(|(n, r)| (*n, r)).collect();
     let ceilings = ceilings(&recordings, &repeats)?;
-    if args.validate.is_empty() && plan.methods.len() * plan.dx_mm.len() > 1 {
+    if args.validate.is_empty() && !args.compares() && plan.methods.len() * plan.dx_mm.len() > 1 {
         return Err(Failure::usage(
             "several realizations need --validate, on which one is selected",
         )
         .hint("or ask for one, such as --method passive --dx 0.05"));
     }
 
-    let mut cells = identify(args, &plan, &training, &recordings)
+    let (mut cells, comparison) = identify(args, &plan, &training, &recordings)
         .map_err(|e| Failure::input(format!("{}: {e}", args.training[0].path.display())))?;
     let (_, first) = &training[0];
     let others = (training.iter().skip(1).map(|(n, r)| (*n, r))).chain(recordings.iter().copied());
@@ -128,6 +132,15 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     }
     let detents = validation::detents(first);
     let best = grid::best(&cells, args.validate.len());
+    let failed = match &comparison {
+        Some(comparison) => comparison.best().and_then(Candidate::failure),
+        None => best.and_then(|best| compare::failure(&cells[best])),
+    };
+    if let Some((failed, best)) = failed.zip(best) {
+        let provenance = &mut cells[best].realization.provenance;
+        let note = provenance.note.take().unwrap_or_default();
+        provenance.note = Some(format!("failed: {failed}; {note}"));
+    }
     let validations = recordings
         .iter()
         .map(|(_, recording)| {
@@ -141,11 +154,13 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         recordings,
         cells,
         best,
+        comparison,
         validations,
         ceilings,
         files: Vec::new(),
     };
-    if let Some(dir) = &args.out {
+    let all_fail = (results.comparison.as_ref()).is_some_and(|c| c.recommended.is_none());
+    if let Some(dir) = args.out.as_ref().filter(|_| !all_fail) {
         let shift = |cells: &mut [Cell], by_mm, by_n| {
             for cell in cells {
                 cell.realization.shift(by_mm);
@@ -174,7 +189,23 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     for (path, _) in &results.files {
         console.say(format!("wrote {}", path.display()));
     }
-    Ok(())
+    match (failed, best.map(|best| results.cells[best].method)) {
+        (Some(failed), Some(method)) => {
+            // a baseline is what others are compared with
+            let baseline = matches!(
+                method,
+                Method::Static | Method::Segments(_) | Method::Spring
+            );
+            let said = format!("{} failed: {failed}", method.as_str());
+            if all_fail || (args.method.is_some() && !baseline) {
+                let hint = "without --method the methods are compared on data left out";
+                return Err(Failure::input(said).hint(hint));
+            }
+            console.say(format!("warning: {said}"));
+            Ok(())
+        }
+        _ => Ok(()),
+    }
 }
 
 /// The damping that a device needs to render a realization; also for `study check`.
@@ -403,7 +434,7 @@ fn identify(
     plan: &Plan,
     training: &[(&NamedPath, Recording)],
     recordings: &[(&NamedPath, &Recording)],
-) -> Result<Vec<Cell>, IdentifyError> {
+) -> Result<(Vec<Cell>, Option<Comparison>), IdentifyError> {
     let training: Vec<&Recording> = training.iter().map(|(_, r)| r).collect();
     let training = Training::of(&training)?;
     let recordings: Vec<&Recording> = recordings.iter().map(|(_, r)| *r).collect();
@@ -421,16 +452,18 @@ fn identify(
                 .set_position(step.steps as u64);
         }
     };
-    let cells = grid::run_in_steps(
-        &training,
-        plan,
-        args.lookup,
-        &recordings,
-        cell_done,
-        step_done,
-    );
+    let found = if args.compares() {
+        compare::run(&training, args.lookup, &recordings, step_done).map(|comparison| {
+            let cells = comparison.best().map(|best| best.cell.clone());
+            (cells.into_iter().collect(), Some(comparison))
+        })
+    } else {
+        let lookup = args.lookup;
+        grid::run_in_steps(&training, plan, lookup, &recordings, cell_done, step_done)
+            .map(|cells| (cells, None))
+    };
     if let Some(bar) = bar.get() {
         bar.finish_and_clear();
     }
-    cells
+    found
 }

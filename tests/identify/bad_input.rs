@@ -260,7 +260,7 @@ fn a_travel_of_a_tenth_of_a_millimeter_or_of_meters_gives_the_same_table() {
             .arg(path("t.csv", training()))
             .arg("--validate")
             .arg(path("v.csv", rows(&[(1.5, 15.0)])))
-            .arg("--json")
+            .args(["--method", "passive", "--json"])
             .output()
             .unwrap();
         assert!(output.status.success());

@@ -270,7 +270,7 @@ fn bad_arguments_and_bad_recordings_give_one_clear_error_each() {
         2,
         "possible values: ewls, constrained, two-sided, hat, passive, mechanism, friction, static, segments, spring",
     );
-    refused(&[TRAINING], 2, "--validate");
+    refused(&[TRAINING, "--method", "ewls"], 2, "--validate");
     refused(&[TRAINING, "--validate", "absent.csv"], 1, "absent.csv: ");
 
     let dir = tempfile::tempdir().unwrap();

@@ -14,7 +14,12 @@ use study_wire::predict::Lookup;
 const GRAM_FORCE_N: f64 = 9.80665e-3;
 
 /// A measured loop of a switch, at ten samples a second.
-fn switch(name: &str) -> Recording {
+pub(crate) fn switch(name: &str) -> Recording {
+    recording::read(name, switch_text(name).as_bytes()).unwrap()
+}
+
+/// The same as text.
+pub(crate) fn switch_text(name: &str) -> String {
     let path = format!(
         "{}/tests/data/switches/{name}.csv",
         env!("CARGO_MANIFEST_DIR")
@@ -27,7 +32,7 @@ fn switch(name: &str) -> Recording {
         let x_mm = cells.next().unwrap();
         writeln!(text, "{},{x_mm},{}", 0.1 * i as f64, force * GRAM_FORCE_N).unwrap();
     }
-    recording::read(name, text.as_bytes()).unwrap()
+    text
 }
 
 /// Measured loops of a linear, a clicky and a tactile switch say nothing about mass and damping:

@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod cli;
+mod compare;
 mod estimators_switches;
 mod estimators_tables;
 mod evidence;

@@ -26,10 +26,12 @@
 
 mod banded;
 pub mod baseline;
+pub mod compare;
 pub mod constrained;
 pub mod delivery;
 pub mod evidence;
 pub mod ewls;
+pub mod folds;
 mod friction;
 pub mod grid;
 mod hat;
@@ -51,7 +53,7 @@ pub use method::Method;
 pub use problem::{Cause, IdentifyError, Warning};
 pub use samples::{Samples, Theta};
 
-use crate::model::{Branch, Provenance, Realization, Trained};
+use crate::model::{Branch, Mechanism, Provenance, Realization, Trained};
 use crate::recording::{Recording, range};
 use evidence::{Evidence, Term};
 use mechanism::{Fitted, Progress};
@@ -65,6 +67,8 @@ use study_wire::predict::{Direction, Lookup};
 #[derive(Debug)]
 pub struct Training<'r> {
     recordings: Vec<&'r Recording>,
+    /// Of their samples, where they are not all 1.
+    weights: Option<Vec<Vec<f64>>>,
     positive: Samples,
     negative: Samples,
     /// Where both directions have samples, mm.
@@ -92,8 +96,17 @@ impl<'r> Training<'r> {
     /// [`IdentifyError`] if a direction has no samples or the directions do not
     /// overlap in x.
     pub fn of(recordings: &[&'r Recording]) -> Result<Self, IdentifyError> {
-        let positive = Samples::of(recordings, |v| v > 0.0);
-        let negative = Samples::of(recordings, |v| v < 0.0);
+        Self::weighted(recordings, None)
+    }
+
+    /// [`Self::of`] samples with weights: those of weight 0 are left out. Only methods that sum over
+    /// samples in order of time use other weights than 0 and 1.
+    fn weighted(
+        recordings: &[&'r Recording],
+        weights: Option<Vec<Vec<f64>>>,
+    ) -> Result<Self, IdentifyError> {
+        let positive = Samples::of(recordings, weights.as_deref(), |v| v > 0.0);
+        let negative = Samples::of(recordings, weights.as_deref(), |v| v < 0.0);
         let names: Vec<&str> = recordings.iter().map(|r| r.name.as_str()).collect();
         let names = names.join(", ");
         let range_of = |samples: &Samples, positive| {
@@ -111,6 +124,7 @@ impl<'r> Training<'r> {
         let forces = recordings.iter().map(|r| range(&r.f_n));
         Ok(Self {
             recordings: recordings.to_vec(),
+            weights,
             positive,
             negative,
             range_mm: [low, high],
@@ -384,25 +398,25 @@ impl<'r> Training<'r> {
             recorded_hz: options.recorded_hz,
         };
         let fitted = mechanism::identify(self, settings, progress)?;
+        let method = Method::Mechanism(options);
+        Ok(Identified {
+            realization: self.of_mechanism(method, dx_mm, fitted.mechanism.clone()),
+            warnings: fitted.warnings(),
+            fitted: Some(Box::new(fitted)),
+        })
+    }
+
+    fn of_mechanism(&self, method: Method, dx_mm: f64, mechanism: Mechanism) -> Realization {
         let provenance = Provenance {
             dx_mm: Some(dx_mm),
-            ..self.provenance(Method::Mechanism(options))
+            ..self.provenance(method)
         };
         let trained = Trained {
             x_mm: self.range_mm,
             v_mm_s: self.top_speed_mm_s,
         };
-        Ok(Identified {
-            realization: Realization::of_mechanism(
-                String::new(),
-                provenance,
-                std::collections::BTreeMap::new(),
-                trained,
-                fitted.mechanism.clone(),
-            ),
-            warnings: fitted.warnings(),
-            fitted: Some(Box::new(fitted)),
-        })
+        let vaf = std::collections::BTreeMap::new();
+        Realization::of_mechanism(String::new(), provenance, vaf, trained, mechanism)
     }
 
     /// A warning about nodes where the recursion of either direction has seen few

@@ -144,7 +144,7 @@ pub(in crate::cli) struct Args {
     #[arg(long)]
     pub(super) active: bool,
 
-    /// Estimator [default: passive; ewls if an option of its recursion is given]
+    /// Estimator [default: all are compared, and one is recommended; with an option of the recursion ewls, with another one of an estimator passive]
     #[arg(long, value_enum)]
     pub(super) method: Option<MethodName>,
 
@@ -420,6 +420,22 @@ impl Args {
         self.lever.map(|lever_mm| (units, lever_mm))
     }
 
+    /// Whether methods are compared: without a method, and without an option of one.
+    pub(super) fn compares(&self) -> bool {
+        let lists = [&self.lambda, &self.dx, &self.delta];
+        self.method.is_none()
+            && self.method() == MethodName::Passive
+            && lists.iter().all(|list| list.is_empty())
+            && self.ridge.is_empty()
+            && self.terms.is_empty()
+            && self.direction.is_none()
+            && self.bounds.is_none()
+            && self.window.is_none()
+            && self.width.is_none()
+            && self.segments.is_none()
+            && !self.huber
+    }
+
     /// The estimator. The options of the paper's recursion mean this recursion.
     pub(super) fn method(&self) -> MethodName {
         let recursion = !self.lambda.is_empty()
@@ -437,6 +453,7 @@ impl Args {
         self.filter.is_some()
             || self.acceleration == Acceleration::Encoder
             || self.method() == MethodName::Mechanism
+            || self.compares()
     }
 
     /// How signals are prepared.

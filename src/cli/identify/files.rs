@@ -3,6 +3,7 @@
 use super::super::trajectory::{refuse_to_overwrite, write_file};
 use super::args::{Args, MethodName, distinct};
 use super::{Failure, Kind, Results};
+use clap::ValueEnum as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 use study_base::text::{ModelId, Untrusted};
@@ -22,22 +23,27 @@ pub(super) fn models(
     dir: &Path,
 ) -> Result<Vec<OutputFile>, Failure> {
     let several = distinct(&args.delta).len() > 1;
-    let template = args.id.as_deref().unwrap_or(match args.method() {
-        MethodName::Ewls => "lambda-{lambda}-dx-{dx}",
-        MethodName::Constrained => "constrained-lambda-{lambda}-dx-{dx}",
-        MethodName::TwoSided if args.width.is_some() => "two-sided-dx-{dx}",
-        MethodName::TwoSided => "two-sided-{lambda}-dx-{dx}",
-        MethodName::Hat if several => "hat-delta-{delta}-dx-{dx}",
-        MethodName::Hat => "hat-dx-{dx}",
-        MethodName::Passive if several => "passive-delta-{delta}-dx-{dx}",
-        MethodName::Passive => "passive-dx-{dx}",
-        MethodName::Mechanism => "mechanism-dx-{dx}",
-        MethodName::Friction if several => "friction-delta-{delta}",
-        MethodName::Friction => "friction",
-        MethodName::Static => "static-dx-{dx}",
-        MethodName::Segments => "segments",
-        MethodName::Spring => "spring",
-    });
+    let method = cells.first().map(|cell| cell.method.as_str());
+    let method = method.and_then(|name| MethodName::from_str(name, false).ok());
+    let template = args
+        .id
+        .as_deref()
+        .unwrap_or(match method.unwrap_or(args.method()) {
+            MethodName::Ewls => "lambda-{lambda}-dx-{dx}",
+            MethodName::Constrained => "constrained-lambda-{lambda}-dx-{dx}",
+            MethodName::TwoSided if args.width.is_some() => "two-sided-dx-{dx}",
+            MethodName::TwoSided => "two-sided-{lambda}-dx-{dx}",
+            MethodName::Hat if several => "hat-delta-{delta}-dx-{dx}",
+            MethodName::Hat => "hat-dx-{dx}",
+            MethodName::Passive if several => "passive-delta-{delta}-dx-{dx}",
+            MethodName::Passive => "passive-dx-{dx}",
+            MethodName::Mechanism => "mechanism-dx-{dx}",
+            MethodName::Friction if several => "friction-delta-{delta}",
+            MethodName::Friction => "friction",
+            MethodName::Static => "static-dx-{dx}",
+            MethodName::Segments => "segments",
+            MethodName::Spring => "spring",
+        });
     let mut ids: Vec<ModelId> = Vec::new();
     let mut files = Vec::new();
     for cell in cells {

@@ -1,9 +1,8 @@
 //! What `study identify` prints.
 
-use super::Results;
 use super::args::NamedPath;
-use super::loops;
-use super::printed::{Printed, align};
+use super::printed::{Printed, align, short_name};
+use super::{Results, comparison, loops};
 use serde_json::{Map, Value, json};
 use std::fmt::Write as _;
 use study_base::text::Untrusted;
@@ -104,7 +103,7 @@ pub(super) fn json(results: &Results<'_>) -> String {
             Some((named.name.clone(), document))
         })
         .collect();
-    let document = json!({
+    let mut document = json!({
         "format": "study-identify/1",
         "tool_version": env!("CARGO_PKG_VERSION"),
         "training": results.training.first().map(|(named, r)| recording(named, r, "training")),
@@ -114,6 +113,9 @@ pub(super) fn json(results: &Results<'_>) -> String {
         "force_curve": loops::json(results),
         "cells": cells,
     });
+    if let Some(comparison) = &results.comparison {
+        document["comparison"] = comparison::json(comparison);
+    }
     format!("{document:#}\n")
 }
 
@@ -267,6 +269,11 @@ pub(super) fn table(results: &Results<'_>) -> String {
             x = p.x(),
         );
     }
+    if let Some(comparison) = &results.comparison {
+        out.push('\n');
+        out += &comparison::table(results, comparison);
+        return finished(out, results);
+    }
     if let Some(cell) = results.cells.first() {
         let _ = writeln!(out, "{}", settings(cell));
     }
@@ -291,6 +298,11 @@ pub(super) fn table(results: &Results<'_>) -> String {
     }
     out.push('\n');
     out.push_str(&selection(results));
+    finished(out, results)
+}
+
+/// With the best cell in detail and the warnings.
+fn finished(mut out: String, results: &Results<'_>) -> String {
     out.push_str(&best_in_detail(results));
     out.push_str(&loops::text(results));
     for (warning, cells) in warnings(results) {
@@ -405,12 +417,6 @@ fn best_in_detail(results: &Results<'_>) -> String {
     )
 }
 
-/// The name, truncated so that the numbers stay on the screen.
-fn short_name(named: &NamedPath) -> String {
-    let name: String = named.name.chars().take(24).collect();
-    Untrusted(&name).to_string()
-}
-
 /// The settings that all cells share.
 fn settings(cell: &Cell) -> String {
     let mut parts = vec![cell.method.as_str().to_owned()];
@@ -460,7 +466,7 @@ fn has_delta(results: &Results<'_>) -> bool {
 
 fn row(results: &Results<'_>, cell: &Cell, best: bool) -> Vec<String> {
     let p = Printed::of(results);
-    let decimals = if p.units == Units::Linear { 4 } else { 6 };
+    let decimals = p.decimals();
     let provenance = &cell.realization.provenance;
     let number = |n: Option<f64>| n.map_or("-".to_owned(), |n| n.to_string());
     let memory = match (provenance.lambda, provenance.memory_mm) {

@@ -1,7 +1,9 @@
-//! Numbers in the units of the recording, and columns of text.
+//! Units, names and columns of what `study identify` prints.
 
 use super::Results;
+use super::args::NamedPath;
 use std::fmt::Write as _;
+use study_base::text::Untrusted;
 use study_haptics::model::Units;
 use unicode_width::UnicodeWidthStr as _;
 
@@ -26,6 +28,11 @@ impl Printed {
         self.units.of_n(n, self.lever_mm)
     }
 
+    /// Decimals of a force: a torque in N·m is some 30 times smaller.
+    pub(super) fn decimals(self) -> usize {
+        if self.units == Units::Linear { 4 } else { 6 }
+    }
+
     pub(super) fn x(self) -> &'static str {
         self.units.names()[0]
     }
@@ -33,6 +40,12 @@ impl Printed {
     pub(super) fn f(self) -> &'static str {
         self.units.names()[1]
     }
+}
+
+/// The name, truncated so that the numbers stay on the screen.
+pub(super) fn short_name(named: &NamedPath) -> String {
+    let name: String = named.name.chars().take(24).collect();
+    Untrusted(&name).to_string()
 }
 
 /// Columns as wide as their widest entry, right-aligned.

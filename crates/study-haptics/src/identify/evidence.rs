@@ -56,6 +56,8 @@ const SAMPLES_PER_UNKNOWN: usize = 3;
 const MOST_NODES: usize = 200;
 /// Speeds below this share of the rms speed are low.
 const LOW_SPEED: f64 = 0.2;
+/// White noise has at most this ratio of variances over two samples and over one.
+const WHITE: f64 = 1.5;
 /// Unknowns beside the nodes: m, b, s.
 const BORDER: usize = 3;
 /// Unknowns per node: C and D.
@@ -245,6 +247,17 @@ fn nodes(recordings: &[&Recording], [low, high]: [f64; 2]) -> Vec<f64> {
     (0..=count as usize)
         .map(|i| low + (high - low) * i as f64 / count)
         .collect()
+}
+
+/// The standard deviation of the noise of single samples of the force, N. `None` if it is not
+/// white, as after a low-pass: noise has the same differences over two samples as over one.
+pub(super) fn white_noise_n(recordings: &[&Recording]) -> Option<f64> {
+    let thinned: Vec<Recording> = (recordings.iter())
+        .map(|r| r.select(&(0..r.len()).step_by(2).collect::<Vec<_>>()))
+        .collect();
+    let single = noise(recordings, |r| &r.f_n);
+    let double = noise(&thinned.iter().collect::<Vec<_>>(), |r| &r.f_n);
+    (single > 0.0 && double < WHITE * single).then(|| single.sqrt())
 }
 
 /// The variance of the noise of single samples of a column: that of its third differences over

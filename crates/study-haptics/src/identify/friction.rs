@@ -6,7 +6,7 @@
 
 use super::banded::{Banded, Bound};
 use super::method::Terms;
-use super::samples::Theta;
+use super::samples::{Theta, Weights, weight_of};
 use super::vaf::motion;
 use crate::recording::Recording;
 use study_wire::predict::{Direction, DirectionState};
@@ -20,19 +20,21 @@ pub(super) fn parameters(
     recordings: &[&Recording],
     rule: Direction,
     terms: Terms,
+    weights: Weights<'_>,
 ) -> Option<[Theta; 2]> {
     let mut normal = Banded::zero(UNKNOWNS, UNKNOWNS - 1);
     let mut right = [0.0; UNKNOWNS];
-    for recording in recordings {
+    for (r, recording) in recordings.iter().enumerate() {
         let mut state = DirectionState::default();
         for i in 0..recording.len() {
             let motion = motion(recording, i);
             let z = state.step(rule, motion);
+            let trust = weight_of(weights, r, i);
             let features = [motion.a_m_s2, motion.v_mm_s, z, 1.0];
             for (row, one) in features.into_iter().enumerate() {
-                right[row] += one * recording.f_n[i];
+                right[row] += trust * one * recording.f_n[i];
                 for (column, other) in features[..=row].iter().enumerate() {
-                    normal.add(row, column, one * other);
+                    normal.add(row, column, trust * one * other);
                 }
             }
         }

@@ -13,7 +13,7 @@
 //! node.
 
 use super::banded::{Banded, Bound};
-use super::samples::Theta;
+use super::samples::{Theta, Weights, weight_of};
 use super::vaf::motion;
 use crate::recording::Recording;
 use study_wire::predict::{Direction, DirectionState, Lookup, locate};
@@ -52,11 +52,13 @@ pub(super) fn table(
     lookup: Lookup,
     rule: Direction,
     penalty: Penalty,
+    weights: Weights<'_>,
 ) -> Option<HatTable> {
     let n = nodes.len() * PER_NODE;
     let mut normal = Banded::zero(n, HALF);
     let mut right = vec![0.0; n];
     let mut weight = vec![[0.0; 2]; nodes.len()];
+    let mut total = 0.0;
     let mut state = DirectionState::default();
     let samples = (recordings.iter().enumerate())
         .flat_map(|(r, recording)| (0..recording.len()).map(move |i| (r, i)));
@@ -67,6 +69,11 @@ pub(super) fn table(
         }
         let motion = motion(recording, i);
         let z = state.step(rule, motion);
+        let trust = weight_of(weights, r, i);
+        if trust == 0.0 {
+            continue;
+        }
+        total += trust;
         let sides = [0.5 * (1.0 + z), 0.5 * (1.0 - z)];
         let features = [motion.a_m_s2, motion.v_mm_s / B_SCALE, 1.0];
         let (left, share) = locate(nodes, lookup, motion.x_mm);
@@ -80,7 +87,7 @@ pub(super) fn table(
                 if part == 0.0 {
                     continue;
                 }
-                weight[node][side] += hat * part;
+                weight[node][side] += trust * hat * part;
                 for (p, feature) in features.into_iter().enumerate() {
                     entries[used] = (node * PER_NODE + side * 3 + p, hat * part * feature);
                     used += 1;
@@ -89,14 +96,13 @@ pub(super) fn table(
         }
         let entries = &entries[..used];
         for (k, (row, one)) in entries.iter().enumerate() {
-            right[*row] += one * recording.f_n[i];
+            right[*row] += trust * one * recording.f_n[i];
             for (column, other) in &entries[..=k] {
-                normal.add(*row, *column, one * other);
+                normal.add(*row, *column, trust * one * other);
             }
         }
     }
-    let samples: usize = recordings.iter().map(|r| r.len()).sum();
-    let information = samples as f64 / nodes.len() as f64;
+    let information = total / nodes.len() as f64;
     add_ridges(&mut normal, nodes.len(), information, penalty);
     let [m, b] = penalty.dynamics;
     let of_node = [m, b, Bound::Free];

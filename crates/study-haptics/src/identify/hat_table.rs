@@ -7,6 +7,7 @@ use super::hat::{self, HatTable, Penalty};
 use super::method::{Delta, Friction, Hat, Method, Passive, Segments, State};
 use super::passive;
 use super::resample::Resampled;
+use super::samples::Weights;
 use super::{Cause, Identified, IdentifyError, Theta, Training, Warning, two_sided, vaf};
 use crate::model::Provenance;
 use study_wire::predict::{Direction, Lookup};
@@ -34,7 +35,7 @@ const HUBER_STEPS: usize = 4;
 
 /// The rms error of the chosen δ over the least one is at most this. Chosen, together
 /// with the ridge on m and b, on simulated switches: see `docs/estimators.md`.
-const TOLERANCE: f64 = 1.1;
+pub(super) const TOLERANCE: f64 = 1.1;
 
 impl Training<'_> {
     /// All nodes at once, by penalized least squares, with a direction state.
@@ -79,7 +80,7 @@ impl Training<'_> {
             ridge_damping: options.ridge_damping,
             terms: options.terms,
         };
-        let weighted = |rule, weights: Option<&[Vec<f64>]>| -> Result<Identified, IdentifyError> {
+        let weighted = |rule, weights: Weights<'_>| -> Result<Identified, IdentifyError> {
             let HatTable {
                 positive,
                 negative,
@@ -89,7 +90,7 @@ impl Training<'_> {
             Ok(self.hats(nodes.clone(), [positive, negative], &weight, rule, lookup))
         };
         let mut identified = self.with_state((options.state, BELOW_TABLE), |rule| {
-            let mut identified = weighted(rule, None)?;
+            let mut identified = weighted(rule, self.weights.as_deref())?;
             for _ in 0..if options.huber { HUBER_STEPS } else { 0 } {
                 identified = weighted(rule, Some(&self.huber(&identified)))?;
             }
@@ -111,9 +112,14 @@ impl Training<'_> {
         let samples: usize = self.recordings.iter().map(|r| r.len()).sum();
         let weight = [[0.5 * samples as f64; 2]; 2];
         let mut identified = self.with_state((options.state, BELOW_FRICTION), |rule| {
-            let sides = friction::parameters(&self.recordings, rule, options.terms)
-                .ok_or(IdentifyError::Undetermined)?
-                .map(|theta| vec![theta; 2]);
+            let sides = friction::parameters(
+                &self.recordings,
+                rule,
+                options.terms,
+                self.weights.as_deref(),
+            )
+            .ok_or(IdentifyError::Undetermined)?
+            .map(|theta| vec![theta; 2]);
             Ok(self.hats(self.range_mm.to_vec(), sides, &weight, rule, lookup))
         })?;
         identified.realization.provenance = self.provenance(Method::Friction(options));
@@ -152,6 +158,27 @@ impl Training<'_> {
         }
     }
 
+    /// The lengths that a table may have, ascending, mm.
+    pub(super) fn deltas_mm(&self) -> Vec<f64> {
+        let least_mm = self.least_delta_mm(BELOW_TABLE[0]);
+        let most_mm = SCAN[1] * (self.range_mm[1] - self.range_mm[0]);
+        let steps = ((most_mm / least_mm).ln() / STEP.ln()).round() as i32;
+        (0..=steps)
+            .map(|i| rounded(least_mm * STEP.powi(i)))
+            .collect()
+    }
+
+    /// A share of the travel, or what the encoder needs.
+    fn least_delta_mm(&self, share: f64) -> f64 {
+        let travel_mm = self.range_mm[1] - self.range_mm[0];
+        let counts = (self.recordings.iter())
+            .filter_map(|r| r.resolution_mm())
+            .fold(0.0, f64::max);
+        (share * travel_mm)
+            .max(LEAST_COUNTS * counts)
+            .min(0.5 * SCAN[1] * travel_mm)
+    }
+
     /// The table with the shortest δ whose rms error on the recordings is within
     /// [`TOLERANCE`] of the least. Tried are lengths in a geometric series from 1/100 to
     /// 1/4 of the travel, or below it, down to a share `floor` of it, while the error falls, then golden sections around the best.
@@ -163,17 +190,9 @@ impl Training<'_> {
         [floor, share]: [f64; 2],
         table: impl Fn(f64) -> Result<Identified, IdentifyError>,
     ) -> Result<Identified, IdentifyError> {
-        let travel_mm = self.range_mm[1] - self.range_mm[0];
-        let counts = (self.recordings.iter())
-            .filter_map(|r| r.resolution_mm())
-            .fold(0.0, f64::max);
-        let at_least = |share: f64| {
-            (share * travel_mm)
-                .max(LEAST_COUNTS * counts)
-                .min(0.5 * SCAN[1] * travel_mm)
-        };
+        let at_least = |share| self.least_delta_mm(share);
         let least_mm = at_least(SCAN[0]);
-        let most_mm = SCAN[1] * travel_mm;
+        let most_mm = SCAN[1] * (self.range_mm[1] - self.range_mm[0]);
         let attempt = |delta_mm: f64| -> Result<(f64, f64, Identified), IdentifyError> {
             let identified = table(delta_mm)?;
             let (mut square, mut samples) = (0.0, 0.0);
@@ -285,8 +304,15 @@ impl Training<'_> {
             positive,
             negative,
             weight,
-        } = hat::table(&self.recordings, &nodes, lookup, rule, penalty)
-            .ok_or(IdentifyError::Undetermined)?;
+        } = hat::table(
+            &self.recordings,
+            &nodes,
+            lookup,
+            rule,
+            penalty,
+            self.weights.as_deref(),
+        )
+        .ok_or(IdentifyError::Undetermined)?;
         Ok(self.hats(nodes, [positive, negative], &weight, rule, lookup))
     }
 

@@ -16,6 +16,7 @@ mod start;
 #[cfg(test)]
 mod tests;
 
+use super::samples::weight_of;
 use super::signal::{LowPass, SignalError, sampling_interval_s};
 use super::{IdentifyError, Training, Warning};
 use crate::model::Mechanism;
@@ -43,6 +44,8 @@ const STARTED_S: f64 = 20.0;
 const UNSURE: f64 = 0.5;
 /// Largest number of steps of the comparison and of the fit.
 const ITERATIONS: [usize; 2] = [12, 40];
+/// The same when a fit is repeated on a part of the recordings.
+const REFITTED: usize = 8;
 
 /// Options of the identification.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -222,9 +225,9 @@ pub fn identify(
         .par_iter()
         .filter_map(|i| {
             let begun = &begun[*i].as_ref()?.mechanism;
-            let from = reach::held(begun, &reach::of(begun, recordings));
+            let from = reach::held(begun, &reach::of(begun, recordings, None));
             let mut fit = fit(&from, &whole, PREDICTED_HZ, ITERATIONS[1])?;
-            fit.mechanism = reach::bridged(fit.mechanism, &reach::of(&from, recordings));
+            fit.mechanism = reach::bridged(fit.mechanism, &reach::of(&from, recordings, None));
             Some((*i, fit))
         })
         .collect();
@@ -235,7 +238,7 @@ pub fn identify(
         .min_by(|a, b| a.1.rms_n.total_cmp(&b.1.rms_n))
         .ok_or(IdentifyError::NoMechanism)?;
     Ok(Fitted {
-        reach_mm: reach::of(&best.mechanism, recordings).range_mm,
+        reach_mm: reach::of(&best.mechanism, recordings, None).range_mm,
         filter,
         standard_errors: best.standard_errors,
         mechanism: Mechanism {
@@ -248,6 +251,23 @@ pub fn identify(
         attempts,
         iterations: best.iterations,
     })
+}
+
+/// A mechanism fitted to the samples whose weight is not 0, from where a fit ended, with the same
+/// low-pass; `None` if the recordings do not suit it.
+pub(super) fn refitted(fitted: &Fitted, training: &Training<'_>) -> Option<Mechanism> {
+    let compared: Vec<Compared<'_>> = (training.recordings.iter().enumerate())
+        .map(|(r, recording)| {
+            let mut compared = Compared::new(recording, fitted.filter, f64::INFINITY).ok()?;
+            compared.keep(|i| weight_of(training.weights.as_deref(), r, i) > 0.0);
+            Some(compared)
+        })
+        .collect::<Option<_>>()?;
+    let top_mm_s = 2.0 * training.top_speed_mm_s;
+    let reach = |of| reach::of(of, &training.recordings, training.weights.as_deref());
+    let from = reach::held(&fitted.mechanism, &reach(&fitted.mechanism));
+    let fit = levenberg::fit(&from, &compared, STARTED_HZ, REFITTED, top_mm_s, &|| ())?;
+    Some(reach::bridged(fit.mechanism, &reach(&from)))
 }
 
 /// The force of each sample of a recording, N, after the low-pass that the recorded force

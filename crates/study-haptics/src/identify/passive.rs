@@ -12,6 +12,7 @@
 use super::banded::{Banded, Bound};
 use super::hat::HatTable;
 use super::method::Terms;
+use super::samples::{Weights, weight_of};
 use super::vaf::motion;
 use crate::recording::Recording;
 use study_wire::predict::{Direction, DirectionState, Lookup, locate};
@@ -32,14 +33,13 @@ pub(super) struct Penalty {
 }
 
 /// The table of least cost; `None` if recordings and ridges leave it undetermined.
-/// `weights` of the samples of each recording, all 1 if `None`.
 pub(super) fn table(
     recordings: &[&Recording],
     nodes: &[f64],
     lookup: Lookup,
     rule: Direction,
     penalty: Penalty,
-    weights: Option<&[Vec<f64>]>,
+    weights: Weights<'_>,
 ) -> Option<HatTable> {
     let n = nodes.len() * PER_NODE;
     let mass = n;
@@ -52,7 +52,10 @@ pub(super) fn table(
         for i in 0..recording.len() {
             let motion = motion(recording, i);
             let z = state.step(rule, motion);
-            let trust = weights.map_or(1.0, |weights| weights[r][i]);
+            let trust = weight_of(weights, r, i);
+            if trust == 0.0 {
+                continue;
+            }
             let sides = [0.5 * (1.0 + z), 0.5 * (1.0 - z)];
             let (left, share) = locate(nodes, lookup, motion.x_mm);
             let mut entries = [(0, 0.0); 2 * PER_NODE + 1];

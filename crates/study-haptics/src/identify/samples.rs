@@ -31,12 +31,25 @@ pub struct Samples {
     pub f_n: Vec<f64>,
 }
 
+/// The weight of every sample of every recording; `None`: all 1.
+pub(super) type Weights<'w> = Option<&'w [Vec<f64>]>;
+
+/// The weight of sample `i` of recording `r`.
+pub(super) fn weight_of(weights: Weights<'_>, r: usize, i: usize) -> f64 {
+    weights.map_or(1.0, |weights| weights[r][i])
+}
+
 impl Samples {
-    /// The samples of `recordings` whose velocity satisfies `belongs`.
-    pub(super) fn of(recordings: &[&Recording], belongs: impl Fn(f64) -> bool) -> Self {
+    /// The samples of `recordings` whose weight is not 0 and whose velocity satisfies `belongs`.
+    pub(super) fn of(
+        recordings: &[&Recording],
+        weights: Weights<'_>,
+        belongs: impl Fn(f64) -> bool,
+    ) -> Self {
         let mut all = Self::default();
-        for r in recordings {
-            for i in (0..r.len()).filter(|i| belongs(r.v_mm_s[*i])) {
+        for (k, r) in recordings.iter().enumerate() {
+            let counts = |i: &usize| belongs(r.v_mm_s[*i]) && weight_of(weights, k, *i) > 0.0;
+            for i in (0..r.len()).filter(counts) {
                 all.x_mm.push(r.x_mm[i]);
                 all.v_mm_s.push(r.v_mm_s[i]);
                 all.a_m_s2.push(r.a_m_s2[i]);

@@ -47,9 +47,9 @@ pub(super) struct Compared<'r> {
     low_pass: LowPass,
     /// The measured force, averaged and low-passed, N.
     force_n: Vec<f64>,
-    /// Every so many averaged samples count, from the first of them.
+    /// The averaged samples that count, and how far apart they are.
+    rows: Vec<usize>,
     stride: usize,
-    first: usize,
 }
 
 /// The squared error and, if asked for, its normal equations.
@@ -87,6 +87,7 @@ impl<'r> Compared<'r> {
             Filter::Both(_) => low_pass.zero_phase(&force_n),
             Filter::Recorded(_) => force_n,
         };
+        let stride = ((rate_hz / corner_hz / PER_PERIOD) as usize).max(1);
         Ok(Self {
             recording,
             samples,
@@ -94,9 +95,17 @@ impl<'r> Compared<'r> {
             block,
             low_pass,
             force_n,
-            stride: ((rate_hz / corner_hz / PER_PERIOD) as usize).max(1),
-            first: (SETTLING_S * rate_hz) as usize,
+            rows: ((SETTLING_S * rate_hz) as usize..samples / block)
+                .step_by(stride)
+                .collect(),
+            stride,
         })
+    }
+
+    /// Only these samples of the recording count.
+    pub(super) fn keep(&mut self, counts: impl Fn(usize) -> bool) {
+        let block = self.block;
+        self.rows.retain(|row| counts(row * block));
     }
 
     /// Steps of the mechanism per sample so that none is longer than 1/`least_hz`.
@@ -110,9 +119,7 @@ impl<'r> Compared<'r> {
 
     /// The error of the low-passed force at the samples that count.
     fn errors<'f>(&'f self, force_n: &'f [f64]) -> impl Iterator<Item = f64> + 'f {
-        (self.first..self.force_n.len())
-            .step_by(self.stride)
-            .map(move |i| force_n[i] - self.force_n[i])
+        (self.rows.iter()).map(move |i| force_n[*i] - self.force_n[*i])
     }
 
     /// The force of a mechanism before the low-pass, N.
@@ -166,7 +173,7 @@ impl<'r> Compared<'r> {
                     return vec![0.0; errors.len()];
                 }
                 let low = self.low_pass.zero_phase(column);
-                (low[self.first..].iter().step_by(self.stride).copied()).collect()
+                self.rows.iter().map(|i| low[*i]).collect()
             })
             .collect();
         let mut normal = vec![0.0; parameters * parameters];

@@ -5,6 +5,7 @@
 //! the force of the target, and a faster hand than the recorded one takes the follower there.
 
 use super::{STARTED_HZ, follow};
+use crate::identify::samples::{Weights, weight_of};
 use crate::model::{Mechanism, Profile};
 use crate::recording::Recording;
 
@@ -20,12 +21,13 @@ pub(super) struct Reach {
     nodes: Vec<bool>,
 }
 
-/// The reach of a mechanism on recordings.
-pub(super) fn of(mechanism: &Mechanism, recordings: &[&Recording]) -> Reach {
+/// The reach of a mechanism on the samples whose weight is not 0.
+pub(super) fn of(mechanism: &Mechanism, recordings: &[&Recording], weights: Weights<'_>) -> Reach {
     let detent = &mechanism.detent;
     let mut range_mm = [f64::INFINITY, f64::NEG_INFINITY];
     let mut time_s = vec![0.0; detent.n.len()];
-    for recording in recordings {
+    for (r, recording) in recordings.iter().enumerate() {
+        let mut i = 0;
         let sample_s = recording.duration_s() / recording.len() as f64;
         follow(
             &mechanism.view(),
@@ -33,6 +35,10 @@ pub(super) fn of(mechanism: &Mechanism, recordings: &[&Recording]) -> Reach {
             recording.len(),
             STARTED_HZ,
             |state| {
+                i += 1;
+                if weight_of(weights, r, i - 1) == 0.0 {
+                    return;
+                }
                 let y_mm = state.y_mm();
                 range_mm = [range_mm[0].min(y_mm), range_mm[1].max(y_mm)];
                 let node = ((y_mm - detent.first_mm) / detent.step_mm).round();

@@ -126,7 +126,7 @@ fn values_that_no_data_reached_are_held() {
         wild.detent.n[i] = 30.0;
     }
     // the handle is at −4.8 to 4.8 mm
-    let reach = reach::of(&truth(), &[&part(0..12_000, 0.8, 0.0)]);
+    let reach = reach::of(&truth(), &[&part(0..12_000, 0.8, 0.0)], None);
     assert!(reach.range_mm[0] > -6.0 && reach.range_mm[1] < 6.0);
     let held = reach::held(&wild, &reach);
     let [low, high] = reach.range_mm;
@@ -142,7 +142,7 @@ fn values_that_no_data_reached_are_held() {
     // two parts of the travel
     let parts = [part(0..900, 0.2, -4.0), part(3000..3900, 0.2, 4.0)];
     wild.detent.n[7] = 30.0;
-    let reach = reach::of(&truth(), &[&parts[0], &parts[1]]);
+    let reach = reach::of(&truth(), &[&parts[0], &parts[1]], None);
     let bridged = reach::bridged(wild, &reach);
     assert!(bridged.detent.n[7].abs() < 5.0, "{:?}", bridged.detent.n);
 }

@@ -1,0 +1,117 @@
+//! What `study identify` prints of a comparison of methods.
+
+use super::printed::{Printed, align, short_name};
+use super::{Results, args::NamedPath};
+use serde_json::{Value, json};
+use std::fmt::Write as _;
+use study_haptics::identify::compare::{Candidate, Comparison};
+
+/// One table and one sentence.
+pub(super) fn table(results: &Results<'_>, comparison: &Comparison) -> String {
+    let p = Printed::of(results);
+    let (x, f) = (p.x(), p.f());
+    let named: Vec<&NamedPath> = results.recordings.iter().map(|(named, _)| *named).collect();
+    let mut heads: Vec<String> = ["", "method"].map(String::from).into();
+    heads.extend([format!("dx {x}"), format!("delta {x}")]);
+    heads.extend(["VAF left out".into(), format!("residual {f}")]);
+    heads.extend(
+        named
+            .iter()
+            .map(|named| format!("VAF {}", short_name(named))),
+    );
+    heads.push("passive".into());
+    let mut rows = vec![heads];
+    for (i, candidate) in comparison.candidates.iter().enumerate() {
+        let realization = &candidate.cell.realization;
+        let length = |mm: Option<f64>| mm.map_or("-".into(), |mm| format!("{:.3}", p.length(mm)));
+        let mark = match comparison.recommended == Some(i) {
+            true => "*",
+            false => "",
+        };
+        let mut row = vec![mark.to_owned(), candidate.cell.method.as_str().to_owned()];
+        row.push(length(realization.provenance.dx_mm));
+        row.push(length(realization.direction.delta_mm()));
+        let decimals = p.decimals();
+        row.extend(match &candidate.left_out {
+            Some(l) => [
+                format!("{:.4}", l.vaf),
+                format!("{:.decimals$}", p.force(l.rms_n)),
+            ],
+            None => ["-", "-"].map(String::from),
+        });
+        row.extend((candidate.cell.scores.iter()).map(|score| format!("{:.4}", score.vaf)));
+        let passes = candidate.cell.certificate.passes();
+        row.push(if passes { "PASS" } else { "FAIL" }.to_owned());
+        rows.push(row);
+    }
+    let left_out = match comparison.whole_strokes {
+        true => "strokes",
+        false => "tenths of the travel in one direction",
+    };
+    let mut out = format!(
+        "VAF left out: on {left_out} that were left out of the training, a fifth at a time\n{}",
+        align(&rows)
+    );
+    for candidate in &comparison.candidates {
+        if let Some(failure) = candidate.failure() {
+            let _ = writeln!(out, "{} failed: {failure}", candidate.cell.method.as_str());
+        }
+    }
+    if let Some(why) = &comparison.not_tried {
+        let _ = writeln!(out, "mechanism not tried: {why}");
+    }
+    let _ = writeln!(out, "\n{}", sentence(p, comparison));
+    out
+}
+
+/// The recommendation with its reason.
+fn sentence(p: Printed, comparison: &Comparison) -> String {
+    let decimals = p.decimals();
+    let name = |i: usize| comparison.candidates[i].cell.method.as_str();
+    let rms_n = |i: usize| comparison.candidates[i].left_out.map_or(0.0, |l| l.rms_n);
+    let Some(best) = comparison.recommended else {
+        return "no method is recommended: all fail".into();
+    };
+    let shown = |n: f64| format!("{:.decimals$} {}", p.force(n), p.f());
+    let noise = match comparison.noise_n {
+        Some(noise_n) => format!(" (noise of the force: {})", shown(noise_n)),
+        None => String::new(),
+    };
+    let against = match comparison.second {
+        None => "and every other one fails".to_owned(),
+        Some(next) => {
+            let (next, ratio) = (name(next), rms_n(next) / rms_n(best));
+            match ratio {
+                1.0.. => format!("{ratio:.2} times less than that of {next}, the next best"),
+                _ => format!("hardly more than that of {next}, and it is preferred to {next}"),
+            }
+        }
+    };
+    format!(
+        "recommended: {}, because its residual on data left out is {}{noise}, {against}",
+        name(best),
+        shown(rms_n(best)),
+    )
+}
+
+pub(super) fn json(comparison: &Comparison) -> Value {
+    let candidate = |candidate: &Candidate| {
+        json!({
+            "method": candidate.cell.method.as_str(),
+            "vaf_left_out": candidate.left_out.map(|l| l.vaf),
+            "residual_left_out_n": candidate.left_out.map(|l| l.rms_n),
+            "dx_mm": candidate.cell.realization.provenance.dx_mm,
+            "vaf": candidate.cell.realization.vaf,
+            "certificate_pass": candidate.cell.certificate.passes(),
+            "failed": candidate.failure().map(|failure| failure.to_string()),
+        })
+    };
+    let candidates: Vec<Value> = comparison.candidates.iter().map(candidate).collect();
+    json!({
+        "candidates": candidates,
+        "recommended": comparison.recommended,
+        "mechanism_not_tried": comparison.not_tried,
+        "noise_n": comparison.noise_n,
+        "whole_strokes": comparison.whole_strokes,
+    })
+}
