@@ -209,6 +209,12 @@ mod tests {
         for (name, code) in &codes_of_all {
             assert!(!name.as_str().contains(code.as_str()));
         }
+        // no code is part of any name, where there are enough others
+        let names: Vec<ModelId> = (100..200).map(|i| id(&format!("m{i}"))).collect();
+        let all: Vec<&ModelId> = names.iter().collect();
+        let codes_of_all = codes(2007, &all);
+        let in_a_name = |code: &String| names.iter().any(|n| n.as_str().contains(code.as_str()));
+        assert!(!codes_of_all.values().any(in_a_name));
         // the same ids again, and with one more at the end
         let names: Vec<ModelId> = ["real", "copy", "spring"].map(id).to_vec();
         let three: Vec<&ModelId> = names.iter().collect();

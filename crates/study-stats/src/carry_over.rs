@@ -203,6 +203,8 @@ mod tests {
                 .collect();
             let mean = found.iter().map(|f| f.slope).sum::<f64>() / studies as f64;
             assert!((mean - carried).abs() < bias, "{carried}: {mean}");
+            let without_0 = |f: &CarryOver| f.ci95.0 * f.ci95.1 > 0.0;
+            assert!(found.iter().all(|f| without_0(f) == (f.p <= 0.05)));
             let rejected = found.iter().filter(|f| f.p <= 0.05).count() as f64 / studies as f64;
             if carried > 0.0 {
                 assert!(rejected > 0.5, "{rejected}");

@@ -478,6 +478,17 @@ mod tests {
         }
     }
 
+    /// c = −(z(H) + z(F))/2, and −(z(H) + z(F))/√2 of two intervals (Macmillan & Creelman 2005,
+    /// equations 2.1 and 7.5): whoever often says "yes" has a criterion below 0. Rates .95 and
+    /// .45: z = 1.644854 and −0.125661 (R 4.2, `qnorm`).
+    #[test]
+    fn a_liberal_criterion_is_negative() {
+        let liberal = answers(9.0, 9.0, 4.0, 9.0);
+        close(yes_no(&liberal).unwrap().criterion, -0.759_596, 1e-6);
+        let bias = two_alternative(&liberal).unwrap().interval_bias;
+        close(bias, -1.074_231, 1e-6);
+    }
+
     /// The worked values of Macmillan & Creelman (2005), chapters 7 and 9, by psyphy
     /// 0.3 in R: ABX with H .75, F .3; same–different with H .6, F .3.
     #[test]

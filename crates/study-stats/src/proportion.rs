@@ -120,6 +120,10 @@ mod tests {
         assert!((found.n_effective - 9.0).abs() < 1e-12);
         let (low, high) = found.ci95.unwrap();
         assert!(low > 0.15 && low < 0.25 && (low + high - 1.0).abs() < 1e-12);
+        // Clusters that are more alike than by chance are no more than their trials.
+        let alike = [(5.0, 10.0); 8].iter().chain(&[(4.0, 10.0), (6.0, 10.0)]);
+        let found = share(&alike.copied().collect::<Vec<_>>()).unwrap();
+        assert_eq!(found.n_effective, 100.0);
     }
 
     #[test]

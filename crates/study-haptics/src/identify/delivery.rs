@@ -101,6 +101,15 @@ mod tests {
             near(delivery.vaf(1.0, 1e-3 * delay_ms), expected, 0.01);
         }
         assert!(delivery.vaf(1.0, 0.0).unwrap() > delivery.vaf(1.0, 0.001).unwrap());
+        // A playback that is 20 ms late delivers a target that is as late.
+        let late: Vec<f64> = (0..3000)
+            .map(|i| ((f64::from(i) - 20.0) * 1e-3 * std::f64::consts::TAU * 2.0).sin())
+            .collect();
+        let delivered = Delivery {
+            recorded_n: late.into(),
+            ..exact()
+        };
+        near(delivered.vaf(1.0, 0.02), 1.0, 1e-9);
         assert_eq!(delivery.vaf(f64::NAN, 0.0), None);
         assert_eq!(delivery.vaf(1.0, 4.0), None);
     }

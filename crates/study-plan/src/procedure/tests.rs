@@ -232,6 +232,25 @@ fn targets_are_those_of_the_literature() {
 }
 
 #[test]
+fn a_step_up_is_longer_by_its_factor() {
+    let rule = Rule::Staircase(Staircase {
+        step_up_factor: 3.0,
+        ..staircase()
+    });
+    let level = |positive| {
+        let mut track = Track::new(&rule, &ladder(), &mut stream()).unwrap();
+        track.answer(&Answer {
+            presented: 1.0,
+            positive,
+            easy: false,
+        });
+        track.next().unwrap().level
+    };
+    assert!((level(true) - 0.8).abs() < 1e-12);
+    assert!((level(false) - 1.6).abs() < 1e-12);
+}
+
+#[test]
 fn the_ladder_takes_the_nearest_level() {
     let ladder = Ladder::new(vec![0.0, 1.0, 3.0]).unwrap();
     let steps = [-1.0, 0.4, 0.5, 0.6, 2.0, 2.1, 9.0].map(|x| ladder.nearest(x));

@@ -211,6 +211,28 @@ mod tests {
     }
 
     #[test]
+    fn the_intake_is_asked_in_the_first_session() {
+        let mut protocol = crate::protocol::example::protocol(2, 1);
+        protocol.intake = protocol.questions.clone();
+        protocol.sessions = ["first", "second"]
+            .map(|id| SessionPlan {
+                id: PartId::new(id).unwrap(),
+                parts: None,
+                min_gap_h: 24.0,
+                max_gap_h: None,
+            })
+            .to_vec();
+        let asked = |session: usize| {
+            let assigned = Assigned {
+                session_id: Some(protocol.sessions[session].id.clone()),
+                ..Assigned::default()
+            };
+            protocol.of(&assigned).intake.len()
+        };
+        assert_eq!([asked(0), asked(1)], [2, 0]);
+    }
+
+    #[test]
     fn pilots_do_not_take_a_place_of_a_row() {
         let groups = groups(&[1, 1]);
         let differs = |n| groups.of_seat(7, Seat::Row(n)) != groups.of_seat(7, Seat::Pilot(n));

@@ -56,6 +56,12 @@ fn parts_add_up_and_a_constant_error_is_in_the_nrmse_only() {
     assert_eq!(detents, r.len());
     let still = r.v_mm_s.iter().filter(|v| **v == 0.0).count();
     assert_eq!(of(plain.positive) + of(plain.negative) + still, r.len());
+    // An error of one direction is found there.
+    let forwards = |_, x, v: f64| switch(x, v) - if v > 0.0 { 1.5 } else { 0.0 };
+    let off = validate(&found.realization, &recording("f", forwards), &[]).unwrap();
+    let bias = |part: Option<Accuracy>| part.unwrap().bias_n;
+    assert!((bias(off.positive) - bias(plain.positive) - 1.5).abs() < 1e-9);
+    assert!((bias(off.negative) - bias(plain.negative)).abs() < 1e-9);
 }
 
 #[test]

@@ -96,6 +96,8 @@ fn a_turning_handle_is_read_at_its_lever_arm() {
         degrees.positive.k_n_per_mm[0],
         0.4 * std::f64::consts::PI / 180.0
     ));
+    // 100 mm/s at 20 mm are 5 rad/s.
+    assert!(close(degrees.trained.v_mm_s, 5f64.to_degrees()));
     let mixed = write(&degrees).replace("f = \"N·m\"", "f = \"N\"");
     let (read, findings) = parse("a.toml", &mixed);
     assert!(read.is_none());

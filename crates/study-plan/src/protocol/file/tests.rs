@@ -378,6 +378,13 @@ fn duplicates_practice_and_primary_refer_to_existing_ids() {
         changed("primary = \"realism\"", "primary = \"realsim\""),
         ["there is no question `realsim`"]
     );
+    assert_eq!(
+        changed(
+            "primary = \"realism\"",
+            "primary = \"realism\"\nrealistic_from = 9"
+        ),
+        ["`analysis.realistic_from` is outside the scale of `realism`"]
+    );
     let chain = LEAST.replacen("file = \"a.toml\"", "duplicate_of = \"b\"", 1)
         + "[[models]]\nid = \"c\"\nduplicate_of = \"a\"\n";
     assert_eq!(messages(&chain), ["`a` is itself a duplicate, of `b`"]);

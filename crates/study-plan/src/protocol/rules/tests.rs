@@ -127,6 +127,24 @@ fn a_mean_at_the_limit_is_not_below_it() {
     assert_eq!(rule.judge(&below).unwrap().excluded, [true, true, false]);
 }
 
+/// One duplicate is rated 2 higher, the other 2 lower.
+#[test]
+fn distances_of_two_duplicates_do_not_cancel() {
+    let mut trials = trials(vec![
+        rated(0, 0, 1.0),
+        rated(0, 1, 3.0),
+        rated(0, 2, 5.0),
+        rated(0, 3, 3.0),
+    ]);
+    trials.realizations.push(Realization {
+        hidden_reference: false,
+        duplicate_of: Some(2),
+    });
+    assert_eq!(trials.repeat_distances()[0], Some(2.0));
+    let judged = Exclusion::Inconsistent(1.5).judge(&trials).unwrap();
+    assert_eq!(judged.excluded, [true; 4]);
+}
+
 #[test]
 fn a_rule_says_why_it_can_judge_nothing() {
     let answers = |rule: Exclusion, answers, of_a_part| {
