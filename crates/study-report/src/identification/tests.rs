@@ -150,6 +150,7 @@ fn a_hat_table_shows_its_slope() {
     for branch in [&mut table.positive, &mut table.negative] {
         branch.k_n_per_mm = vec![0.0; 3];
     }
+    table.negative.m_kg = vec![0.2; 3];
     let figure = parameters(&table, Shown::LINEAR).figure;
     assert_eq!(
         figure.panels[2].y.label,
@@ -162,6 +163,14 @@ fn a_hat_table_shows_its_slope() {
     let named = |p: &Panel| p.series.iter().filter(|s| s.name.is_some()).count();
     let legends: Vec<usize> = figure.panels.iter().map(named).collect();
     assert_eq!(legends, [2, 0, 0, 0]);
+    let masses = figure.panels[0].series.iter().filter_map(|s| {
+        let Mark::Line(points) = &s.mark else {
+            return None;
+        };
+        Some((s.name.as_deref()?, points[0].1))
+    });
+    let masses: Vec<(&str, f64)> = masses.collect();
+    assert_eq!(masses, [("v > 0", 0.1), ("v < 0", 0.2)]);
     let titles: Vec<&str> = figure.panels.iter().map(|p| p.title.as_str()).collect();
     assert_eq!(titles, ["a", "b", "c", "d"]);
     let Mark::Line(zero) = &figure.panels[3].series[0].mark else {

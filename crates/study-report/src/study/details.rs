@@ -214,3 +214,20 @@ fn order(order: &Order) -> &'static str {
         Order::File(_) => "read from a prepared file",
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use study_plan::protocol::{Breaks, example};
+
+    #[test]
+    fn breaks_come_after_some_trials_and_last_some_seconds() {
+        let mut protocol = example::protocol(2, 1);
+        protocol.design.breaks = Some(Breaks {
+            every: 20,
+            at_least_s: 60.0,
+        });
+        let told = "After every 20 trials there was a break of at least 60 s.";
+        assert!(conduct(&protocol, &[]).iter().any(|text| text == told));
+    }
+}
