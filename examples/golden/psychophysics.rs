@@ -5,7 +5,8 @@ use serde::de::{DeserializeOwned, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 use serde_json::{Map, Value as Json, json};
 use study_analysis::analyze::psychophysics as analysis;
-use study_analysis::analyze::{Value, Values};
+use study_analysis::analyze::results::Field;
+use study_analysis::analyze::{Value, Values, group_id};
 use study_base::rng::Stream;
 use study_plan::procedure::{Function, Parameter, Passes, QuestPlus, Scale, Staircase, Stop};
 use study_plan::procedure::{quest, staircase};
@@ -203,17 +204,18 @@ fn quest_plus(input: &Settings, text: &str) -> Result<Values, Error> {
         entropy.push(track.expected_entropy());
         track.answer(presented, *answer > 0.5);
     }
-    let name = analysis::TrackName {
-        participant: input.text("participant")?,
-        track: input.text("track")?,
-    };
     let summary = track.summary();
-    Ok(analysis::quest_plus(
-        name,
-        &proposed,
-        Some((&entropy, track.entropy())),
-        &summary,
-    ))
+    let entropies = Some((&entropy[..], track.entropy()));
+    let found = analysis::quest_plus(&proposed, entropies, &summary);
+    let names = [input.text("participant")?, input.text("track")?];
+    Ok(named(&group_id("track", &names), &found))
+}
+
+/// The statistics of a record with this identifier.
+fn named(id: &str, record: &impl Field) -> Values {
+    let mut values = Values::default();
+    record.put(id, &mut values);
+    values
 }
 
 /// The rule of one track; what it does not state is that of the file.
@@ -279,17 +281,10 @@ fn staircases(input: &Settings) -> Result<Values, Error> {
     let participant = input.text("participant")?;
     let mut found = Values::default();
     let print = |stairs: &Stairs, found: &mut Values| {
-        let name = analysis::TrackName {
-            participant,
-            track: stairs.name,
-        };
         let summary = stairs.progress.summary();
-        found.extend(analysis::staircase(
-            name,
-            &stairs.rule,
-            &stairs.levels,
-            &summary,
-        ));
+        let track = analysis::staircase(&stairs.rule, &stairs.levels, &summary);
+        let id = group_id("track", &[participant, stairs.name]);
+        track.put(&id, found);
     };
     let Some(tracks) = input.0.get("tracks").and_then(Json::as_array) else {
         let mut stairs = Stairs::new(input, input)?;
@@ -315,7 +310,8 @@ fn staircases(input: &Settings) -> Result<Values, Error> {
     for stairs in &tracks {
         print(stairs, &mut found);
     }
-    found.extend(analysis::track_order(participant, &order));
+    let id = group_id("track", &[participant, "order"]);
+    analysis::track_order(&order).put(&id, &mut found);
     Ok(found)
 }
 
@@ -372,7 +368,7 @@ fn psychometric(input: &Settings) -> Result<Values, Error> {
         repeats: 2_000,
         seed: SEED,
     };
-    Ok(analysis::psychometric(&cells, &settings))
+    Ok(analysis::psychometric(&cells, &settings).values())
 }
 
 fn detection(input: &Settings) -> Result<Values, Error> {
@@ -418,7 +414,7 @@ fn detection(input: &Settings) -> Result<Values, Error> {
             answers,
         });
     }
-    Ok(analysis::detection(task, &cells))
+    Ok(named("sdt", &analysis::detection(task, &cells)))
 }
 
 fn pairs(input: &Settings, rows: &[Row]) -> Result<Values, Error> {
@@ -459,7 +455,8 @@ fn pairs(input: &Settings, rows: &[Row]) -> Result<Values, Error> {
         other => return Err(Error::Unknown("the treatment of ties", other.to_owned())),
     };
     let order = input.known("order_effect").unwrap_or(false);
-    Ok(analysis::preferences(&preferences, ties, order))
+    let found = analysis::preferences(&preferences, ties, order);
+    Ok(named("pairs", &found))
 }
 
 /// Several data sets in one table, by the column `case`.
@@ -489,7 +486,7 @@ fn magnitude(input: &Settings) -> Result<Values, Error> {
             })
         })
         .collect::<Result<Vec<_>, Error>>()?;
-    Ok(analysis::magnitude(&rows))
+    Ok(named("magnitude", &analysis::magnitude(&rows)))
 }
 
 fn mushra(input: &Settings) -> Result<Values, Error> {
@@ -518,5 +515,8 @@ fn mushra(input: &Settings) -> Result<Values, Error> {
                 (share * 1e11).round() / 1e9
             }),
     };
-    Ok(analysis::mushra(&rows, &roles, &screening))
+    let (kept, all) = analysis::mushra(&rows, &roles, &screening);
+    let mut found = named("mushra", &kept);
+    all.put("mushra_unscreened", &mut found);
+    Ok(found)
 }

@@ -10,6 +10,8 @@ use object::{
 use serde_json::{Map, Value as Json, json};
 use study_analysis::analyze::findings::Estimate;
 use study_analysis::analyze::psychophysics::PartAnalysis;
+use study_analysis::analyze::psychophysics::results::PartResults;
+use study_analysis::analyze::results::Field as _;
 use study_analysis::analyze::{
     Analysis, Applied, Finding, RealizationSummary, Value, Values, Warning,
 };
@@ -72,8 +74,8 @@ fn statistics(of: &Values) -> (Map<String, Json>, Map<String, Json>) {
 }
 
 /// The statistics of a table of trials, `study-trials/1`.
-pub fn trials(path: &str, task: &str, rows: usize, of: &Values) -> String {
-    let (values, undefined) = statistics(of);
+pub fn trials(path: &str, task: &str, rows: usize, of: &PartResults) -> String {
+    let (values, undefined) = statistics(&of.values());
     let document = json!({
         "format": "study-trials/1",
         "tool_version": env!("CARGO_PKG_VERSION"),
@@ -105,7 +107,7 @@ fn exclusions(all: &[Applied]) -> Vec<Rule> {
 }
 
 fn part(part: &PartAnalysis) -> Json {
-    let (values, undefined) = statistics(&part.values);
+    let (values, undefined) = statistics(&part.values());
     json!({
         "part": part.part,
         "task": part.task,

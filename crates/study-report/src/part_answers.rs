@@ -3,7 +3,8 @@
 
 use super::{apa, sentences};
 use study_analysis::analyze::psychophysics::{LevelData, PartAnalysis, PartFinding, PartQuestion};
-use study_analysis::analyze::{Pair, Verdict, group_id};
+use study_analysis::analyze::results::{Interval, Number as _, Stat};
+use study_analysis::analyze::{Pair, Verdict};
 use study_base::text::counted;
 use study_stats::psychometric::{Core, Spacing};
 
@@ -285,82 +286,72 @@ pub(super) fn results(part: &PartAnalysis) -> String {
     text.join(" ")
 }
 
+/// ", 95 % CI [.2, .4]" of an interval.
+fn ci(ends: Option<(f64, f64)>, format: fn(f64) -> String) -> String {
+    ends.map_or_else(String::new, |ends| {
+        format!(", 95 % CI {}", apa::interval(ends, format))
+    })
+}
+
 /// How alike the sessions are.
 fn retest(part: &PartAnalysis) -> Option<String> {
-    let icc = |name: &str| {
-        let id = format!("retest/icc_{name}");
-        let ci = part.values.interval(&format!("{id}_ci95"));
-        let ci = ci.map_or_else(String::new, |e| {
-            format!(", 95 % CI {}", apa::interval(e, apa::two))
-        });
-        Some(format!("{}{ci}", apa::two(part.values.number(&id)?)))
+    let found = part.results.over.again.retest.as_ref()?;
+    let icc = |value: &Stat, ci95: &Interval| {
+        let ci = ci(ci95.ends(), apa::two);
+        Some(format!("{}{ci}", apa::two(value.number()?)))
     };
     Some(format!(
         "Test–retest reliability over {} participants: ICC(A,1) = {} (agreement), ICC(C,1) = {} \
          (consistency).",
-        part.values.number("retest/n")?,
-        icc("agreement")?,
-        icc("consistency")?
+        found.n.number()?,
+        icc(&found.icc_agreement, &found.icc_agreement_ci95)?,
+        icc(&found.icc_consistency, &found.icc_consistency_ci95)?
     ))
 }
 
 /// The thresholds of each condition.
 fn thresholds(part: &PartAnalysis) -> Vec<String> {
-    let mut conditions: Vec<&str> = part
-        .data
-        .levels
-        .iter()
-        .map(|l| l.condition.as_str())
-        .collect();
-    conditions.sort_unstable();
-    conditions.dedup();
-    let one = |condition: &&str| {
-        let id = group_id("psy_group", &[condition, "posterior_threshold"]);
-        let get = |what: &str| part.values.number(&format!("{id}/{what}"));
-        let ci = part.values.interval(&format!("{id}/ci95"));
-        let ci = ci.map_or_else(String::new, |ends| {
-            format!(", 95 % CI {}", apa::interval(ends, apa::plain))
-        });
+    let all = part.results.over.psy_group.iter();
+    all.filter_map(|(condition, found)| {
+        let found = &found.posterior_threshold;
         Some(format!(
-            "{condition}: the geometric mean of the thresholds was {}{ci} (n = {}).",
-            apa::plain(get("geometric_mean")?),
-            get("n")?
+            "{}: the geometric mean of the thresholds was {}{} (n = {}).",
+            condition.as_str(),
+            apa::plain(found.geometric_mean.number()?),
+            ci(found.ci95.ends(), apa::plain),
+            found.n.number()?
         ))
-    };
-    conditions.iter().filter_map(one).collect()
+    })
+    .collect()
 }
 
 /// The exponent of estimated magnitudes of levels.
 fn exponent(part: &PartAnalysis) -> Option<String> {
-    let exponent = part.values.number("magnitude/exponent")?;
-    let ci = part
-        .values
-        .interval("magnitude/exponent_over_participants/ci95");
-    let ci = ci.map_or_else(String::new, |ends| {
-        format!(
-            ", 95 % CI {} over participants",
-            apa::interval(ends, apa::two)
-        )
-    });
+    let law = part.results.over.magnitude.as_ref()?.law.as_ref()?;
+    let ci = ci(law.exponent_over_participants.ci95.ends(), apa::two);
+    let over = if ci.is_empty() {
+        ""
+    } else {
+        " over participants"
+    };
     Some(format!(
-        "Estimates were proportional to the level to the power of {}{ci} (n = {}).",
-        apa::two(exponent),
+        "Estimates were proportional to the level to the power of {}{ci}{over} (n = {}).",
+        apa::two(law.exponent.number()?),
         part.participants
     ))
 }
 
 /// The mean score of a questionnaire.
 fn scores(part: &PartAnalysis) -> Option<String> {
-    let get = |what: &str| part.values.number(&format!("questionnaire/{what}"));
-    let name = questionnaire(part)?.0;
-    let ci = part.values.interval("questionnaire/ci95")?;
+    let found = part.results.questionnaire.as_ref()?;
     Some(format!(
-        "The mean score of the {name} was {} (SD = {}, 95 % CI {}, median {}, n = {}).",
-        apa::two(get("mean")?),
-        apa::two(get("sd")?),
-        apa::interval(ci, apa::two),
-        apa::two(get("median")?),
-        get("n")?
+        "The mean score of the {} was {} (SD = {}, 95 % CI {}, median {}, n = {}).",
+        questionnaire(part)?.0,
+        apa::two(found.mean.number()?),
+        apa::two(found.sd.number()?),
+        apa::interval(found.ci95.ends()?, apa::two),
+        apa::two(found.median.number()?),
+        found.n.number()?
     ))
 }
 
@@ -422,9 +413,9 @@ fn shapes(part: &PartAnalysis) -> String {
 
 /// How the numbers were computed, for a paper.
 pub(super) fn methods(part: &PartAnalysis) -> String {
-    let has = |group: &str| part.values.iter().any(|(id, _)| id.starts_with(group));
+    let (results, over) = (&part.results, &part.results.over);
     let mut text = Vec::new();
-    if has("psy/") {
+    if !results.psy.is_empty() {
         text.push(format!(
             "The psychometric function of each participant and condition was {} with \
              beta-binomial errors; thresholds are posterior means with equal-tailed 95 % intervals \
@@ -435,59 +426,58 @@ pub(super) fn methods(part: &PartAnalysis) -> String {
     if let Some((_, how)) = questionnaire(part) {
         text.push(how.to_owned());
     }
-    if has("magnitude/") {
+    if over.magnitude.is_some() {
         text.push(
             "Estimates of magnitude were averaged as logarithms, after the participants' own means were made equal \
              (Lane et al., 1961)."
                 .to_owned(),
         );
     }
-    if has("magnitude_mixed/") {
+    if results.magnitude_mixed.is_some() {
         text.push(
             "Realizations were compared by a linear mixed model of the logarithms with an intercept for each \
              participant (REML; F with Satterthwaite's degrees of freedom, contrasts by Kenward and Roger's method with Holm's correction)."
                 .to_owned(),
         );
     }
-    if has("psy_mixed/") {
+    if over.psy_mixed.is_some() {
         text.push(
             "Conditions were compared by a linear mixed model with an intercept for each participant \
              (REML; F with Satterthwaite's degrees of freedom, contrasts by Kenward and Roger's method with Holm's correction)."
                 .to_owned(),
         );
     }
-    if has("sdt/") {
+    if !results.sdt.is_empty() {
         text.push(
             "Sensitivities d′ are from rates after the log-linear correction (Hautus, 1995)."
                 .to_owned(),
         );
     }
-    if has("groups/") {
+    if over.again.groups.is_some() {
         text.push(
             "Groups were compared by Welch's analysis of variance of one mean for each participant, over what \
              all groups have."
                 .to_owned(),
         );
     }
-    if has("groups_conditions/") {
+    if over.again.groups_conditions.is_some() {
         text.push(
             "Whether conditions depend on the group is the interaction of both in an analysis of variance between \
              and within participants, with the Greenhouse–Geisser correction."
                 .to_owned(),
         );
     }
-    if has("sessions/") {
+    if over.again.sessions.is_some() {
         text.push(
             "Sessions were compared by a linear mixed model with an intercept for each participant; intraclass \
              correlations are those of single sessions (Shrout & Fleiss, 1979)."
                 .to_owned(),
         );
     }
-    if has("pairs/ability") {
-        let ties = if has("pairs/tie_log_nu") {
-            ", with ties (Davidson, 1970)"
-        } else {
-            ""
+    if let Some(pairs) = results.pairs.as_ref().filter(|p| !p.items.0.is_empty()) {
+        let ties = match &pairs.ties {
+            Some(_) => ", with ties (Davidson, 1970)",
+            None => "",
         };
         text.push(format!(
             "Preferences were fitted by the model of Bradley and Terry (1952){ties}, by maximum \

@@ -2,7 +2,6 @@
 //! print the columns that name them.
 
 use super::apa::{digits, interval_or_dash, name, or_dash};
-use std::rc::Rc;
 use study_analysis::analyze::results::Number;
 
 /// How a number is printed.
@@ -243,57 +242,27 @@ impl Table {
     }
 }
 
-/// Looks up a statistic of what a row is about.
-type Get<'a, T> = Rc<dyn Fn(T, &str) -> Option<f64> + 'a>;
-
-/// A table in the making: the things that its rows are about, and how to look up a statistic
-/// of one of them.
-pub(crate) struct Builder<'a, T> {
+/// A table in the making, and the things that its rows are about.
+pub(crate) struct Builder<T> {
     rows: Vec<T>,
-    get: Get<'a, T>,
     table: Table,
 }
 
-impl<'a, T: Copy> Builder<'a, T> {
-    pub(crate) fn new(
-        caption: &str,
-        rows: impl IntoIterator<Item = T>,
-        get: impl Fn(T, &str) -> Option<f64> + 'a,
-    ) -> Self {
-        let get = Rc::new(get);
+impl<T: Copy> Builder<T> {
+    pub(crate) fn new(caption: &str, rows: impl IntoIterator<Item = T>) -> Self {
         let rows: Vec<T> = rows.into_iter().collect();
         let table = Table {
             caption: caption.to_owned(),
             apart: vec![false; rows.len()],
             ..Table::default()
         };
-        Self { rows, get, table }
+        Self { rows, table }
     }
 
     /// Rows that stand apart from the others.
     pub(crate) fn apart(mut self, apart: &dyn Fn(T) -> bool) -> Self {
         self.table.apart = self.rows.iter().copied().map(apart).collect();
         self
-    }
-
-    /// A statistic: its column on pages and in the file, where it has its own name.
-    pub(crate) fn stat(self, head: &str, what: &str, format: Format) -> Self {
-        self.stat_as(page(head).file(what), what, format)
-    }
-
-    /// A statistic with other names of its column.
-    pub(crate) fn stat_as(self, head: Head, what: &str, format: Format) -> Self {
-        let get = Rc::clone(&self.get);
-        self.number(head, format, &|row| get(row, what))
-    }
-
-    /// An interval, whose ends are two statistics.
-    pub(crate) fn interval(self, head: Head, what: &str, format: Format) -> Self {
-        let get = Rc::clone(&self.get);
-        let end = |row, end: &str| get(row, &format!("{what}_{end}"));
-        self.push(head, true, &|row| {
-            Cell::Interval(end(row, "lo").zip(end(row, "hi")), format)
-        })
     }
 
     /// A column of statistics that are a field of what a row is about.
@@ -359,9 +328,4 @@ impl<'a, T: Copy> Builder<'a, T> {
     pub(crate) fn done(self) -> Table {
         self.table
     }
-}
-
-/// Rows without statistics to look up.
-pub(crate) fn none<T>(_: T, _: &str) -> Option<f64> {
-    None
 }

@@ -12,7 +12,7 @@ pub(crate) use rendering::{is_judged, rendered, rendered_by_participant};
 pub(crate) use subjects::subjects;
 
 use crate::apa::{self, one, percent, three, two, whole};
-use crate::table::{Builder, Cell, Format, Head, Table, file, none, page, report, terminal};
+use crate::table::{Builder, Cell, Format, Head, Table, file, page, report, terminal};
 use crate::{Site, SiteDevice, answers, plot, sites as of_sites};
 use study_analysis::analyze::results::{
     Coefficient, Described, Differences, List, Number as _, Stat,
@@ -62,7 +62,7 @@ pub(crate) fn realizations<'a>(a: &'a Analysis, gap: &str) -> Table {
         Head::default()
     }
     .file("vaf");
-    let mut table = Builder::new("Ratings by realization", rows, &none)
+    let mut table = Builder::new("Ratings by realization", rows)
         .apart(&|(m, _)| !m.tested)
         .text(terminal("realization"), &|(m, _)| with_role(m))
         .column(report("realization").file("model"), &|(m, _)| {
@@ -219,7 +219,7 @@ fn glossary(a: &Analysis) -> Option<String> {
 
 /// The components of the variance, with their shares.
 pub(crate) fn variance(a: &Analysis) -> Table {
-    Builder::new("Variance components", &answers::variance_shares(a), &none)
+    Builder::new("Variance components", &answers::variance_shares(a))
         .text(report("component"), &|s| s.0.to_owned())
         .number(report("share"), percent, &|s| Some(s.1))
         .done()
@@ -265,7 +265,7 @@ pub(crate) fn agreement(a: &Analysis) -> Table {
     let defined = coefficients.into_iter().filter(|c| c.1.is_some());
     let rounded = "Shares are rounded to whole per cent, so their sum can be 99 or 101.";
     let shares = (!answers::variance_shares(a).is_empty()).then(|| rounded.to_owned());
-    Builder::new("Agreement", defined, none)
+    Builder::new("Agreement", defined)
         .text(report("coefficient"), &|c| c.0.to_owned())
         .column(report("value"), &|c| Cell::Number(c.1, c.2))
         .ends(report("95 % CI"), share_2, &|c| c.3)
@@ -291,7 +291,7 @@ pub(crate) fn sites(all: &[Site]) -> Table {
         let sessions = counted(d.sessions, "session", "sessions");
         format!("{} {}: {sessions}", d.kind, d.id)
     };
-    Builder::new("Sites and their devices", rows, &none)
+    Builder::new("Sites and their devices", rows)
         .text(report("site"), &|(site, _)| site.name.clone())
         .text(report("participants"), &|(site, _)| {
             site.participants.to_string()

@@ -131,14 +131,14 @@ pub(super) fn run(
     };
     let file = File::open(path).map_err(|e| Failure::file(path, &e))?;
     let name = path.display().to_string();
-    let (values, rows) =
+    let (results, rows) =
         analyze_table(&name, BufReader::new(file), kind, &settings).map_err(Failure::input)?;
     if as_json {
-        return console.document(json::trials(&name, task, rows, &values));
+        return console.document(json::trials(&name, task, rows, &results));
     }
     let page = Page {
         width: console.width,
         color: console.color,
     };
-    console.out(trials(&name, task, rows, &values, page))
+    console.out(trials(&name, task, rows, &results, page))
 }

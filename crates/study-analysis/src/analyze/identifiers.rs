@@ -15,13 +15,6 @@ pub(super) fn escaped(name: &str) -> Cow<'_, str> {
     }
 }
 
-/// The name that stands in a part of an identifier.
-pub fn unescaped(part: &str) -> String {
-    part.replace("%2F", "/")
-        .replace("%7C", "|")
-        .replace("%25", "%")
-}
-
 /// The common prefix of the statistics of something with a name, `desc/a`; or with two,
 /// `reference/R/a`.
 pub fn group_id(group: &str, names: &[&str]) -> String {
@@ -43,13 +36,6 @@ pub fn pair_id(group: &str, a: &str, b: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_name_comes_back_as_it_was() {
-        for name in ["a/b", "b|c", "50%", "%2F", "%252F", "%7C|", "plain"] {
-            assert_eq!(unescaped(&escaped(name)), name);
-        }
-    }
 
     #[test]
     fn names_with_separators_never_share_an_identifier() {

@@ -1,6 +1,6 @@
 //! Statistics of thresholds and comparisons: tracks, psychometric functions, detection,
 //! paired preferences, magnitude estimation, MUSHRA. Each function takes what was
-//! answered and returns statistics by identifier; `docs/statistics-psychophysics.md`
+//! answered and returns statistics as records; `docs/statistics-psychophysics.md`
 //! defines them.
 
 mod again;
@@ -15,6 +15,7 @@ mod over_participants;
 mod part_data;
 mod preferences;
 mod questionnaires;
+pub mod results;
 mod scales;
 mod study;
 mod table;
@@ -25,11 +26,12 @@ pub use detection::{Detection, Task, detection};
 pub(crate) use discriminations::{have_ratios, settings as track_settings};
 pub use findings::{PartFinding, PartQuestion};
 pub use fits::{FitCell, FitSettings, psychometric};
-pub use part_data::{LevelData, Measured, PartAnalysis, PartData, StudyData};
+pub use over_participants::Measured;
+pub use part_data::{LevelData, PartAnalysis, PartData, StudyData};
 pub(crate) use part_data::{asked, sessions_of};
 pub use preferences::{Choice, Preference, preferences};
 pub use scales::{MagnitudeRow, MushraRoles, MushraRow, magnitude, mushra};
 pub use study::parts;
 pub use table::{TableError, TableKind, analyze_table};
-pub use tracks::{TrackData, TrackName, TrackTrial, quest_plus, staircase, track_order};
+pub use tracks::{TrackData, TrackTrial, quest_plus, staircase, track_order};
 pub use trials::{Asked, TrialCount, TrialSettings, discrimination};

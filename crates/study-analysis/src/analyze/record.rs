@@ -18,9 +18,12 @@
 //!    [`super::results::Results`]: the compiler lists where that is made.
 //! 4. Findings and reports read `results.order.trial.slope.number()` instead of a string.
 
-use super::identifiers::escaped;
+pub use super::keys::{
+    CovariateName, DuplicateName, Key, PairName, ParticipantName, RealizationName, ReferenceName,
+    SiteName,
+};
 use super::values::{Value, Values};
-use std::borrow::{Borrow, Cow};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 /// Why a statistic is undefined.
@@ -181,6 +184,13 @@ pub trait Field: Sized {
     fn explain(&mut self, why: &Why);
     /// Adds its declaration.
     fn declare(id: &str, doc: &'static str, all: &mut Vec<Declared>);
+
+    /// Its statistics by identifier.
+    fn values(&self) -> Values {
+        let mut values = Values::default();
+        self.put("", &mut values);
+        values
+    }
 }
 
 impl Field for Stat {
@@ -294,14 +304,6 @@ impl<T: Field> Field for Box<T> {
     }
 }
 
-/// A name of the data by which records are kept.
-pub trait Key: Ord {
-    /// What stands for it in a reference.
-    const PLACEHOLDER: &'static str;
-    /// Its part of an identifier.
-    fn part(&self) -> Cow<'_, str>;
-}
-
 impl<K: Key, R: Field> Field for BTreeMap<K, R> {
     fn undefined(_: &Why) -> Self {
         Self::new()
@@ -321,91 +323,6 @@ impl<K: Key, R: Field> Field for BTreeMap<K, R> {
 
     fn declare(id: &str, doc: &'static str, all: &mut Vec<Declared>) {
         R::declare(&join(id, K::PLACEHOLDER), doc, all);
-    }
-}
-
-/// Names of one kind, as keys.
-macro_rules! names {
-    ($($(#[doc = $doc:literal])+ $name:ident = $placeholder:literal,)*) => {$(
-        $(#[doc = $doc])+
-        #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-        pub struct $name(String);
-
-        impl $name {
-            /// The name as the data have it. Untrusted.
-            pub fn as_str(&self) -> &str {
-                &self.0
-            }
-        }
-
-        impl From<&str> for $name {
-            fn from(name: &str) -> Self {
-                Self(name.to_owned())
-            }
-        }
-
-        impl Borrow<str> for $name {
-            fn borrow(&self) -> &str {
-                &self.0
-            }
-        }
-
-        impl Key for $name {
-            const PLACEHOLDER: &'static str = $placeholder;
-
-            fn part(&self) -> Cow<'_, str> {
-                escaped(&self.0)
-            }
-        }
-    )*};
-}
-
-names! {
-    /// The name of a realization.
-    RealizationName = "M",
-    /// The name of a reference, anchor or physical sample.
-    ReferenceName = "R",
-    /// The name of a hidden duplicate.
-    DuplicateName = "D",
-    /// The name of a participant.
-    ParticipantName = "S",
-    /// The name of a covariate of realizations.
-    CovariateName = "NAME",
-    /// The name of a site.
-    SiteName = "SITE",
-}
-
-/// Two realizations. The one whose name sorts first comes first.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub struct PairName {
-    first: String,
-    second: String,
-}
-
-impl PairName {
-    /// The pair of two names, in either order.
-    pub fn of(a: &str, b: &str) -> Self {
-        Self {
-            first: a.min(b).to_owned(),
-            second: a.max(b).to_owned(),
-        }
-    }
-}
-
-impl Key for PairName {
-    const PLACEHOLDER: &'static str = "a|b";
-
-    fn part(&self) -> Cow<'_, str> {
-        format!("{}|{}", escaped(&self.first), escaped(&self.second)).into()
-    }
-}
-
-/// The number of a repetition.
-impl Key for u32 {
-    const PLACEHOLDER: &'static str = "R";
-
-    fn part(&self) -> Cow<'_, str> {
-        self.to_string().into()
     }
 }
 

@@ -342,7 +342,7 @@ fn told_apart(world: &TracksWorld, counts: &[Vec<TrialCount>], alpha: f64) -> Op
             Some((&track.rules, asked, counts.clone(), &track.settings))
         })
         .collect();
-    let found: Option<Vec<bool>> = (decided::told_apart(&tracks, alpha).iter())
+    let found: Option<Vec<bool>> = (decided::told_apart(&tracks, alpha)?.iter())
         .map(|finding| verdict(Some(finding)))
         .collect();
     found.map(|all| !all.is_empty() && all.into_iter().all(|yes| yes))

@@ -15,7 +15,7 @@ pub fn part_tables(parts: &[PartAnalysis]) -> Vec<TableFile> {
     ];
     for (file, make) in KINDS {
         let of_part =
-            |part: &PartAnalysis| make(&part.values).records(&[("part", part.part.as_str())]);
+            |part: &PartAnalysis| make(&part.results).records(&[("part", part.part.as_str())]);
         let rows = joined(parts.iter().map(of_part));
         if !rows.is_empty() {
             all.push(table(file, rows));
@@ -44,7 +44,7 @@ fn joined(tables: impl Iterator<Item = Vec<Vec<String>>>) -> Vec<Vec<String>> {
 fn statistics(parts: &[PartAnalysis]) -> Vec<Vec<String>> {
     let mut rows = vec![cells(["part", "identifier", "value", "undefined_because"])];
     for part in parts {
-        for (id, value) in part.values.iter() {
+        for (id, value) in part.values().iter() {
             let (value, why) = match value {
                 Value::Number(x) => (digits(*x), String::new()),
                 Value::List(x) => {

@@ -5,8 +5,12 @@ use super::{Canvas, Drawn, MAX_DRAWN, cell, drawn, head, rows_height};
 use crate::apa::digits;
 use crate::chart::{Axis, Color, Dash, Figure, Look, Mark, PALETTE, Panel, Shape, Whisker};
 use crate::chart::{Label, shortened};
+use std::collections::BTreeMap;
+use study_analysis::analyze::psychophysics::results::{
+    At, CellName, ConditionName, Function, GeometricMean, Sensitivity,
+};
 use study_analysis::analyze::psychophysics::{LevelData, PartAnalysis, TrackData, TrackTrial};
-use study_analysis::analyze::{group_id, unescaped};
+use study_analysis::analyze::results::{Interval, Number as _};
 use study_stats::psychometric::{Curve, Spacing};
 
 /// What the files of these figures are called before the number of the part.
@@ -77,16 +81,22 @@ fn place(spacing: Spacing, level: f64) -> f64 {
     spacing.place(level).unwrap_or(f64::NAN)
 }
 
+/// What was fitted to a cell.
+fn fitted<'a>(part: &'a PartAnalysis, cell: &LevelData) -> Option<&'a Function> {
+    let name = CellName::of(&cell.participant, &cell.condition);
+    part.results.psy.get(&name)
+}
+
 /// The function of a cell, of posterior means, on its scale.
 fn curve(part: &PartAnalysis, cell: &LevelData) -> Option<Curve> {
-    let id = group_id("psy", &[&cell.participant, &cell.condition]);
-    let get = |what: &str| part.values.number(&format!("{id}/posterior/{what}"));
+    let means = &fitted(part, cell)?.posterior;
+    let gamma = means.gamma.as_ref();
     Some(Curve {
         core: cell.core,
-        threshold: cell.spacing.place(get("threshold/mean")?)?,
-        width: get("width/mean")?,
-        gamma: part.data.guess.or_else(|| get("gamma/mean"))?,
-        lambda: get("lambda/mean")?,
+        threshold: cell.spacing.place(means.threshold.mean.number()?)?,
+        width: means.width.mean.number()?,
+        gamma: part.data.guess.or_else(|| gamma?.mean.number())?,
+        lambda: means.lambda.mean.number()?,
     })
 }
 
@@ -139,11 +149,8 @@ fn psychometric(name: &str, part: &PartAnalysis) -> Option<Drawn> {
             let at = |i: u32| from + (to - from) * f64::from(i) / 120.0;
             let line = (0..=120).map(|i| (at(i), curve.value(at(i)))).collect();
             panel = panel.with(Look::plain(PALETTE[1]).stroke(1.8), Mark::Line(line));
-            let id = group_id("psy", &[&cell.participant, &cell.condition]);
-            if let Some((low, high)) = part
-                .values
-                .interval(&format!("{id}/posterior/threshold/ci95"))
-            {
+            let ci95 = fitted(part, cell).and_then(|f| f.posterior.threshold.ci95.as_ref());
+            if let Some((low, high)) = ci95.and_then(Interval::ends) {
                 let at = curve.value(curve.threshold);
                 let (low, high) = (place(spacing, low), place(spacing, high));
                 let bar = Mark::ErrorBarsAcross(vec![Whisker { at, low, high }]);
@@ -341,69 +348,51 @@ fn forest(
     }))
 }
 
+/// A number, and its interval.
+type Estimated = (Option<f64>, Option<(f64, f64)>);
+
 /// Participants of a condition with a value, then the mean.
-fn by_condition(
-    part: &PartAnalysis,
-    group: &str,
-    value: impl Fn(&str) -> Option<(f64, Option<(f64, f64)>)>,
-    mean: impl Fn(&str) -> Option<(f64, Option<(f64, f64)>)>,
+fn by_condition<R>(
+    cells: &BTreeMap<CellName, R>,
+    value: impl Fn(&R) -> Estimated,
+    mean: impl Fn(&ConditionName) -> Option<Estimated>,
 ) -> Vec<(String, Vec<Row>)> {
-    let mut conditions: Vec<(String, Vec<Row>)> = Vec::new();
-    let mut cells: Vec<(&str, &str)> = (part.values.iter())
-        .filter_map(|(id, _)| {
-            let mut names = id.strip_prefix(group)?.strip_prefix('/')?.split('/');
-            let (participant, condition) = (names.next()?, names.next()?);
-            names.next()?;
-            (participant != "pooled").then_some((condition, participant))
+    let mut cells: Vec<(&CellName, &R)> = cells.iter().collect();
+    cells.sort_by_key(|(name, _)| &name.condition);
+    let row = |name: &str, (value, ci95): Estimated, mean: bool| {
+        Some(Row {
+            name: name.to_owned(),
+            value: value?,
+            ci95,
+            mean,
         })
-        .collect();
-    cells.sort_unstable();
-    cells.dedup();
-    for own in cells.chunk_by(|a, b| a.0 == b.0) {
-        let condition = own[0].0;
-        let mut rows: Vec<Row> = (own.iter())
-            .filter_map(|(_, participant)| {
-                let (value, ci95) = value(&format!("{group}/{participant}/{condition}"))?;
-                Some(Row {
-                    name: unescaped(participant),
-                    value,
-                    ci95,
-                    mean: false,
-                })
-            })
-            .collect();
-        rows.extend(
-            mean(condition)
-                .filter(|_| rows.len() > 1)
-                .map(|(value, ci95)| Row {
-                    name: "mean".to_owned(),
-                    value,
-                    ci95,
-                    mean: true,
-                }),
-        );
-        if !rows.is_empty() {
-            conditions.push((unescaped(condition), rows));
+    };
+    let conditions = cells.chunk_by(|a, b| a.0.condition == b.0.condition);
+    let rows = conditions.map(|own| {
+        let condition = &own[0].0.condition;
+        let of_cell =
+            |(cell, found): &(&CellName, &R)| row(cell.participant.as_str(), value(found), false);
+        let mut rows: Vec<Row> = own.iter().filter_map(of_cell).collect();
+        if rows.len() > 1 {
+            rows.extend(mean(condition).and_then(|mean| row("mean", mean, true)));
         }
-    }
-    conditions
+        (condition.as_str().to_owned(), rows)
+    });
+    rows.filter(|(_, rows)| !rows.is_empty()).collect()
 }
 
 fn thresholds(name: &str, part: &PartAnalysis) -> Option<Drawn> {
-    let with = |id: &str| {
-        Some((
-            part.values.number(id)?,
-            part.values.interval(&id.replace("/mean", "/ci95")),
-        ))
-    };
     let panels = by_condition(
-        part,
-        "psy",
-        |cell| with(&format!("{cell}/posterior/threshold/mean")),
+        &part.results.psy,
+        |function| {
+            let found = &function.posterior.threshold;
+            let ci95 = found.ci95.as_ref().and_then(Interval::ends);
+            (found.mean.number(), ci95)
+        },
         |condition| {
-            let id = format!("psy_group/{condition}/posterior_threshold");
-            let mean = part.values.number(&format!("{id}/geometric_mean"))?;
-            Some((mean, part.values.interval(&format!("{id}/ci95"))))
+            let found = &part.results.over.psy_group.get(condition)?;
+            let found = &found.posterior_threshold;
+            Some((found.geometric_mean.number(), found.ci95.ends()))
         },
     );
     let caption = "Thresholds (posterior means) with 95 % intervals. Diamond: geometric mean over \
@@ -414,23 +403,10 @@ fn thresholds(name: &str, part: &PartAnalysis) -> Option<Drawn> {
 }
 
 fn sensitivities(name: &str, part: &PartAnalysis) -> Option<Drawn> {
-    let panels = by_condition(
-        part,
-        "sdt",
-        |cell| {
-            let d = |what: &str| part.values.number(&format!("{cell}/{what}"));
-            let found = ["d_differencing", "d"]
-                .into_iter()
-                .find_map(|id| Some((id, d(id)?)));
-            let (id, value) = found?;
-            Some((value, part.values.interval(&format!("{cell}/{id}_ci95"))))
-        },
-        |condition| {
-            let id = format!("sdt_group/{condition}/d");
-            let mean = part.values.number(&format!("{id}/mean"))?;
-            Some((mean, part.values.interval(&format!("{id}/ci95"))))
-        },
-    );
+    let panels = by_condition(&part.results.sdt, Sensitivity::d, |condition| {
+        let found = part.results.over.sdt_group.get(condition)?;
+        Some((found.d.mean.number(), found.d.ci95.ends()))
+    });
     let caption = "Sensitivity d′ with 95 % intervals. Diamond: mean over participants with its t interval. \
                    Line: no sensitivity.";
     let title = "Sensitivity by participant";
@@ -439,17 +415,13 @@ fn sensitivities(name: &str, part: &PartAnalysis) -> Option<Drawn> {
 
 /// Realization, ability and interval, the most preferred first.
 fn abilities(part: &PartAnalysis) -> Vec<Row> {
-    let items = part
-        .values
-        .iter()
-        .filter_map(|(id, _)| id.strip_prefix("pairs/ability/"));
+    let items = part.results.pairs.iter().flat_map(|p| &p.items.0);
     let mut rows: Vec<Row> = items
-        .filter_map(|item| {
-            let of = |what: &str| part.values.number(&format!("pairs/ability{what}/{item}"));
+        .filter_map(|(name, item)| {
             Some(Row {
-                name: unescaped(item),
-                value: of("")?,
-                ci95: of("_ci95_lo").zip(of("_ci95_hi")),
+                name: name.as_str().to_owned(),
+                value: item.ability.number()?,
+                ci95: item.ability_ci95.ends(),
                 mean: false,
             })
         })
@@ -531,15 +503,11 @@ type Estimate = (f64, f64, Option<(f64, f64)>);
 
 /// Estimated magnitudes of levels over the levels, both on logarithmic axes.
 fn magnitudes(name: &str, part: &PartAnalysis) -> Option<Drawn> {
-    let found = part.values.iter().filter_map(|(id, _)| {
-        let level = id.strip_prefix("magnitude/level/")?;
-        let level = level.strip_suffix("/geometric_mean")?;
-        let ci95 = format!("magnitude/level/{level}/ci95");
-        let mean = part.values.number(id)?;
-        Some((level.parse().ok()?, mean, part.values.interval(&ci95)))
-    });
-    let mut rows: Vec<Estimate> = found.collect();
-    rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let found = part.results.over.magnitude.as_ref()?;
+    let estimate = |(level, mean): (&At, &GeometricMean)| {
+        Some((level.0, mean.geometric_mean.number()?, mean.ci95.ends()))
+    };
+    let rows: Vec<Estimate> = found.levels.iter().filter_map(estimate).collect();
     if rows.len() < 2 || rows.iter().any(|row| row.0 <= 0.0) {
         return None;
     }
@@ -556,8 +524,9 @@ fn magnitudes(name: &str, part: &PartAnalysis) -> Option<Drawn> {
                    were made equal. Line: the power function fitted to the means. Both axes are logarithmic."
         .to_owned();
     let line = || {
-        let exponent = part.values.number("magnitude/exponent")?;
-        let at_1 = part.values.number("magnitude/log10_coefficient")? * std::f64::consts::LN_10;
+        let law = found.law.as_ref()?;
+        let exponent = law.exponent.number()?;
+        let at_1 = law.log10_coefficient.number()? * std::f64::consts::LN_10;
         let point = |row: &Estimate| (row.0.ln(), at_1 + exponent * row.0.ln());
         Some(vec![point(rows.first()?), point(rows.last()?)])
     };

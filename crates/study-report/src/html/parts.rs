@@ -94,13 +94,13 @@ fn section(part: &PartAnalysis, report: &PartReport, first: usize) -> Markup {
                 @for line in more { p { (typeset(line)) } }
             }
             (figures_section(&report.figures, first))
-            @for own in &tables(&part.values) { (table(own)) }
+            @for own in &tables(&part.results) { (table(own)) }
             h3 { "For the paper" }
             p.note { "Drafts made from the numbers of this analysis. Check every sentence before you use it." }
             p { (typeset(&report.trials)) " " (typeset(&methods(part))) }
             @let results = results(part);
             @if !results.is_empty() { p { (typeset(&results)) } }
-            (statistics::listing(&part.values, "docs/statistics-psychophysics.md", "parts.json"))
+            (statistics::listing(&part.values(), "docs/statistics-psychophysics.md", "parts.json"))
         }
     }
 }

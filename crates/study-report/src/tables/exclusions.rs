@@ -1,7 +1,7 @@
 //! Tables of exclusions: the rules, the rows, and what they change.
 
 use crate::apa::{self, bare_p, digits, plain, three, whole};
-use crate::table::{Builder, Cell, Format, Table, file, none, report};
+use crate::table::{Builder, Cell, Format, Table, file, report};
 use study_analysis::analyze::results::{BeforeExclusion, Correlation, Differences, Number};
 use study_analysis::analyze::{Analysis, PreregisteredRule, Value};
 
@@ -11,7 +11,7 @@ pub(crate) fn rules(a: &Analysis) -> Table {
         true => "Exclusion rules, changed after the study began: see Deviations",
         false => "Preregistered exclusion rules",
     };
-    Builder::new(caption, &a.exclusions, &none)
+    Builder::new(caption, &a.exclusions)
         .column(report("rule").file("rule"), &|e| {
             Cell::Code(e.rule.to_string())
         })
@@ -32,7 +32,7 @@ pub(crate) fn excluded(a: &Analysis) -> Table {
         .rows
         .iter()
         .filter_map(|r| Some((r, r.excluded.as_ref()?)));
-    Builder::new("Excluded rows", rows, &none)
+    Builder::new("Excluded rows", rows)
         .text(report("participant").file("subject"), &|(r, _)| {
             a.subject(r).to_owned()
         })
@@ -55,7 +55,7 @@ pub(crate) fn with_and_without(a: &Analysis) -> Table {
     let rows = rows.map_or_else(Vec::new, |before| compared(a, before));
     let defined = rows.iter().filter(|row| row.2.is_some());
     let caption = "Main results with and without the exclusions";
-    Builder::new(caption, defined, &none)
+    Builder::new(caption, defined)
         .text(report("statistic"), &|row| row.0.clone())
         .column(report("with the exclusions"), &|row| {
             Cell::Number(row.1, row.3)
@@ -132,7 +132,7 @@ pub(crate) fn all_with_and_without(a: &Analysis) -> Table {
         Value::Number(x) => Some((id.strip_prefix("before_exclusion/")?, *x)),
         Value::List(_) | Value::Undefined(_) => None,
     });
-    Builder::new("", rows, &none)
+    Builder::new("", rows)
         .text(file("identifier"), &|row| row.0.to_owned())
         .number(file("with"), digits, &|row| a.values.number(row.0))
         .number(file("without"), digits, &|row| Some(row.1))

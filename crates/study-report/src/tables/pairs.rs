@@ -2,7 +2,7 @@
 
 use crate::apa::{self, bare_p, three, two, whole};
 use crate::sentences;
-use crate::table::{Builder, Table, file, none, page, report};
+use crate::table::{Builder, Table, file, page, report};
 use study_analysis::analyze::results::{Number as _, PairName, Posthoc, ReferenceTest, Stat};
 use study_analysis::analyze::{Analysis, MAX_PAIRED, Pair, RealizationSummary};
 use study_base::text::counted;
@@ -33,7 +33,7 @@ pub(crate) fn pairs(a: &Analysis) -> Table {
         )
     });
     let t = |p: &Pair| Some(cancelled(p.test.as_ref()?.statistic.as_ref()?.value));
-    Builder::new("Pairs of realizations", &a.pairs, &none)
+    Builder::new("Pairs of realizations", &a.pairs)
         .text(report("pair (a − b)"), &|p| {
             format!("{} − {}", apa::name(&p.first), apa::name(&p.second))
         })
@@ -77,8 +77,7 @@ pub(crate) fn posthoc(a: &Analysis) -> Table {
         ("p_wilcoxon_normal", |p| &p.p_wilcoxon_normal),
         ("rank_biserial", |p| &p.rank_biserial),
     ];
-    let mut table =
-        Builder::new("", tests, &none).text(file("pair"), &|p| format!("{}|{}", p.0, p.1));
+    let mut table = Builder::new("", tests).text(file("pair"), &|p| format!("{}|{}", p.0, p.1));
     for (name, of) in columns {
         table = table.field(file(name), two, |p| of(p.2));
     }
@@ -109,7 +108,7 @@ fn against(a: &Analysis, r: &RealizationSummary) -> Table {
         .collect();
     let equivalence = tests.iter().any(|(_, test)| test.p_tost.number().is_some());
     let equivalence = report("p (equivalence)").when(equivalence);
-    Builder::new(&caption, tests, &none)
+    Builder::new(&caption, tests)
         .name("realization", "model", &|(name, _)| name.to_owned())
         .field(page("n"), whole, |(_, t)| &t.n)
         .field(page("difference"), three, |(_, t)| &t.mean_diff)
@@ -128,7 +127,7 @@ pub(crate) fn repeats(a: &Analysis) -> Table {
     });
     let compared = all.filter(|(_, _, test)| test.mean_diff.number().is_some());
     let caption = "Hidden duplicates minus their originals, over participants";
-    Builder::new(caption, compared, &none)
+    Builder::new(caption, compared)
         .name("duplicate", "duplicate", &|m| m.0.to_owned())
         .name("of", "of", &|m| m.1.to_owned())
         .field(page("n"), whole, |(_, _, t)| &t.n)

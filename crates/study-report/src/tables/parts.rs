@@ -4,14 +4,17 @@
 mod scales;
 
 use crate::apa::{self, bare_p, interval_or_dash, listing, name, or_dash, plain, two};
-use crate::table::{Builder, Table, page};
+use crate::table::{Builder, Head, Table, page};
 use scales::{items, magnitudes, ratings, scores};
-use std::collections::{BTreeMap, BTreeSet};
-use study_analysis::analyze::{Value, Values, unescaped};
+use std::collections::BTreeMap;
+use study_analysis::analyze::psychophysics::results::{
+    Ability, CellName, ConditionModel, Contrast, Function, PartResults, Sensitivity,
+};
+use study_analysis::analyze::results::{Number as _, PairName, RealizationName};
 use study_base::text::Untrusted;
 
 /// A kind of table: the file it goes into, and how it is made.
-type Kind = (&'static str, fn(&Values) -> Table);
+type Kind = (&'static str, fn(&PartResults) -> Table);
 
 /// All tables, in the order of a page; those without rows and notes are left out of it.
 pub(crate) const KINDS: [Kind; 14] = [
@@ -32,102 +35,75 @@ pub(crate) const KINDS: [Kind; 14] = [
 ];
 
 /// All tables of these statistics; those without rows are left out.
-pub(crate) fn tables(values: &Values) -> Vec<Table> {
-    let tables = KINDS.iter().map(|(_, table)| table(values));
+pub(crate) fn tables(results: &PartResults) -> Vec<Table> {
+    let tables = KINDS.iter().map(|(_, table)| table(results));
     tables
         .filter(|t| !t.is_empty() || !t.notes.is_empty())
         .collect()
 }
 
-/// The names in the identifiers between `group/` and the statistic, each once.
-fn names<'a>(values: &'a Values, group: &str) -> BTreeSet<&'a str> {
-    cells(values, group).into_iter().map(|c| c.0).collect()
+/// A column of pages, with its name in the file.
+fn column(head: &str, file: &str) -> Head {
+    page(head).file(file)
 }
 
-/// The first two names in the identifiers after `group/`, each pair once; the second one is
-/// empty where the statistic follows the first.
-fn cells<'a>(values: &'a Values, group: &str) -> BTreeSet<(&'a str, &'a str)> {
-    let names = values.iter().filter_map(|(id, _)| {
-        let rest = id.strip_prefix(group)?.strip_prefix('/')?;
-        let (first, rest) = rest.split_once('/')?;
-        Some((first, rest.split_once('/').map_or("", |r| r.0)))
-    });
-    names.collect()
-}
-
-/// Participant and condition of each cell.
-fn participants<'a>(values: &'a Values, group: &str) -> Vec<(&'a str, &'a str)> {
-    let cells = cells(values, group).into_iter();
-    cells.filter(|cell| !cell.1.is_empty()).collect()
-}
-
-/// The two names of a pair, and what stands between them.
-fn both(pair: &str, sign: &str) -> String {
-    let names: Vec<String> = pair.split('|').map(unescaped).collect();
-    names.join(sign)
-}
-
-/// The name that stands in a part of an identifier, in a sentence.
-fn spelled(part: &str) -> String {
-    name(&unescaped(part))
-}
-
-/// A statistic of a participant and a condition.
-fn of_cell(values: &Values, group: &str, cell: (&str, &str), what: &str) -> Option<f64> {
-    values.number(&format!("{group}/{}/{}/{what}", cell.0, cell.1))
+/// A table of participants and conditions.
+fn of_cells<'a, R>(
+    caption: &str,
+    cells: impl Iterator<Item = (&'a CellName, &'a R)>,
+) -> Builder<(&'a CellName, &'a R)> {
+    Builder::new(caption, cells)
+        .name("", "participant", &|cell| {
+            cell.0.participant.as_str().to_owned()
+        })
+        .name("condition", "condition", &|cell| {
+            cell.0.condition.as_str().to_owned()
+        })
 }
 
 /// Each participant and condition.
-fn thresholds(values: &Values) -> Table {
-    let get = |cell: (&str, &str), what: &str| of_cell(values, "psy", cell, what);
-    let reversals = |cell: (&str, &str)| of_cell(values, "track", cell, "estimate");
+fn thresholds(results: &PartResults) -> Table {
     // Only staircases have reversals.
-    let staircases = participants(values, "track").iter().any(|cell| {
-        let id = format!("track/{}/{}/estimate", cell.0, cell.1);
-        values.get(&id).is_some()
-    });
-    let cells = participants(values, "psy");
-    let own = cells.iter().copied().filter(|cell| cell.0 != "pooled");
-    let table = Builder::new("Thresholds", own.clone(), &get)
-        .name("", "participant", &|cell| unescaped(cell.0))
-        .name("condition", "condition", &|cell| unescaped(cell.1))
-        .stat("trials", "n_trials", count)
-        .stat_as(
-            page("threshold").file("threshold"),
-            "posterior/threshold/mean",
-            plain,
-        )
-        .interval(
-            page("95 %").file("threshold_ci95"),
-            "posterior/threshold/ci95",
-            plain,
-        )
-        .stat_as(page("width").file("width"), "posterior/width/mean", plain)
-        .interval(
-            page("95 %").file("width_ci95"),
-            "posterior/width/ci95",
-            plain,
-        )
-        .stat_as(page("ML").file("ml_threshold"), "ml/threshold", plain)
+    let staircases = results.track.values().any(|t| t.staircase.is_some());
+    let reversals = |cell: &CellName| {
+        let staircase = results.track.get(cell)?.staircase.as_ref()?;
+        staircase.estimate.number()
+    };
+    let interval = |head: &str| page("95 %").file(head);
+    let table = of_cells::<Function>("Thresholds", results.psy.iter())
+        .field(column("trials", "n_trials"), count, |c| {
+            &c.1.trials.n_trials
+        })
+        .field(column("threshold", "threshold"), plain, |c| {
+            &c.1.posterior.threshold.mean
+        })
+        .ends(interval("threshold_ci95"), plain, &|c| {
+            c.1.posterior.threshold.ci95.as_ref()?.ends()
+        })
+        .field(column("width", "width"), plain, |c| {
+            &c.1.posterior.width.mean
+        })
+        .ends(interval("width_ci95"), plain, &|c| {
+            c.1.posterior.width.ci95.as_ref()?.ends()
+        })
+        .field(column("ML", "ml_threshold"), plain, |c| &c.1.ml.threshold)
         .number(
-            page("reversals").file("reversal_mean").when(staircases),
+            column("reversals", "reversal_mean").when(staircases),
             plain,
-            &reversals,
+            &|c| reversals(c.0),
         )
         .done();
     if table.is_empty() {
         return table;
     }
-    let mut notes = vec![threshold_note(
-        cells.iter().any(|cell| get(*cell, "log_scale").is_some()),
-        staircases,
-    )];
-    // What is pooled is not in the table.
+    let logarithms = results.psy.values().any(|f| f.trials.log_scale.is_some());
+    let mut notes = vec![threshold_note(logarithms, staircases)];
     let mut reasons: BTreeMap<&str, Vec<String>> = BTreeMap::new();
-    for cell in own {
-        let id = format!("psy/{}/{}/ml/threshold", cell.0, cell.1);
-        if let Some(why) = values.reason(&id) {
-            let whose = format!("{} {}", spelled(cell.0), spelled(cell.1));
+    for (cell, function) in &results.psy {
+        if let Some(why) = function.ml.threshold.reason() {
+            let [participant, condition] =
+                [cell.participant.as_str(), cell.condition.as_str()].map(name);
+            let whose = format!("{participant} {condition}");
             reasons.entry(why).or_default().push(whose);
         }
     }
@@ -139,17 +115,22 @@ fn thresholds(values: &Values) -> Table {
         format!("{}: no maximum of the likelihood: {why}.", listing(&whose))
     };
     notes.extend(reasons.into_iter().map(of_reason));
-    let conditions = names(values, "psy_group").into_iter();
-    notes.extend(conditions.filter_map(|condition| {
-        let id = |what: &str| format!("psy_group/{condition}/posterior_threshold/{what}");
-        Some(format!(
-            "{}: geometric mean {} {} of {} participants.",
-            spelled(condition),
-            plain(values.number(&id("geometric_mean"))?),
-            interval_or_dash(values.interval(&id("ci95")), plain),
-            values.number(&id("n")).unwrap_or_default(),
-        ))
-    }));
+    notes.extend(
+        results
+            .over
+            .psy_group
+            .iter()
+            .filter_map(|(condition, found)| {
+                let found = &found.posterior_threshold;
+                Some(format!(
+                    "{}: geometric mean {} {} of {} participants.",
+                    name(condition.as_str()),
+                    plain(found.geometric_mean.number()?),
+                    interval_or_dash(found.ci95.ends(), plain),
+                    found.n.number().unwrap_or_default(),
+                ))
+            }),
+    );
     table.with_notes(notes)
 }
 
@@ -176,118 +157,116 @@ fn count(n: f64) -> String {
     n.to_string()
 }
 
-/// A mean or, of logarithms, a geometric mean.
-fn mean(get: &dyn Fn(&str) -> Option<f64>, what: &str) -> Option<f64> {
-    get(&format!("geometric_{what}")).or_else(|| get(what))
-}
-
 /// Thresholds of the mixed model, by condition.
-fn conditions(values: &Values) -> Table {
-    let get = |condition: &str, what: &str| values.number(&format!("psy_mixed/{condition}/{what}"));
-    let mean = |condition: &str| mean(&|what| get(condition, what), "mean");
-    let all = names(values, "psy_mixed").into_iter();
-    let all: Vec<&str> = all.filter(|c| mean(c).is_some()).collect();
-    let ratios = all.iter().any(|c| get(c, "geometric_mean").is_some());
+fn conditions(results: &PartResults) -> Table {
+    let model = results.over.psy_mixed.as_ref();
+    let all = model.into_iter().flat_map(|m| &m.conditions);
+    let all: Vec<_> = all.filter(|c| c.1.mean().is_some()).collect();
+    let ratios = all.iter().any(|c| c.1.geometric_mean.is_some());
     let ratios = ratios.then(|| "Geometric means; contrasts are ratios.".to_owned());
-    let why = values.reason("psy_mixed/F");
+    let why = model.and_then(|m| m.test.f.reason());
     let why = why.map(|why| format!("No comparison of conditions: {}.", Untrusted(why)));
-    Builder::new("Thresholds by condition, mixed model", all, &get)
-        .name("", "condition", &unescaped)
-        .number(page("mean").file("mean"), plain, &mean)
-        .interval(page("95 %").file("mean_ci95"), "ci95", plain)
+    Builder::new("Thresholds by condition, mixed model", all)
+        .name("", "condition", &|c| c.0.as_str().to_owned())
+        .number(column("mean", "mean"), plain, &|c| c.1.mean())
+        .ends(column("95 %", "mean_ci95"), plain, &|c| {
+            c.1.ci95.as_ref()?.ends()
+        })
         .notes(ratios.into_iter().chain(why))
 }
 
 /// Contrasts of thresholds.
-fn contrasts(values: &Values) -> Table {
-    of_pairs(
-        values,
-        &["psy_mixed"],
-        "Contrasts of thresholds",
-        "conditions",
-    )
-    .done()
+fn contrasts(results: &PartResults) -> Table {
+    let model = results.over.psy_mixed.as_ref();
+    of_model("Contrasts of thresholds", model)
 }
 
 /// Contrasts of estimated magnitudes.
-fn magnitude_contrasts(values: &Values) -> Table {
-    let caption = "Contrasts of estimated magnitudes";
-    of_pairs(values, &["magnitude_mixed"], caption, "conditions").done()
+fn magnitude_contrasts(results: &PartResults) -> Table {
+    let model = results.magnitude_mixed.as_ref();
+    of_model("Contrasts of estimated magnitudes", model)
+}
+
+fn of_model(caption: &str, model: Option<&ConditionModel>) -> Table {
+    let pairs = model.into_iter().flat_map(|m| &m.pairs);
+    of_pairs(caption, "conditions", pairs).done()
 }
 
 /// Contrasts of groups and of sessions.
-fn group_pairs(values: &Values) -> Table {
+fn group_pairs(results: &PartResults) -> Table {
+    let again = &results.over.again;
+    let groups = again.groups.iter().flat_map(|g| &g.pairs);
+    let sessions = again.sessions.iter().flat_map(|s| &s.pairs);
     let caption = "Contrasts of groups and sessions";
-    of_pairs(values, &["groups", "sessions"], caption, "names")
-        .stat("g", "hedges_g", two)
+    of_pairs(caption, "names", groups.chain(sessions))
+        .field(column("g", "hedges_g"), two, |c| &c.1.hedges_g)
         .done()
 }
 
-/// A contrast: the group of its statistics, and the pair.
-type Contrast<'a> = (&'a str, &'a str);
-
 /// The columns that all contrasts have: ratios or differences.
 fn of_pairs<'a>(
-    values: &'a Values,
-    groups: &[&'static str],
     caption: &str,
     file: &str,
-) -> Builder<'a, Contrast<'a>> {
-    let all = groups.iter().flat_map(|group| {
-        let pairs = names(values, group).into_iter();
-        pairs.map(move |pair| (*group, pair))
-    });
-    let ratio = |c: Contrast<'_>| values.number(&format!("{}/{}/ratio", c.0, c.1));
-    let difference = |c: Contrast<'_>| values.number(&format!("{}/{}/difference", c.0, c.1));
-    let estimate = |c: Contrast<'_>| ratio(c).or_else(|| difference(c));
-    let get = move |c: Contrast<'_>, what: &str| values.number(&format!("{}/{}/{what}", c.0, c.1));
-    Builder::new(caption, all.filter(|c| estimate(*c).is_some()), get)
-        .name("", file, &|c| {
-            both(c.1, if ratio(c).is_some() { " / " } else { " − " })
+    pairs: impl Iterator<Item = (&'a PairName, &'a Contrast)>,
+) -> Builder<(&'a PairName, &'a Contrast)> {
+    let all = pairs.filter(|c| c.1.estimate().1.is_some());
+    Builder::new(caption, all)
+        .name("", file, &|(pair, contrast)| {
+            let sign = if contrast.ratio.is_some() {
+                " / "
+            } else {
+                " − "
+            };
+            pair.names().join(sign)
         })
-        .number(page("estimate").file("estimate"), plain, &estimate)
-        .interval(page("95 %").file("estimate_ci95"), "ci95", plain)
-        .stat("t", "t", two)
-        .stat("df", "df", two)
-        .stat("p (Holm)", "p_holm", bare_p)
+        .number(column("estimate", "estimate"), plain, &|c| c.1.estimate().1)
+        .ends(column("95 %", "estimate_ci95"), plain, &|c| c.1.ci95.ends())
+        .field(column("t", "t"), two, |c| &c.1.t)
+        .field(column("df", "df"), two, |c| &c.1.df)
+        .field(column("p (Holm)", "p_holm"), bare_p, |c| &c.1.p_holm)
 }
 
 /// Means of groups and of sessions.
-fn groups(values: &Values) -> Table {
-    let kinds = ["groups", "sessions"];
-    let get =
-        |(kind, name): (&str, &str), what: &str| values.number(&format!("{kind}/{name}/{what}"));
-    let mean = |row, what| mean(&|what| get(row, what), what);
-    let all = kinds.into_iter().flat_map(|kind| {
-        let names = names(values, kind).into_iter();
-        names.map(move |name| (kind, name))
-    });
-    let means = all.filter(|row| !row.1.contains('|') && mean(*row, "mean").is_some());
-    let why = kinds.into_iter().filter_map(|kind| {
-        let why = Untrusted(values.reason(&format!("{kind}/F"))?);
+fn groups(results: &PartResults) -> Table {
+    let (groups, sessions) = (&results.over.again.groups, &results.over.again.sessions);
+    let of_groups = groups.iter().flat_map(|g| &g.groups);
+    let of_groups = of_groups.map(|(name, center)| (name.as_str(), center));
+    let of_sessions = sessions.iter().flat_map(|s| &s.conditions);
+    let of_sessions = of_sessions.map(|(name, center)| (name.as_str(), center));
+    let means = (of_groups.chain(of_sessions)).filter(|(_, center)| center.mean().is_some());
+    let why = [
+        ("groups", groups.as_ref().map(|g| &g.test.f)),
+        ("sessions", sessions.as_ref().map(|s| &s.test.f)),
+    ];
+    let why = why.into_iter().filter_map(|(kind, f)| {
+        let why = Untrusted(f?.reason()?);
         Some(format!("No comparison of {kind}: {why}."))
     });
-    Builder::new("Groups and sessions", means, &get)
-        .name("", "name", &|row| unescaped(row.1))
-        .stat("n", "n", count)
-        .number(page("mean").file("mean"), plain, &|row| mean(row, "mean"))
-        .number(page("SD").file("sd"), plain, &|row| mean(row, "sd"))
-        .interval(page("95 %").file("mean_ci95"), "ci95", plain)
+    Builder::new("Groups and sessions", means)
+        .name("", "name", &|(name, _)| name.to_owned())
+        .field(column("n", "n"), count, |(_, c)| &c.n)
+        .number(column("mean", "mean"), plain, &|(_, c)| c.mean())
+        .number(column("SD", "sd"), plain, &|(_, c)| c.sd())
+        .ends(column("95 %", "mean_ci95"), plain, &|(_, c)| {
+            c.ci95.as_ref()?.ends()
+        })
         .notes(why)
 }
 
-fn comparisons(values: &Values) -> Table {
-    let get = |cell: (&str, &str), what: &str| of_cell(values, "psy", cell, what);
-    let all = participants(values, "psy").into_iter();
-    let compared = all.filter(|cell| get(*cell, "pse").is_some());
-    Builder::new("Comparisons with the standard", compared, &get)
-        .name("", "participant", &|cell| unescaped(cell.0))
-        .name("condition", "condition", &|cell| unescaped(cell.1))
-        .stat("PSE", "pse", plain)
-        .interval(page("95 %").file("pse_ci95"), "pse_ci95", plain)
-        .stat("constant error", "constant_error", plain)
-        .stat("JND", "jnd", plain)
-        .stat("Weber fraction", "weber_fraction", plain)
+fn comparisons(results: &PartResults) -> Table {
+    let all = results.psy.iter();
+    let compared = all.filter_map(|(cell, f)| Some((cell, f.with_standard.as_ref()?)));
+    let compared = compared.filter(|(_, found)| found.pse.number().is_some());
+    of_cells("Comparisons with the standard", compared)
+        .field(column("PSE", "pse"), plain, |c| &c.1.pse)
+        .ends(column("95 %", "pse_ci95"), plain, &|c| c.1.pse_ci95.ends())
+        .field(column("constant error", "constant_error"), plain, |c| {
+            &c.1.constant_error
+        })
+        .field(column("JND", "jnd"), plain, |c| &c.1.jnd)
+        .field(column("Weber fraction", "weber_fraction"), plain, |c| {
+            &c.1.weber_fraction
+        })
         .done()
 }
 
@@ -296,81 +275,67 @@ fn two_or_0(x: f64) -> String {
     two(if x.abs() < 1e-9 { 0.0 } else { x })
 }
 
-fn sensitivities(values: &Values) -> Table {
-    let number = |cell: (&str, &str), what: &str| of_cell(values, "sdt", cell, what);
-    // Where participants compare the intervals, d′ is that of differencing.
-    let get = |cell: (&str, &str), what: &str| {
-        let id = format!("sdt/{}/{}/d_differencing", cell.0, cell.1);
-        match values.get(&id) {
-            Some(_) => number(cell, &what.replacen('d', "d_differencing", 1)),
-            None => number(cell, what),
-        }
-    };
-    let bias = |cell| {
-        let mut all = ["criterion", "interval_bias", "bias"].into_iter();
-        all.find_map(|bias| number(cell, bias))
-    };
-    let groups = names(values, "sdt_group").into_iter().filter_map(|group| {
-        let id = |what: &str| format!("sdt_group/{group}/{what}");
+fn sensitivities(results: &PartResults) -> Table {
+    let groups = results.over.sdt_group.iter().filter_map(|(group, found)| {
         Some(format!(
             "{}: mean d′ {} {} of {} participants.",
-            spelled(group),
-            two(values.number(&id("d/mean"))?),
-            interval_or_dash(values.interval(&id("d/ci95")), two),
-            values.number(&id("n")).unwrap_or_default(),
+            name(group.as_str()),
+            two(found.d.mean.number()?),
+            interval_or_dash(found.d.ci95.ends(), two),
+            found.n.number().unwrap_or_default(),
         ))
     });
-    Builder::new("Sensitivities", participants(values, "sdt"), &get)
-        .name("", "participant", &|cell| unescaped(cell.0))
-        .name("condition", "condition", &|cell| unescaped(cell.1))
-        .stat("d′", "d", two)
-        .interval(page("95 %").file("d_ci95"), "d_ci95", two)
-        .number(page("bias").file("bias"), two_or_0, &bias)
+    of_cells::<Sensitivity>("Sensitivities", results.sdt.iter())
+        .number(column("d′", "d"), two, &|c| c.1.d().0)
+        .ends(column("95 %", "d_ci95"), two, &|c| c.1.d().1)
+        .number(column("bias", "bias"), two_or_0, &|c| c.1.bias())
         .notes(groups)
 }
 
 /// Items, the most preferred first.
-fn abilities(values: &Values) -> Table {
-    let get = |item: &str, what: &str| values.number(&format!("pairs/{what}/{item}"));
-    let ability = |item: &str| get(item, "ability");
-    let mut items: Vec<&str> = (values.iter())
-        .filter_map(|(id, _)| id.strip_prefix("pairs/ability/"))
-        .collect();
-    let order = |item: &str| ability(item).unwrap_or(f64::MIN);
+fn abilities(results: &PartResults) -> Table {
+    let pairs = results.pairs.as_ref();
+    let mut items: Vec<(&RealizationName, &Ability)> =
+        pairs.into_iter().flat_map(|p| &p.items.0).collect();
+    let order = |item: &(&RealizationName, &Ability)| item.1.ability.number().unwrap_or(f64::MIN);
     items.sort_by(|a, b| order(b).total_cmp(&order(a)));
     let mut notes = Vec::new();
-    if let Some(item) = items.first().filter(|item| ability(item).is_none()) {
-        let why = values.reason(&format!("pairs/ability/{item}"));
-        notes.push(format!("No abilities: {}.", name(why.unwrap_or_default())));
+    if let Some(why) = items.first().and_then(|item| item.1.ability.reason()) {
+        notes.push(format!("No abilities: {}.", name(why)));
         items.clear();
-    } else if let Some(order) = values.number("pairs/order") {
-        let p = or_dash(values.number("pairs/order_p"), apa::p);
+    } else if let Some(effect) = pairs.and_then(|p| p.order.as_ref())
+        && let Some(order) = effect.order.number()
+    {
+        let p = or_dash(effect.order_p.number(), apa::p);
         notes.push(format!(
             "Order: {} for what is presented first, p {p}.",
             two(order)
         ));
     }
-    Builder::new("Preferences", items, &get)
-        .name("", "realization", &unescaped)
-        .stat("ability", "ability", two_or_0)
-        .stat_as(page("SE").file("se"), "ability_se", two)
-        .interval(page("95 %").file("ability_ci95"), "ability_ci95", two)
+    Builder::new("Preferences", items)
+        .name("", "realization", &|item| item.0.as_str().to_owned())
+        .field(column("ability", "ability"), two_or_0, |i| &i.1.ability)
+        .field(column("SE", "se"), two, |i| &i.1.ability_se)
+        .ends(column("95 %", "ability_ci95"), two, &|i| {
+            i.1.ability_ci95.ends()
+        })
         .notes(notes)
 }
 
 /// Differences of abilities.
-fn differences(values: &Values) -> Table {
-    let get = |pair: &str, what: &str| values.number(&format!("pairs/{pair}/{what}"));
-    let pairs = values.iter().filter_map(|(id, value)| {
-        let pair = id.strip_prefix("pairs/")?.strip_suffix("/difference")?;
-        matches!(value, Value::Number(_)).then_some(pair)
-    });
-    Builder::new("Differences of abilities", pairs, &get)
-        .name("", "realizations", &|pair| both(pair, " − "))
-        .stat("difference", "difference", two_or_0)
-        .stat("SE", "se", two)
-        .stat("clustered", "se_clustered", two)
-        .stat("preferred", "preferred", two)
-        .stat("p (Holm)", "p_holm", bare_p)
+fn differences(results: &PartResults) -> Table {
+    let pairs = results.pairs.iter().flat_map(|p| &p.pairs);
+    let pairs = pairs.filter(|p| p.1.difference.number().is_some());
+    Builder::new("Differences of abilities", pairs)
+        .name("", "realizations", &|p| p.0.names().join(" − "))
+        .field(column("difference", "difference"), two_or_0, |p| {
+            &p.1.difference
+        })
+        .field(column("SE", "se"), two, |p| &p.1.se)
+        .field(column("clustered", "se_clustered"), two, |p| {
+            &p.1.se_clustered
+        })
+        .field(column("preferred", "preferred"), two, |p| &p.1.preferred)
+        .field(column("p (Holm)", "p_holm"), bare_p, |p| &p.1.p_holm)
         .done()
 }

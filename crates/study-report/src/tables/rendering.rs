@@ -1,7 +1,7 @@
 //! Tables of the force of the playbacks.
 
 use crate::apa::{self, plain, three};
-use crate::table::{Builder, Table, none, page, report};
+use crate::table::{Builder, Table, page, report};
 use study_analysis::analyze::Analysis;
 use study_analysis::analyze::results::{Judged, Number as _};
 
@@ -15,10 +15,7 @@ pub(crate) fn is_judged(a: &Analysis) -> bool {
 }
 
 /// The columns of the verdicts; what is marked includes the faults.
-fn with_verdicts<'a, T: Copy>(
-    table: Builder<'a, T>,
-    judged: fn(T) -> &'a Judged,
-) -> Builder<'a, T> {
+fn with_verdicts<'a, T: Copy>(table: Builder<T>, judged: fn(T) -> &'a Judged) -> Builder<T> {
     let verdict = |name: &str, what: &str| page(name).file(what);
     table
         .field(verdict("right", "n_ok"), plain, |t| &judged(t).n_ok)
@@ -46,7 +43,7 @@ pub(crate) fn rendered(a: &Analysis) -> Table {
         playbacks.judged.n_ok.number()?;
         Some((m, playbacks))
     });
-    let table = Builder::new("Force of the playbacks, by realization", rows, &none)
+    let table = Builder::new("Force of the playbacks, by realization", rows)
         .text(report("realization"), &|(m, _)| m.id.clone());
     with_verdicts(table, |(_, p)| &p.judged)
         .field(page("VAF, mean"), four, |(_, p)| &p.rendered_vaf.mean)
@@ -66,7 +63,7 @@ pub(crate) fn rendered_by_participant(a: &Analysis) -> Table {
     let rendering = a.results.evidence.rendering.as_ref();
     let rows = rendering.into_iter().flat_map(|r| &r.participants);
     let rows = rows.filter(|(_, judged)| judged.n_ok.number().is_some());
-    let table = Builder::new("Force of the playbacks, by participant", rows, &none)
+    let table = Builder::new("Force of the playbacks, by participant", rows)
         .text(report("participant"), &|(name, _)| name.as_str().to_owned());
     with_verdicts(table, |(_, judged)| judged).done()
 }

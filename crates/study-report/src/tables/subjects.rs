@@ -1,7 +1,7 @@
 //! The table of participants.
 
 use crate::apa::{self, two, whole};
-use crate::table::{Builder, Table, file, none, page, report};
+use crate::table::{Builder, Table, file, page, report};
 use study_analysis::analyze::Analysis;
 use study_analysis::analyze::results::{Number as _, ParticipantName, Screened, Stat};
 
@@ -16,7 +16,7 @@ pub(crate) fn subjects(a: &Analysis) -> Table {
     let enough = a.tested().count() > 2;
     let caption = "Screening of participants (nobody is excluded by it)";
     let column = |head: &str, name: &str| page(head).file(name);
-    let mut table = Builder::new(caption, all, &none)
+    let mut table = Builder::new(caption, all)
         .name("participant", "subject", &|s: Row<'_>| {
             s.0.as_str().to_owned()
         })

@@ -6,16 +6,16 @@ use crate::apa::name;
 use crate::part_answers::{Answered, answered, answers, banner, caveats};
 use crate::table::Table;
 use crate::tables::parts::tables;
-use study_analysis::analyze::Values;
 use study_analysis::analyze::psychophysics::PartAnalysis;
+use study_analysis::analyze::psychophysics::results::PartResults;
 use study_base::text::{Untrusted, counted};
 
 /// The statistics of a table of trials.
-pub fn trials(title: &str, task: &str, rows: usize, values: &Values, page: Page) -> String {
+pub fn trials(title: &str, task: &str, rows: usize, results: &PartResults, page: Page) -> String {
     let paint = Paint(page.color);
     let mut out = paint.strong(&name(title));
     out += &format!("\n{task}, {}\n\n", counted(rows, "row", "rows"));
-    out + &all_tables(values, page)
+    out + &all_tables(results, page)
 }
 
 /// A part of a study: its tables, answers and caveats.
@@ -33,7 +33,7 @@ pub fn part(title: &str, part: &PartAnalysis, page: Page) -> String {
         out += &paint.warn(&format!("{text}\n"));
     }
     out.push('\n');
-    out += &all_tables(&part.values, page);
+    out += &all_tables(&part.results, page);
     for Answered {
         question,
         short,
@@ -54,10 +54,10 @@ pub fn part(title: &str, part: &PartAnalysis, page: Page) -> String {
     out
 }
 
-fn all_tables(values: &Values, page: Page) -> String {
+fn all_tables(results: &PartResults, page: Page) -> String {
     let width = page.width.clamp(60, 100);
     let paint = Paint(page.color);
-    let tables = tables(values);
+    let tables = tables(results);
     (tables.iter().map(|table| one(table, width, paint))).collect()
 }
 

@@ -4,22 +4,79 @@
 //! threshold or a sensitivity. Groups are compared over what all of them have, sessions
 //! over what all sessions have.
 
-use super::over_participants::{NOT_POSITIVE, Threshold, mixed};
-use super::part_data::Measured;
-use crate::analyze::identifiers::{group_id, pair_id};
-use crate::analyze::values::Values;
+use super::over_participants::{
+    Center, ConditionModel, Contrast, FTest, Measured, NOT_POSITIVE, Threshold, mixed,
+};
+use crate::analyze::keys::GroupName;
+use crate::analyze::record::{Interval, PairName, Stat, statistics};
 use std::collections::{BTreeMap, BTreeSet};
 use study_stats::agreement::icc;
 use study_stats::between::{self, welch};
 use study_stats::describe::{mean, sd};
 use study_stats::paired::holm;
 
+statistics! {
+    /// Welch's (1951) analysis of variance of the participants' means over what all groups have.
+    pub struct Groups {
+        /// conditions and sessions that all groups have
+        n_cells: Stat,
+        /// whether groups differ
+        test: FTest as "",
+        /// by group
+        groups: BTreeMap<GroupName, Center> as "",
+        /// by pair of groups
+        pairs: BTreeMap<PairName, Contrast> as "",
+    }
+
+    /// The interaction of group and condition over what all groups have, in an analysis of variance between and within participants.
+    pub struct Profiles {
+        /// number of conditions
+        n_conditions: Stat,
+        /// number of participants
+        n: Stat,
+        /// of the interaction
+        test: FTest as "",
+        /// Greenhouse and Geisser's ε from the covariance within groups
+        eps_gg: Stat,
+        /// p with their correction, which decides
+        p_gg: Stat,
+    }
+
+    /// How alike the sessions are (Shrout & Fleiss 1979).
+    pub struct Retest {
+        /// ICC(A,1)
+        icc_agreement: Stat,
+        /// of ICC(A,1)
+        icc_agreement_ci95: Interval,
+        /// ICC(C,1)
+        icc_consistency: Stat,
+        /// of ICC(C,1)
+        icc_consistency_ci95: Interval,
+        /// participants who came to all sessions
+        n: Stat,
+        /// √(residual mean square)
+        sem: Stat,
+    }
+
+    /// Groups and sessions.
+    pub struct Again {
+        /// whether groups differ
+        groups: Option<Groups>,
+        /// whether what the conditions do depends on the group
+        groups_conditions: Option<Profiles>,
+        /// whether sessions differ, over what a participant has in all of their sessions
+        sessions: Option<ConditionModel>,
+        /// how alike they are
+        retest: Option<Retest>,
+    }
+}
+
 /// Condition and session.
 type Cell<'a> = (&'a str, Option<&'a str>);
 
 /// The statistics of groups and sessions; of `ratios` over natural logarithms. Sessions are
 /// in the order of the protocol.
-pub(super) fn again(measured: &[Measured], sessions: &[&str], ratios: bool, values: &mut Values) {
+pub(super) fn again(measured: &[Measured], sessions: &[&str], ratios: bool) -> Again {
     let logs: Vec<Measured> = (measured.iter())
         .map(|m| Measured {
             value: if ratios { libm::log(m.value) } else { m.value },
@@ -27,12 +84,21 @@ pub(super) fn again(measured: &[Measured], sessions: &[&str], ratios: bool, valu
         })
         .collect();
     let usable = logs.iter().all(|m| m.value.is_finite());
-    if logs.iter().any(|m| m.group.is_some()) {
-        between_groups(&logs, ratios, usable, values);
+    let common = have_groups(&logs).then(|| Common::of(&logs));
+    let (sessions, retest) = match sessions.len() > 1 {
+        true => between_sessions(&logs, sessions, ratios, usable),
+        false => (None, None),
+    };
+    Again {
+        groups: (common.as_ref()).map(|common| between_groups(common, ratios, usable)),
+        groups_conditions: common.filter(|_| usable).and_then(|c| profiles(&c)),
+        sessions,
+        retest,
     }
-    if sessions.len() > 1 {
-        between_sessions(&logs, sessions, ratios, usable, values);
-    }
+}
+
+fn have_groups(measured: &[Measured]) -> bool {
+    measured.iter().any(|m| m.group.is_some())
 }
 
 /// The numbers of each participant in these cells, in their order; only of those who have all
@@ -92,18 +158,16 @@ impl<'a> Common<'a> {
 
 /// Groups by conditions only, of numbers whose mean over the conditions says nothing of a
 /// participant.
-pub(super) fn by_condition(measured: &[Measured], values: &mut Values) {
-    if measured.iter().any(|m| m.group.is_some()) {
-        profiles(&Common::of(measured), values);
+pub(super) fn by_condition(measured: &[Measured]) -> Again {
+    let common = have_groups(measured).then(|| Common::of(measured));
+    Again {
+        groups_conditions: common.and_then(|common| profiles(&common)),
+        ..Again::undefined("")
     }
 }
 
-fn between_groups(measured: &[Measured], ratios: bool, usable: bool, values: &mut Values) {
+fn between_groups(all: &Common<'_>, ratios: bool, usable: bool) -> Groups {
     let shown = |x: f64| if ratios { libm::exp(x) } else { x };
-    let all = Common::of(measured);
-    if usable {
-        profiles(&all, values);
-    }
     let means = |rows: &Vec<Vec<f64>>| -> Vec<f64> {
         let rows = rows.iter().filter(|_| usable);
         rows.filter_map(|row| mean(row)).collect()
@@ -121,22 +185,21 @@ fn between_groups(measured: &[Measured], ratios: bool, usable: bool, values: &mu
     } else {
         "a group has fewer than two participants, or they are all alike"
     };
-    let mut group = values.group("groups", why);
-    group.put("n_cells", all.cells.len() as f64);
-    group.maybe("F", test.map(|t| t.f));
-    group.maybe("df1", test.map(|t| t.df1));
-    group.maybe("df2", test.map(|t| t.df2));
-    group.maybe("p", test.and_then(|t| t.p));
-    let (center, difference) = match ratios {
-        true => ("geometric_mean", "ratio"),
-        false => ("mean", "difference"),
-    };
-    for (name, x) in &groups {
-        let mut group = values.group(group_id("groups", &[name]), why);
-        group.put("n", x.len() as f64);
-        group.maybe(center, mean(x).map(shown));
-        group.maybe(if ratios { "geometric_sd" } else { "sd" }, sd(x).map(shown));
-    }
+    let stat = |x: Option<f64>| Stat::or(x, why);
+    let of_ratios = |x: Option<f64>| ratios.then(|| stat(x));
+    let of_differences = |x: Option<f64>| (!ratios).then(|| stat(x));
+    let centers = groups.iter().map(|(name, x)| {
+        let (mean, sd) = (mean(x).map(shown), sd(x).map(shown));
+        let center = Center {
+            n: Some(Stat::count(x.len())),
+            geometric_mean: of_ratios(mean),
+            mean: of_differences(mean),
+            geometric_sd: of_ratios(sd),
+            sd: of_differences(sd),
+            ci95: None,
+        };
+        ((*name).into(), center)
+    });
     let list: Vec<(&str, &Vec<f64>)> = groups.iter().map(|(name, x)| (*name, x)).collect();
     let pairs: Vec<(usize, usize)> = (0..list.len())
         .flat_map(|a| (a + 1..list.len()).map(move |b| (a, b)))
@@ -145,24 +208,42 @@ fn between_groups(measured: &[Measured], ratios: bool, usable: bool, values: &mu
         .map(|(a, b)| welch::difference(list[*a].1, list[*b].1))
         .collect();
     let p: Vec<Option<f64>> = found.iter().map(|d| d.and_then(|d| d.p)).collect();
-    for (((a, b), found), (p, p_holm)) in pairs.iter().zip(&found).zip(p.iter().zip(holm(&p))) {
-        let mut group = values.group(pair_id("groups", list[*a].0, list[*b].0), why);
-        group.maybe(difference, found.map(|d| shown(d.difference)));
-        group.interval("ci95", found.map(|d| (shown(d.ci95.0), shown(d.ci95.1))));
-        group.maybe("t", found.map(|d| d.t));
-        group.maybe("df", found.map(|d| d.df));
-        group.maybe("p", *p);
-        group.maybe("p_holm", p_holm);
-        group.maybe("hedges_g", found.and_then(|d| d.hedges_g));
+    let p_holm = holm(&p);
+    let contrasts = pairs.iter().enumerate().map(|(k, (a, b))| {
+        let found = found[k];
+        let estimate = found.map(|d| shown(d.difference));
+        let ends = found.map(|d| (shown(d.ci95.0), shown(d.ci95.1)));
+        let contrast = Contrast {
+            ratio: of_ratios(estimate),
+            difference: of_differences(estimate),
+            ci95: Interval::or(ends, why),
+            t: stat(found.map(|d| d.t)),
+            df: stat(found.map(|d| d.df)),
+            p: stat(p[k]),
+            p_holm: stat(p_holm[k]),
+            hedges_g: Some(stat(found.and_then(|d| d.hedges_g))),
+        };
+        (PairName::of(list[*a].0, list[*b].0), contrast)
+    });
+    Groups {
+        n_cells: Stat::count(all.cells.len()),
+        test: FTest {
+            f: stat(test.map(|t| t.f)),
+            df1: stat(test.map(|t| t.df1)),
+            df2: stat(test.map(|t| t.df2)),
+            p: stat(test.and_then(|t| t.p)),
+        },
+        groups: centers.collect(),
+        pairs: contrasts.collect(),
     }
 }
 
 /// Whether what the conditions do depends on the group: the interaction of both, of each
 /// participant's means over the sessions. Nothing of one group or one condition.
-fn profiles(common: &Common<'_>, values: &mut Values) {
+fn profiles(common: &Common<'_>) -> Option<Profiles> {
     let conditions: BTreeSet<&str> = common.cells.iter().map(|(c, _)| *c).collect();
     if conditions.len() < 2 || common.groups.len() < 2 {
-        return;
+        return None;
     }
     let of_conditions = |row: &Vec<f64>| -> Vec<f64> {
         let of = |condition: &&str| {
@@ -185,15 +266,19 @@ fn profiles(common: &Common<'_>, values: &mut Values) {
     };
     let found = found.as_ref();
     let why = "too few participants have all conditions that the groups have in common";
-    let mut group = values.group("groups_conditions", why);
-    group.put("n_conditions", conditions.len() as f64);
-    group.put("n", rows.iter().map(Vec::len).sum::<usize>() as f64);
-    group.maybe("F", found.and_then(|f| f.f));
-    group.maybe("df1", found.map(|f| f.df1));
-    group.maybe("df2", found.map(|f| f.df2));
-    group.maybe("p", found.and_then(|f| f.p));
-    group.maybe("eps_gg", found.and_then(|f| f.eps_gg));
-    group.maybe("p_gg", found.and_then(|f| f.p_gg));
+    let stat = |x: Option<f64>| Stat::or(x, why);
+    Some(Profiles {
+        n_conditions: Stat::count(conditions.len()),
+        n: Stat::count(rows.iter().map(Vec::len).sum()),
+        test: FTest {
+            f: stat(found.and_then(|f| f.f)),
+            df1: stat(found.map(|f| f.df1)),
+            df2: stat(found.map(|f| f.df2)),
+            p: stat(found.and_then(|f| f.p)),
+        },
+        eps_gg: stat(found.and_then(|f| f.eps_gg)),
+        p_gg: stat(found.and_then(|f| f.p_gg)),
+    })
 }
 
 fn between_sessions(
@@ -201,8 +286,7 @@ fn between_sessions(
     sessions: &[&str],
     ratios: bool,
     usable: bool,
-    values: &mut Values,
-) {
+) -> (Option<ConditionModel>, Option<Retest>) {
     // Conditions that every session has; of each participant those of that participant's group.
     let mut own: BTreeMap<&str, BTreeMap<&str, BTreeMap<&str, f64>>> = BTreeMap::new();
     for m in measured {
@@ -241,35 +325,35 @@ fn between_sessions(
             value: if ratios { libm::exp(*value) } else { *value },
         })
         .collect();
-    if usable {
-        mixed("sessions", &of_cells, ratios, values);
-    }
     let found = icc(&rows).filter(|_| usable);
     let why = if usable {
         "fewer than two participants have been to all sessions"
     } else {
         NOT_POSITIVE
     };
-    for (name, found) in [
-        ("agreement", found.as_ref().and_then(|f| f.icc2)),
-        ("consistency", found.as_ref().and_then(|f| f.icc3)),
-    ] {
-        let mut group = values.group("retest", why);
-        group.maybe(&format!("icc_{name}"), found.map(|c| c.value));
-        let ci95 = found
-            .and_then(|c| c.ci95)
-            .and_then(|(low, high)| low.zip(high));
-        group.interval(&format!("icc_{name}_ci95"), ci95);
-    }
-    let mut group = values.group("retest", why);
-    group.put("n", rows.len() as f64);
+    let ends =
+        |c: study_stats::agreement::Coefficient| c.ci95.and_then(|(low, high)| low.zip(high));
+    let [icc2, icc3] = [
+        found.as_ref().and_then(|f| f.icc2),
+        found.as_ref().and_then(|f| f.icc3),
+    ];
     let sem = found.as_ref().map(|f| f.ms_error.max(0.0).sqrt());
-    group.maybe("sem", sem);
+    let retest = Retest {
+        icc_agreement: Stat::or(icc2.map(|c| c.value), why),
+        icc_agreement_ci95: Interval::or(icc2.and_then(ends), why),
+        icc_consistency: Stat::or(icc3.map(|c| c.value), why),
+        icc_consistency_ci95: Interval::or(icc3.and_then(ends), why),
+        n: Stat::count(rows.len()),
+        sem: Stat::or(sem, why),
+    };
+    let model = usable.then(|| mixed(&of_cells, ratios)).flatten();
+    (model, Some(retest))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::analyze::record::{Field as _, Number as _};
 
     fn measured(rows: &[(&str, &str, &str, f64)]) -> Vec<Measured> {
         let one = |(participant, group, session, value): &(&str, &str, &str, f64)| Measured {
@@ -320,8 +404,7 @@ mod tests {
     /// lmer(v ~ s + (1|p)); ICC(2,1) and ICC(3,1) from anova(lm(v ~ p + s)).
     #[test]
     fn groups_and_sessions_are_those_of_r() {
-        let mut values = Values::default();
-        again(&measured(&ROWS), &["one", "two"], false, &mut values);
+        let values = again(&measured(&ROWS), &["one", "two"], false).values();
         for (id, expected) in REFERENCE {
             let found = values.number(id).unwrap_or(f64::NAN);
             assert!(
@@ -340,9 +423,8 @@ mod tests {
             value: 100.0,
             ..m
         }));
-        let (mut with, mut without) = (Values::default(), Values::default());
-        again(&rows, &[], false, &mut with);
-        again(&measured(&ROWS), &[], false, &mut without);
+        let with = again(&rows, &[], false).values();
+        let without = again(&measured(&ROWS), &[], false).values();
         for id in [
             "groups/F",
             "groups/p",
@@ -387,8 +469,7 @@ mod tests {
             all.collect::<Vec<_>>()
         });
         let rows: Vec<Measured> = rows.collect();
-        let mut values = Values::default();
-        again(&rows, &[], false, &mut values);
+        let values = again(&rows, &[], false).values();
         for (id, expected) in INTERACTION {
             let id = format!("groups_conditions/{id}");
             let found = values.number(&id).unwrap_or(f64::NAN);
@@ -398,9 +479,7 @@ mod tests {
             );
         }
         // Nothing without a second condition.
-        let mut values = Values::default();
-        again(&rows[..1], &[], false, &mut values);
-        assert_eq!(values.get("groups_conditions/F"), None);
+        assert_eq!(again(&rows[..1], &[], false).groups_conditions, None);
     }
 
     /// By condition, what the participants differ by in all conditions does not matter.
@@ -427,14 +506,9 @@ mod tests {
                     row(who, group, "b", x[1] + up),
                 ]
             });
-            let mut values = Values::default();
-            by_condition(&rows.collect::<Vec<_>>(), &mut values);
-            assert!(
-                values
-                    .iter()
-                    .all(|(id, _)| id.starts_with("groups_conditions/"))
-            );
-            values.number("groups_conditions/F").unwrap()
+            let found = by_condition(&rows.collect::<Vec<_>>());
+            assert_eq!((found.groups, found.sessions), (None, None));
+            found.groups_conditions.unwrap().test.f.number().unwrap()
         };
         // t² of the differences -.6, -.4 against .2, .8 with 2 degrees of freedom.
         assert!((of(0.0) - 10.0).abs() < 1e-9, "{}", of(0.0));
@@ -443,17 +517,19 @@ mod tests {
 
     #[test]
     fn thresholds_are_compared_as_ratios() {
-        let mut values = Values::default();
-        again(&measured(&ROWS), &["one", "two"], true, &mut values);
-        let number = |id: &str| values.number(id).unwrap();
-        let ratio = number("groups/x/geometric_mean") / number("groups/y/geometric_mean");
-        assert!((number("groups/x|y/ratio") - ratio).abs() < 1e-12);
-        assert!(number("sessions/one|two/ratio") < 1.0);
+        let found = again(&measured(&ROWS), &["one", "two"], true);
+        let (groups, sessions) = (found.groups.unwrap(), found.sessions.unwrap());
+        let ratio = groups.groups["x"].mean().unwrap() / groups.groups["y"].mean().unwrap();
+        let (name, of_groups) = groups.pairs[&PairName::of("x", "y")].estimate();
+        assert_eq!(name, "ratio");
+        assert!((of_groups.unwrap() - ratio).abs() < 1e-12);
+        let (_, of_sessions) = sessions.pairs[&PairName::of("one", "two")].estimate();
+        assert!(of_sessions.unwrap() < 1.0);
         let mut rows = measured(&ROWS);
         rows[0].value = 0.0;
-        let mut values = Values::default();
-        again(&rows, &["one", "two"], true, &mut values);
-        assert_eq!(values.reason("groups/p"), Some(NOT_POSITIVE));
-        assert_eq!(values.reason("retest/icc_agreement"), Some(NOT_POSITIVE));
+        let found = again(&rows, &["one", "two"], true);
+        assert_eq!(found.groups.unwrap().test.p.reason(), Some(NOT_POSITIVE));
+        let retest = found.retest.unwrap();
+        assert_eq!(retest.icc_agreement.reason(), Some(NOT_POSITIVE));
     }
 }

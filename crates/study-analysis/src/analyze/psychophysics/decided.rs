@@ -2,12 +2,12 @@
 //! estimates and findings as those of a study's parts.
 
 use super::discriminations::sensitivity;
-use super::findings::{PartFacts, PartFinding, of_preferences, of_sensitivities, of_thresholds};
+use super::findings::{self, PartFacts, PartFinding, PartQuestion, of_model, of_preferences};
 use super::over_participants::{Threshold, Told, mixed, sensitivities};
 use super::preferences::{Preference, in_both_orders, preferences};
 use super::trials::{Asked, TrialCount, TrialSettings, discrimination};
-use crate::analyze::identifiers::group_id;
-use crate::analyze::values::Values;
+use crate::analyze::keys::CellName;
+use crate::analyze::record::Number as _;
 use std::collections::BTreeSet;
 use study_plan::protocol::parts::TrackRules;
 use study_stats::psychometric::{Level, group, posterior};
@@ -23,18 +23,15 @@ pub(crate) struct Compared {
 
 /// The finding of some answers to pairs, and the abilities on which that of VAF rests.
 pub(crate) fn compared(chosen: &[Preference], tie: bool, alpha: f64) -> Compared {
-    let values = preferences(chosen, tie, in_both_orders(chosen));
-    let names: BTreeSet<&String> = chosen.iter().flat_map(|p| [&p.first, &p.second]).collect();
-    let names: Vec<String> = names.into_iter().cloned().collect();
+    let found = preferences(chosen, tie, in_both_orders(chosen));
     let people: BTreeSet<&str> = chosen.iter().map(|p| p.participant.as_str()).collect();
     let facts = PartFacts {
-        values: &values,
         alpha,
         participants: people.len(),
     };
-    let ability = |name: &String| values.number(&group_id("pairs/ability", &[name]));
-    let abilities: Option<Vec<f64>> = names.iter().map(ability).collect();
-    let (findings, _) = of_preferences(&facts, &names);
+    let items = found.items.0.values();
+    let abilities: Option<Vec<f64>> = items.map(|item| item.ability.number()).collect();
+    let (findings, _) = of_preferences(&facts, &found);
     Compared {
         preferred: findings.into_iter().next(),
         abilities: abilities.unwrap_or_default(),
@@ -64,17 +61,13 @@ pub(crate) fn thresholds(
             value: *value,
         })
         .collect();
-    let mut values = Values::default();
-    mixed("psy_mixed", &of, ratios, &mut values);
-    let conditions: BTreeSet<&str> = found.iter().map(|t| t.1.as_str()).collect();
+    let model = mixed(&of, ratios)?;
     let people: BTreeSet<&str> = found.iter().map(|t| t.0.as_str()).collect();
     let facts = PartFacts {
-        values: &values,
         alpha,
         participants: people.len(),
     };
-    let conditions: Vec<&str> = conditions.into_iter().collect();
-    of_thresholds(&facts, &conditions).0.into_iter().next()
+    of_model(&facts, PartQuestion::Thresholds, Some(&model)).0
 }
 
 /// Half the 95 % interval of the mean threshold on a track, of its natural logarithm where
@@ -88,12 +81,13 @@ pub(crate) fn threshold_half_width(of_track: &[f64], ratios: bool) -> Option<f64
     Some(libm::log(high / low) / 2.0)
 }
 
-/// The findings of each track whether its two realizations are told apart.
+/// The findings of each track whether its two realizations are told apart; `None` if one has
+/// no sensitivities.
 pub(crate) fn told_apart(
     tracks: &[(&TrackRules, Asked, Vec<TrialCount>, &TrialSettings)],
     alpha: f64,
-) -> Vec<PartFinding> {
-    let (mut told, mut values) = (Vec::new(), Values::default());
+) -> Option<Vec<PartFinding>> {
+    let mut told = Vec::new();
     let mut people = 0;
     for (rules, asked, counts, settings) in tracks {
         let found = discrimination(*asked, counts, settings);
@@ -101,10 +95,8 @@ pub(crate) fn told_apart(
         people = people.max(participants.len());
         for participant in participants {
             let name = rules.id.as_str();
-            let id = |group: &str, what: &str| {
-                format!("{}/{what}", group_id(group, &[participant, name]))
-            };
-            if let Some((d, above_chance)) = sensitivity(*asked, rules, &found, &id) {
+            let own = found.sdt.get(&CellName::of(participant, name));
+            if let Some((d, above_chance)) = sensitivity(*asked, rules, own) {
                 told.push(Told {
                     condition: name.to_owned(),
                     d,
@@ -113,12 +105,13 @@ pub(crate) fn told_apart(
             }
         }
     }
-    sensitivities(&told, &mut values);
     let facts = PartFacts {
-        values: &values,
         alpha,
         participants: people,
     };
-    let names: Vec<&str> = tracks.iter().map(|t| t.0.id.as_str()).collect();
-    of_sensitivities(&facts, &names)
+    let groups = sensitivities(&told);
+    let of_track = |name: &str| Some(findings::told_apart(&facts, name, groups.get(name)?));
+    (tracks.iter())
+        .map(|(rules, ..)| of_track(rules.id.as_str()))
+        .collect()
 }

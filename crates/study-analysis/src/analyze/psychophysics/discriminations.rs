@@ -1,14 +1,14 @@
 //! The tracks of a part: functions, sensitivities, and what participants have in common.
 
 use super::again::again;
-use super::over_participants::{Threshold, Told, mixed, sensitivities};
-use super::part_data::{
-    Found, LevelData, Measured, PartData, StudyData, chosen, groups, sessions_of,
-};
-use super::tracks::{TrackName, of_session};
+use super::detection::Sensitivity;
+use super::over_participants::{Measured, Threshold, Told, mixed, sensitivities};
+use super::part_data::{Found, LevelData, PartData, StudyData, chosen, groups, sessions_of};
+use super::results::PartResults;
+use super::tracks::of_session;
 use super::trials::{Asked, TrialCount, TrialSettings, discrimination, level};
-use crate::analyze::identifiers::group_id;
-use crate::analyze::values::Values;
+use crate::analyze::keys::CellName;
+use crate::analyze::record::Number as _;
 use std::collections::{BTreeMap, BTreeSet};
 use study_base::text::PartId;
 use study_plan::protocol::Protocol;
@@ -26,7 +26,8 @@ pub(super) fn of_tracks(
 ) -> Option<Found> {
     let protocol = study.protocol;
     let methods: BTreeSet<&str> = tracks.iter().map(|t| t.method.as_str()).collect();
-    let (mut values, mut trials, mut task) = (Values::default(), 0, "discrimination");
+    let mut results = PartResults::undefined("");
+    let (mut trials, mut task) = (0, "discrimination");
     let (mut told, mut thresholds, mut measured) = (Vec::new(), Vec::new(), Vec::new());
     let (mut warnings, mut data) = (Vec::new(), PartData::default());
     let mut names = Vec::new();
@@ -52,11 +53,10 @@ pub(super) fn of_tracks(
         people.sort_unstable();
         people.dedup();
         for participant in &people {
-            let id = |group: &str, what: &str| {
-                format!("{}/{what}", group_id(group, &[participant, condition]))
-            };
-            let threshold = found.number(&id("psy", "posterior/threshold/mean"));
-            let told_apart = sensitivity(asked, rules, &found, &id);
+            let cell = CellName::of(participant, condition);
+            let threshold = found.psy.get(&cell);
+            let threshold = threshold.and_then(|f| f.posterior.threshold.mean.number());
+            let told_apart = sensitivity(asked, rules, found.sdt.get(&cell));
             if let Some(value) = threshold.or(told_apart.map(|t| t.0)) {
                 measured.push(Measured {
                     participant: (*participant).to_owned(),
@@ -81,7 +81,10 @@ pub(super) fn of_tracks(
                 protocol.fit(rules),
             ));
         }
-        values.extend(found);
+        results.psy.extend(found.psy);
+        results.pooled.extend(found.pooled);
+        results.sdt.extend(found.sdt);
+        results.over.psy_group.extend(found.over.psy_group);
         // Whoever does not count has no track either.
         for history in study.sessions {
             let Some(start) = history.start() else {
@@ -90,31 +93,25 @@ pub(super) fn of_tracks(
             let participant = start.participant.as_str();
             let in_session = session.is_none() || start.assigned.session_id.as_ref() == session;
             if in_session && people.binary_search(&participant).is_ok() {
-                let name = TrackName {
-                    participant,
-                    track: condition,
-                };
-                let to = (&mut values, &mut warnings);
-                data.tracks
-                    .extend(of_session(protocol, rules, history, name, to));
+                let name = CellName::of(participant, condition);
+                let found = of_session(protocol, rules, history, &name, &mut warnings);
+                if let Some((result, own)) = found {
+                    results.track.insert(name, result);
+                    data.tracks.push(own);
+                }
             }
         }
     }
-    sensitivities(&told, &mut values);
+    results.over.sdt_group = sensitivities(&told);
     let families = tracks.iter().filter_map(|t| protocol.family(t.family()?));
     let families: Vec<_> = families.collect();
     // Sensitivities have no ratios.
     let ratios = !thresholds.is_empty() && have_ratios(protocol, tracks);
     if !thresholds.is_empty() {
-        mixed(
-            "psy_mixed",
-            &over_sessions(&measured, ratios),
-            ratios,
-            &mut values,
-        );
+        results.over.psy_mixed = mixed(&over_sessions(&measured, ratios), ratios);
     }
     let ids: Vec<&str> = sessions.iter().flatten().map(|s| s.as_str()).collect();
-    again(&measured, &ids, ratios, &mut values);
+    results.over.again = again(&measured, &ids, ratios);
     data.measured = measured;
     if let Some(first) = families.first()
         && families.iter().all(|f| f.id == first.id)
@@ -124,7 +121,7 @@ pub(super) fn of_tracks(
     Some(Found {
         task,
         trials,
-        values,
+        results,
         warnings,
         data,
         names,
@@ -179,21 +176,19 @@ fn condition(track: &PartId, session: Option<&PartId>) -> String {
 pub(super) fn sensitivity(
     asked: Asked,
     rules: &TrackRules,
-    values: &Values,
-    id: &impl Fn(&str, &str) -> String,
+    found: Option<&Sensitivity>,
 ) -> Option<(f64, f64)> {
-    let get = |what: &str| values.number(&id("sdt", what));
+    let found = found?;
     match asked {
-        Asked::TwoIntervals | Asked::YesNo => Some((get("d")?, get("d")?)),
+        Asked::TwoIntervals | Asked::YesNo => Some((found.d.number()?, found.d.number()?)),
         Asked::ThreeIntervals | Asked::OddOneOut => {
             // Without a d′, if all answers are correct.
-            Some((
-                get("d")?,
-                get("share_correct")? - rules.method.guess_rate()?,
-            ))
+            let correct = found.share_correct.number()?;
+            Some((found.d.number()?, correct - rules.method.guess_rate()?))
         }
         Asked::Abx | Asked::SameDifferent => {
-            Some((get("d_differencing")?, get("share_unbiased")? - 0.5))
+            let unbiased = found.share_unbiased.number()?;
+            Some((found.d_differencing.number()?, unbiased - 0.5))
         }
         Asked::Comparison => None,
     }

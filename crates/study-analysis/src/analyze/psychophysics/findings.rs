@@ -1,10 +1,14 @@
 //! The findings of a part that is no rating.
 
-use super::preferences::ENOUGH_CLUSTERS;
+use super::again::Again;
+use super::over_participants::{ConditionModel, Contrast, FTest, GroupSensitivity};
+use super::preferences::{AbilityDifference, ENOUGH_CLUSTERS, Preferences};
 use crate::analyze::design::Design;
 use crate::analyze::findings::{Direction, Estimate, Finding, Pair, Test, TestKind, Verdict};
-use crate::analyze::identifiers::{group_id, pair_id};
-use crate::analyze::values::Values;
+use crate::analyze::identifiers::group_id;
+use crate::analyze::record::{Interval, Number, PairName, Stat};
+use crate::analyze::results::{Correlation, Permuted};
+use std::collections::BTreeMap;
 use study_base::apa;
 use study_stats::level::rejects;
 
@@ -55,17 +59,12 @@ impl PartQuestion {
 pub type PartFinding = Finding<PartQuestion>;
 
 /// What findings are made from.
-pub(super) struct PartFacts<'a> {
-    pub(super) values: &'a Values,
+pub(super) struct PartFacts {
     pub(super) alpha: f64,
     pub(super) participants: usize,
 }
 
-impl PartFacts<'_> {
-    fn number(&self, id: &str) -> Option<f64> {
-        self.values.number(id)
-    }
-
+impl PartFacts {
     fn design(&self, realizations: usize) -> Design {
         Design {
             participants: self.participants,
@@ -74,59 +73,100 @@ impl PartFacts<'_> {
         }
     }
 
-    fn undefined(&self, question: PartQuestion, id: &str, realizations: usize) -> PartFinding {
-        let why = self.values.reason(id).unwrap_or("there is no test");
+    /// A question without an answer, because this statistic has none.
+    fn undefined(
+        &self,
+        question: PartQuestion,
+        statistic: impl Number,
+        realizations: usize,
+    ) -> PartFinding {
+        let why = statistic.reason().unwrap_or(NO_TEST);
         Finding::undefined(question, why, self.design(realizations))
     }
 }
 
-/// The findings of preferences over these items, and their differences.
+const NO_TEST: &str = "there is no test";
+
+/// The findings of preferences, and the differences of the realizations.
 pub(super) fn of_preferences(
-    facts: &PartFacts<'_>,
-    items: &[String],
+    facts: &PartFacts,
+    preferences: &Preferences,
 ) -> (Vec<PartFinding>, Vec<Pair>) {
     let kind = match facts.participants {
         n if n >= ENOUGH_CLUSTERS => TestKind::WaldClustered,
         _ => TestKind::Wald,
     };
-    let of_pair = |a: &str, b: &str| {
-        let id = pair_id("pairs", a, b);
-        pair(facts, &id, (a, b), ("difference", kind, "z"))
+    let comparisons = preferences.pairs.len();
+    let of_pair = |(name, pair): (&PairName, &AbilityDifference)| {
+        let difference = pair.difference.number()?;
+        let se = pair.se_clustered.number();
+        let se = se.filter(|_| kind == TestKind::WaldClustered);
+        let z = se.or(pair.se.number()).map(|se| difference / se);
+        let test = pair.p_holm.number().map(|p| Test {
+            comparisons,
+            ..Test::single(kind, p, facts.alpha).with("z", z, &[None])
+        });
+        let estimate = estimate("difference", difference, &pair.ci95);
+        Some(compared(facts, name, estimate, test, &pair.p))
     };
-    let mut pairs = Vec::new();
-    for (i, a) in items.iter().enumerate() {
-        pairs.extend(items[i + 1..].iter().filter_map(|b| of_pair(a, b)));
+    let pairs: Vec<Pair> = preferences.pairs.iter().filter_map(of_pair).collect();
+    let mut found = vec![preferred(facts, preferences, &pairs)];
+    if let Some(vaf) = &preferences.vaf {
+        found.push(with_vaf(facts, PartQuestion::PreferenceVaf, vaf));
     }
-    let mut found = vec![preferred(facts, items, &pairs)];
-    if facts.values.get("pairs/vaf/n_models").is_some() {
-        found.push(with_vaf(facts, PartQuestion::PreferenceVaf, "pairs/vaf"));
-    }
-    if facts.values.get("pairs/order").is_some() {
-        found.push(interval_order(facts));
-    }
+    found.extend(interval_order(facts, preferences));
     (found, pairs)
 }
 
+fn estimate(name: &'static str, value: f64, ci95: &Interval) -> Estimate {
+    Estimate {
+        name,
+        value,
+        ci95: ci95.ends(),
+    }
+}
+
+/// The comparison of two; without a test, the reason is that of its `p`.
+fn compared(
+    facts: &PartFacts,
+    name: &PairName,
+    difference: Estimate,
+    test: Option<Test>,
+    p: impl Number,
+) -> Pair {
+    let [first, second] = name.names().map(str::to_owned);
+    let undefined = || Verdict::Undefined(p.reason().unwrap_or(NO_TEST).to_owned());
+    Pair {
+        first,
+        second,
+        participants: facts.participants,
+        difference,
+        dz: None,
+        verdict: test.as_ref().map_or_else(undefined, Test::verdict),
+        test,
+        equivalence: None,
+    }
+}
+
 /// The comparison with the smallest p; yes, if any differs.
-fn preferred(facts: &PartFacts<'_>, items: &[String], pairs: &[Pair]) -> PartFinding {
+fn preferred(facts: &PartFacts, preferences: &Preferences, pairs: &[Pair]) -> PartFinding {
     let question = PartQuestion::Preferred;
     let p = |pair: &&Pair| pair.test.as_ref().map_or(f64::INFINITY, |t| t.p);
     let clearest = pairs.iter().min_by(|a, b| p(a).total_cmp(&p(b)));
+    let items = &preferences.items.0;
     let Some((pair, test)) = clearest.and_then(|pair| Some((pair, pair.test.clone()?))) else {
-        let first = items.first().map_or("", String::as_str);
-        return facts.undefined(question, &group_id("pairs/ability", &[first]), items.len());
+        let first = items.values().next().map(|item| &item.ability);
+        return facts.undefined(question, first, items.len());
     };
     let mut found = Finding {
         estimate: Some(pair.difference),
         ..Finding::decided(question, test, facts.design(items.len()))
     };
-    let ability = |item: &String| facts.number(&group_id("pairs/ability", &[item]));
-    found.names = items.to_vec();
-    (found.names).sort_by(|a, b| {
-        ability(b)
-            .unwrap_or(0.0)
-            .total_cmp(&ability(a).unwrap_or(0.0))
-    });
+    let mut abilities: Vec<(&str, f64)> = (items.iter())
+        .map(|(name, item)| (name.as_str(), item.ability.number().unwrap_or(0.0)))
+        .collect();
+    abilities.sort_by(|a, b| b.1.total_cmp(&a.1));
+    found.names = abilities.iter().map(|a| a.0.to_owned()).collect();
     if facts.participants < ENOUGH_CLUSTERS {
         found.caveat(
             "few-clusters",
@@ -139,25 +179,34 @@ fn preferred(facts: &PartFacts<'_>, items: &[String], pairs: &[Pair]) -> PartFin
     found
 }
 
-/// The correlation with VAF in `group`.
-fn with_vaf(facts: &PartFacts<'_>, question: PartQuestion, group: &str) -> PartFinding {
-    let id = |what: &str| format!("{group}/{what}");
-    let n = facts.number(&id("n_models")).unwrap_or(0.0) as usize;
-    let Some(test) = permutation(facts, group) else {
-        return facts.undefined(question, &id("pearson/r"), n);
+/// A correlation with VAF.
+fn with_vaf(facts: &PartFacts, question: PartQuestion, vaf: &Correlation) -> PartFinding {
+    let (n, pearson) = (vaf.n(), &vaf.pearson);
+    let permuted = pearson.permuted.as_ref();
+    let r = pearson.r.number();
+    let tested = r
+        .zip(permuted.and_then(Permuted::two_sided))
+        .map(|(r, (p, exact))| {
+            let kind = match exact {
+                true => TestKind::PermutationExact,
+                false => TestKind::PermutationMonteCarlo,
+            };
+            Test::single(kind, p, facts.alpha).with("r", Some(r), &[])
+        });
+    let Some(test) = tested else {
+        return facts.undefined(question, &pearson.r, n);
     };
-    let r = facts.number(&id("pearson/r"));
     let direction = r.map(Direction::of).filter(|_| test.is_significant());
     let mut found = Finding {
         direction,
         estimate: r.map(|value| Estimate {
             name: "r",
             value,
-            ci95: facts.values.interval(&id("pearson/ci95")),
+            ci95: pearson.ci95.as_ref().and_then(Interval::ends),
         }),
         ..Finding::decided(question, test, facts.design(n))
     };
-    let least = facts.number(&id("pearson/smallest_p_two_sided"));
+    let least = permuted.and_then(|p| p.smallest_p_two_sided.number());
     if let Some(least) = least.filter(|p| !rejects(*p, facts.alpha)) {
         found.caveat(
             "too-few",
@@ -170,245 +219,179 @@ fn with_vaf(facts: &PartFacts<'_>, question: PartQuestion, group: &str) -> PartF
     found
 }
 
-/// The permutation test of the correlation in a group of statistics.
-fn permutation(facts: &PartFacts<'_>, group: &str) -> Option<Test> {
-    let of = |what: &str| facts.number(&format!("{group}/pearson/{what}"));
-    let r = of("r")?;
-    let exact = of("p_exact_two_sided").map(|p| (TestKind::PermutationExact, p));
-    let random = || of("p_monte_carlo_two_sided").map(|p| (TestKind::PermutationMonteCarlo, p));
-    let (kind, p) = exact.or_else(random)?;
-    Some(Test::single(kind, p, facts.alpha).with("r", Some(r), &[]))
-}
-
-fn interval_order(facts: &PartFacts<'_>) -> PartFinding {
+fn interval_order(facts: &PartFacts, preferences: &Preferences) -> Option<PartFinding> {
     let question = PartQuestion::IntervalOrder;
-    let (order, se) = (facts.number("pairs/order"), facts.number("pairs/order_se"));
-    let Some(p) = facts.number("pairs/order_p") else {
-        return facts.undefined(question, "pairs/order_p", 0);
+    let effect = preferences.order.as_ref()?;
+    let (order, se) = (effect.order.number(), effect.order_se.number());
+    let Some(p) = effect.order_p.number() else {
+        return Some(facts.undefined(question, &effect.order_p, 0));
     };
     let z = order.zip(se).map(|(order, se)| order / se);
     let test = Test::single(TestKind::Wald, p, facts.alpha).with("z", z, &[]);
-    Finding {
+    Some(Finding {
         direction: order.map(Direction::of).filter(|_| test.is_significant()),
         estimate: order.and_then(|value| Estimate::of("order", value)),
         ..Finding::decided(question, test, facts.design(0))
-    }
+    })
 }
 
-/// Whether standard and comparison are told apart, by condition.
-pub(super) fn of_sensitivities(facts: &PartFacts<'_>, conditions: &[&str]) -> Vec<PartFinding> {
-    let one = |condition: &&str| {
-        let question = PartQuestion::ToldApart((*condition).to_owned());
-        let id = |what: &str| format!("{}/{what}", group_id("sdt_group", &[condition]));
-        let n = facts.number(&id("n")).unwrap_or(0.0) as usize;
-        let Some(p) = facts.number(&id("above_chance/p")) else {
-            return facts.undefined(question, &id("above_chance/p"), 0);
-        };
-        let t = facts.number(&id("above_chance/t"));
-        let df = facts.number(&id("above_chance/df"));
-        let test = Test::single(TestKind::OneSampleT, p, facts.alpha).with("t", t, &[df]);
-        let above = facts.number(&id("above_chance/mean")).unwrap_or(0.0) > 0.0;
-        let mut found = Finding {
-            participants: n,
-            estimate: facts.number(&id("d/mean")).map(|value| Estimate {
-                name: "d'",
-                value,
-                ci95: facts.values.interval(&id("d/ci95")),
-            }),
-            ..Finding::decided(question, test, facts.design(0))
-        };
-        // Answers below chance do not show that the two are told apart.
-        if found.is_yes() && !above {
-            found.verdict = Verdict::NotShown;
-            found.caveat(
-                "below-chance",
-                "answers are below chance: are the answers of the track interchanged?",
-            );
-        }
-        found
+/// Whether standard and comparison of a condition are told apart.
+pub(super) fn told_apart(
+    facts: &PartFacts,
+    condition: &str,
+    found: &GroupSensitivity,
+) -> PartFinding {
+    let question = PartQuestion::ToldApart(condition.to_owned());
+    let (d, above) = (&found.d, &found.above_chance);
+    let Some(p) = above.p.number() else {
+        return facts.undefined(question, &above.p, 0);
     };
-    conditions.iter().map(one).collect()
-}
-
-/// Whether thresholds differ between conditions, and their contrasts.
-pub(super) fn of_thresholds(
-    facts: &PartFacts<'_>,
-    conditions: &[&str],
-) -> (Vec<PartFinding>, Vec<Pair>) {
-    of_model(facts, conditions, (PartQuestion::Thresholds, "psy_mixed"))
+    let test = Test::single(TestKind::OneSampleT, p, facts.alpha);
+    let mut finding = Finding {
+        participants: found.n.number().unwrap_or(0.0) as usize,
+        estimate: d.mean.number().map(|mean| estimate("d'", mean, &d.ci95)),
+        ..Finding::decided(
+            question,
+            test.with("t", above.t.number(), &[above.df.number()]),
+            facts.design(0),
+        )
+    };
+    // Answers below chance do not show that the two are told apart.
+    if finding.is_yes() && above.sample.mean.number().unwrap_or(0.0) <= 0.0 {
+        finding.verdict = Verdict::NotShown;
+        finding.caveat(
+            "below-chance",
+            "answers are below chance: are the answers of the track interchanged?",
+        );
+    }
+    finding
 }
 
 /// Whether estimates differ between realizations, their contrasts, and whether VAF predicts them.
 pub(super) fn of_realizations(
-    facts: &PartFacts<'_>,
-    realizations: &[&str],
+    facts: &PartFacts,
+    model: Option<&ConditionModel>,
+    vaf: Option<&Correlation>,
 ) -> (Vec<PartFinding>, Vec<Pair>) {
-    let model = (PartQuestion::Magnitudes, "magnitude_mixed");
-    let (mut found, pairs) = of_model(facts, realizations, model);
-    if facts.values.get("magnitude/vaf/n_models").is_some() {
-        found.push(with_vaf(facts, PartQuestion::MagnitudeVaf, "magnitude/vaf"));
-    }
-    (found, pairs)
+    let (found, pairs) = of_model(facts, PartQuestion::Magnitudes, model);
+    let vaf = vaf.map(|vaf| with_vaf(facts, PartQuestion::MagnitudeVaf, vaf));
+    (found.into_iter().chain(vaf).collect(), pairs)
 }
 
 /// The test of the conditions of a mixed model, and their contrasts; nothing without one.
-fn of_model(
-    facts: &PartFacts<'_>,
-    conditions: &[&str],
-    (question, model): (PartQuestion, &str),
-) -> (Vec<PartFinding>, Vec<Pair>) {
-    if facts.values.get(&format!("{model}/F")).is_none() {
-        return (Vec::new(), Vec::new());
-    }
-    let of_pair = |a: &str, b: &str| {
-        let id = pair_id(model, a, b);
-        let ratio = facts.values.get(&format!("{id}/ratio")).is_some();
-        let name = if ratio { "ratio" } else { "difference" };
-        pair(facts, &id, (a, b), (name, TestKind::MixedContrast, "t"))
+pub(super) fn of_model(
+    facts: &PartFacts,
+    question: PartQuestion,
+    model: Option<&ConditionModel>,
+) -> (Option<PartFinding>, Vec<Pair>) {
+    let Some(model) = model else {
+        return (None, Vec::new());
     };
-    let mut pairs = Vec::new();
-    for (i, a) in conditions.iter().enumerate() {
-        pairs.extend(conditions[i + 1..].iter().filter_map(|b| of_pair(a, b)));
-    }
-    let of = |what: &str| facts.number(&format!("{model}/{what}"));
-    let found = match of("p") {
-        None => facts.undefined(question, &format!("{model}/p"), conditions.len()),
-        Some(p) => {
-            let test = Test::single(TestKind::MixedModel, p, facts.alpha).with(
-                "F",
-                of("F"),
-                &[of("df1"), of("df2")],
-            );
-            Finding {
-                participants: of("n_participants").unwrap_or(0.0) as usize,
-                ..Finding::decided(question, test, facts.design(conditions.len()))
+    let comparisons = model.pairs.len();
+    let of_pair = |(name, contrast): (&PairName, &Contrast)| {
+        let test = contrast.p_holm.number().map(|p| {
+            let test = Test::single(TestKind::MixedContrast, p, facts.alpha);
+            Test {
+                comparisons,
+                ..test.with("t", contrast.t.number(), &[contrast.df.number()])
             }
-        }
+        });
+        Some(compared(
+            facts,
+            name,
+            of_contrast(contrast)?,
+            test,
+            &contrast.p,
+        ))
     };
-    (vec![found], pairs)
+    let conditions = model.conditions.len();
+    let found = match f_test(facts, TestKind::MixedModel, &model.test) {
+        None => facts.undefined(question, &model.test.p, conditions),
+        Some(test) => Finding {
+            participants: model.n_participants.number().unwrap_or(0.0) as usize,
+            ..Finding::decided(question, test, facts.design(conditions))
+        },
+    };
+    (
+        Some(found),
+        model.pairs.iter().filter_map(of_pair).collect(),
+    )
+}
+
+fn of_contrast(contrast: &Contrast) -> Option<Estimate> {
+    let (name, value) = contrast.estimate();
+    Some(estimate(name, value?, &contrast.ci95))
+}
+
+fn f_test(facts: &PartFacts, kind: TestKind, found: &FTest) -> Option<Test> {
+    let df = [found.df1.number(), found.df2.number()];
+    let test = Test::single(kind, found.p.number()?, facts.alpha);
+    Some(test.with("F", found.f.number(), &df))
 }
 
 /// Whether groups and sessions differ, where a study has them.
-pub(super) fn of_groups_and_sessions(facts: &PartFacts<'_>) -> Vec<PartFinding> {
-    let one = |(question, group, kind): (PartQuestion, &str, TestKind)| {
-        let id = |what: &str| format!("{group}/{what}");
-        facts.values.get(&id("F"))?;
-        let p = match kind {
-            TestKind::BetweenWithin => "p_gg",
-            _ => "p",
-        };
-        let Some(p) = facts.number(&id(p)) else {
-            return Some(facts.undefined(question, &id(p), 0));
-        };
-        // Of a test within participants both degrees of freedom are corrected.
-        let epsilon = facts.number(&id("eps_gg")).unwrap_or(1.0);
-        let df = ["df1", "df2"].map(|df| Some(facts.number(&id(df))? * epsilon));
-        let test = Test::single(kind, p, facts.alpha).with("F", facts.number(&id("F")), &df);
-        Some(Finding {
-            estimate: only_pair(facts, group),
+pub(super) fn of_groups_and_sessions(facts: &PartFacts, again: &Again) -> Vec<PartFinding> {
+    let decided = |question, test: Option<Test>, p: &Stat, estimate| match test {
+        None => facts.undefined(question, p, 0),
+        Some(test) => Finding {
+            estimate,
             ..Finding::decided(question, test, facts.design(0))
-        })
+        },
     };
-    let questions = [
-        (PartQuestion::Groups, "groups", TestKind::Welch),
-        (
-            PartQuestion::GroupsConditions,
-            "groups_conditions",
-            TestKind::BetweenWithin,
-        ),
-        (PartQuestion::Sessions, "sessions", TestKind::MixedModel),
-    ];
-    questions.into_iter().filter_map(one).collect()
+    let groups = again.groups.as_ref().map(|g| {
+        let test = f_test(facts, TestKind::Welch, &g.test);
+        decided(PartQuestion::Groups, test, &g.test.p, only_pair(&g.pairs))
+    });
+    let profiles = again.groups_conditions.as_ref().map(|g| {
+        // Of a test within participants p and both degrees of freedom are corrected.
+        let epsilon = g.eps_gg.number().unwrap_or(1.0);
+        let df = [&g.test.df1, &g.test.df2].map(|df| Some(df.number()? * epsilon));
+        let test = g.p_gg.number().map(|p| {
+            let test = Test::single(TestKind::BetweenWithin, p, facts.alpha);
+            test.with("F", g.test.f.number(), &df)
+        });
+        decided(PartQuestion::GroupsConditions, test, &g.p_gg, None)
+    });
+    let sessions = again.sessions.as_ref().map(|s| {
+        let test = f_test(facts, TestKind::MixedModel, &s.test);
+        decided(PartQuestion::Sessions, test, &s.test.p, only_pair(&s.pairs))
+    });
+    [groups, profiles, sessions].into_iter().flatten().collect()
 }
 
 /// The contrast of two groups or sessions, where there are no more.
-fn only_pair(facts: &PartFacts<'_>, group: &str) -> Option<Estimate> {
-    let mut found = ["ratio", "difference"].into_iter().flat_map(|name| {
-        let end = format!("/{name}");
-        let start = format!("{group}/");
-        let all = facts.values.iter();
-        let of_pair = move |(id, _): (&'_ str, _)| {
-            let pair = id.strip_prefix(&start)?.strip_suffix(&end)?;
-            pair.contains('|').then(|| (name, format!("{start}{pair}")))
-        };
-        all.filter_map(of_pair).collect::<Vec<_>>()
-    });
-    let (name, id) = found.next()?;
-    let alone = found.next().is_none();
-    let value = facts.number(&format!("{id}/{name}")).filter(|_| alone)?;
-    Some(Estimate {
-        name,
-        value,
-        ci95: facts.values.interval(&format!("{id}/ci95")),
-    })
-}
-
-/// The comparison of two, as statistics have it.
-fn pair(
-    facts: &PartFacts<'_>,
-    id: &str,
-    (a, b): (&str, &str),
-    (name, kind, symbol): (&'static str, TestKind, &'static str),
-) -> Option<Pair> {
-    let get = |what: &str| facts.number(&format!("{id}/{what}"));
-    let test = get("p_holm").map(|p| {
-        let comparisons = facts.values.iter();
-        let of_group = id.split('/').next().unwrap_or_default();
-        let comparisons = comparisons.filter(|(other, _)| {
-            other.starts_with(of_group) && other.contains('|') && other.ends_with("/p_holm")
-        });
-        let se = get("se_clustered").filter(|_| kind == TestKind::WaldClustered);
-        let z = (get("difference").zip(se.or(get("se")))).map(|(d, se)| d / se);
-        Test {
-            comparisons: comparisons.count(),
-            ..Test::single(kind, p, facts.alpha).with(symbol, get("t").or(z), &[get("df")])
-        }
-    });
-    Some(Pair {
-        first: a.to_owned(),
-        second: b.to_owned(),
-        participants: facts.participants,
-        difference: Estimate {
-            name,
-            value: get(name)?,
-            ci95: facts.values.interval(&format!("{id}/ci95")),
-        },
-        dz: None,
-        verdict: match &test {
-            Some(test) => test.verdict(),
-            None => Verdict::Undefined(
-                facts
-                    .values
-                    .reason(&format!("{id}/p"))
-                    .unwrap_or("there is no test")
-                    .to_owned(),
-            ),
-        },
-        test,
-        equivalence: None,
-    })
+fn only_pair(pairs: &BTreeMap<PairName, Contrast>) -> Option<Estimate> {
+    let first = pairs.values().next()?;
+    of_contrast(first).filter(|_| pairs.len() == 1)
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::over_participants::{AboveChance, Sample};
     use super::*;
 
     #[test]
     fn answers_below_chance_do_not_tell_apart() {
         let finding = |mean: f64| {
-            let mut values = Values::default();
-            let mut group = values.group("sdt_group/c", "");
-            group.put("n", 6.0);
-            group.put("d/mean", mean);
-            for (id, x) in [("mean", mean), ("t", 8.0 * mean), ("df", 5.0), ("p", 0.001)] {
-                group.put(&format!("above_chance/{id}"), x);
-            }
+            let sample = || Sample {
+                mean: Stat::of(mean),
+                ..Sample::undefined("")
+            };
+            let found = GroupSensitivity {
+                d: sample(),
+                above_chance: AboveChance {
+                    sample: sample(),
+                    t: Stat::of(8.0 * mean),
+                    df: Stat::of(5.0),
+                    p: Stat::of(0.001),
+                },
+                n: Stat::of(6.0),
+            };
             let facts = PartFacts {
-                values: &values,
                 alpha: 0.05,
                 participants: 6,
             };
-            of_sensitivities(&facts, &["c"]).remove(0)
+            told_apart(&facts, "c", &found)
         };
         let above = finding(0.5);
         assert_eq!((above.verdict, above.caveats.len()), (Verdict::Yes, 0));

@@ -2,17 +2,179 @@
 
 use super::over_participants::NOT_POSITIVE;
 use crate::analyze::draws::Draws;
-use crate::analyze::identifiers::group_id;
-use crate::analyze::values::Values;
+use crate::analyze::keys::{At, CellName, ConditionName};
+use crate::analyze::record::{Interval, Key as _, Number as _, Stat, statistics};
 use std::collections::BTreeMap;
 use study_stats::distribution::normal_quantile;
 use study_stats::psychometric::{
-    Core, Curve, Experiment, Fit, Interval, Level, NoThreshold, Spacing, Support, deviance_p,
-    free_lapse, group, map, maximum_likelihood, pooled, posterior,
+    Core, Curve, Experiment, Fit, Level, NoThreshold, Spacing, Support, deviance_p, free_lapse,
+    group, map, maximum_likelihood, pooled, posterior,
 };
 
 /// Shares of ψ whose level is always given, beside the middle of the function.
 const SHARES: [f64; 4] = [0.707, 0.75, 0.794, 0.8];
+
+statistics! {
+    /// The trials that are fitted.
+    pub struct Fitted {
+        /// number of levels
+        n_levels: Stat,
+        /// number of trials
+        n_trials: Stat,
+        /// 1 where the function is one of the logarithm of the level
+        log_scale: Option<Stat>,
+        /// trials at levels of 0 and below, which have no logarithm
+        n_left_out: Option<Stat>,
+    }
+
+    /// Maximum likelihood with γ and λ fixed.
+    pub struct MaximumLikelihood {
+        /// the level at which the function without guesses and lapses is ½
+        threshold: Stat,
+        /// the distance from .05 to .95 of it, on the scale
+        width: Stat,
+        /// standard error of the threshold, from the observed information
+        se_threshold: Stat,
+        /// standard error of the width
+        se_width: Stat,
+        /// its deviance
+        deviance: Stat,
+        /// levels − 2
+        df: Stat,
+        /// the level at which the function has a share
+        level_at: BTreeMap<At, Stat>,
+        /// (1 + #{D* ≥ D})/(B + 1) over B simulated data sets, each fitted again
+        deviance_p_bootstrap: Option<Stat>,
+    }
+
+    /// Maximum likelihood with λ free up to .06 (Wichmann & Hill 2001).
+    pub struct FreeLapse {
+        /// the threshold
+        threshold: Stat,
+        /// the width
+        width: Stat,
+        /// the share of lapses
+        lambda: Stat,
+        /// the share of guesses
+        gamma: Stat,
+        /// its deviance
+        deviance: Stat,
+    }
+
+    /// A comparison with a standard, by maximum likelihood.
+    pub struct WithStandard {
+        /// the point of subjective equality: the threshold
+        pse: Stat,
+        /// its standard error
+        se_pse: Stat,
+        /// Wald's
+        pse_ci95: Interval,
+        /// pse − standard
+        constant_error: Stat,
+        /// half the distance of the levels at S = .25 and S = .75
+        jnd: Stat,
+        /// its standard error, over logarithms by the delta method
+        se_jnd: Stat,
+        /// jnd/standard
+        weber_fraction: Stat,
+    }
+
+    /// The mode of the posterior.
+    pub struct Mode {
+        /// the threshold
+        threshold: Stat,
+        /// the width
+        width: Stat,
+        /// the share of lapses
+        lambda: Stat,
+        /// the share of guesses
+        gamma: Stat,
+        /// how much answers vary more than binomially
+        eta: Stat,
+        /// logarithm of the density, without binomial coefficients and constants of the priors
+        log_posterior_kernel: Stat,
+    }
+
+    /// A parameter in the posterior.
+    pub struct PosteriorMean {
+        /// its mean
+        mean: Stat,
+        /// equal-tailed
+        ci95: Option<Interval>,
+    }
+
+    /// The posterior.
+    pub struct Posterior {
+        /// of the threshold, as a level
+        threshold: PosteriorMean,
+        /// of the width
+        width: PosteriorMean,
+        /// of the share of lapses
+        lambda: PosteriorMean,
+        /// of the variation beyond the binomial one
+        eta: PosteriorMean,
+        /// of the share of guesses, in yes–no
+        gamma: Option<PosteriorMean>,
+    }
+
+    /// The psychometric function of a participant and condition.
+    pub struct Function {
+        /// what is fitted
+        trials: Fitted as "",
+        /// by maximum likelihood
+        ml: MaximumLikelihood,
+        /// of a comparison
+        with_standard: Option<WithStandard> as "",
+        /// by maximum likelihood with free lapses
+        ml_lapse: Option<FreeLapse>,
+        /// the mode of the posterior
+        map: Mode,
+        /// the posterior: the headline
+        posterior: Posterior,
+    }
+
+    /// The function of summed counts, which is flatter than anybody's.
+    pub struct PooledFunction {
+        /// what is fitted
+        trials: Fitted as "",
+        /// by maximum likelihood
+        ml: MaximumLikelihood,
+    }
+
+    /// Thresholds of several participants, on natural logarithms. Leaving out those without a threshold biases the mean.
+    pub struct ThresholdSummary {
+        /// geometric mean
+        geometric_mean: Stat,
+        /// t interval on logarithms
+        ci95: Interval,
+        /// geometric standard deviation
+        geometric_sd: Stat,
+        /// arithmetic mean
+        arithmetic_mean: Stat,
+        /// participants with a threshold
+        n: Stat,
+        /// participants without one
+        n_undefined: Stat,
+    }
+
+    /// Thresholds of a condition.
+    pub struct GroupThresholds {
+        /// by maximum likelihood
+        threshold: ThresholdSummary,
+        /// posterior means
+        posterior_threshold: ThresholdSummary,
+    }
+
+    /// Psychometric functions.
+    pub struct Functions {
+        /// by participant and condition
+        psy: BTreeMap<CellName, Function>,
+        /// with several participants of a condition, of their summed counts
+        pooled: BTreeMap<ConditionName, PooledFunction> as "psy/pooled",
+        /// what several participants have in common
+        psy_group: BTreeMap<ConditionName, GroupThresholds>,
+    }
+}
 
 /// The trials of one participant in one condition.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,141 +212,133 @@ pub struct FitSettings {
     pub seed: u64,
 }
 
-/// All statistics of psychometric functions. Cells are sorted by participant and
-/// condition; with several participants of a condition, their counts are also pooled
-/// (`psy/pooled/…`) and their thresholds summed up (`psy_group/…`).
-pub fn psychometric(cells: &[FitCell], settings: &FitSettings) -> Values {
-    let mut values = Values::default();
+/// All statistics of psychometric functions. With several participants of a condition, their
+/// counts are also pooled, and their thresholds summed up.
+pub fn psychometric(cells: &[FitCell], settings: &FitSettings) -> Functions {
+    let mut functions = Functions::undefined("");
     let mut conditions: BTreeMap<&str, Vec<&FitCell>> = BTreeMap::new();
     for cell in cells {
         conditions.entry(&cell.condition).or_default().push(cell);
     }
     for (condition, cells) in conditions {
-        let mut likely = Vec::new();
-        let mut bayesian = Vec::new();
-        for cell in &cells {
-            let names = [cell.participant.as_str(), condition];
-            let found = one(&names, &cell.levels, settings, &mut values);
-            likely.push((cell.participant.as_str(), found.0));
-            bayesian.push((cell.participant.as_str(), found.1));
+        let found: Vec<(CellName, Function)> = (cells.iter())
+            .map(|cell| {
+                let name = CellName::of(&cell.participant, condition);
+                let function = Function::of(&name, &cell.levels, settings);
+                (name, function)
+            })
+            .collect();
+        if cells.len() > 1 {
+            let all: Vec<Level> = cells.iter().flat_map(|c| c.levels.clone()).collect();
+            let (trials, levels) = counts(&all, settings.spacing);
+            let fit = maximum_likelihood(settings.core, &levels, settings.gamma, settings.lambda);
+            let ml = likelihood(&fit, settings);
+            let pooled = PooledFunction { trials, ml };
+            functions.pooled.insert(condition.into(), pooled);
+            let summary = |threshold: fn(&Function) -> &Stat| {
+                summary(
+                    &found
+                        .iter()
+                        .map(|f| threshold(&f.1).number())
+                        .collect::<Vec<_>>(),
+                )
+            };
+            let group = GroupThresholds {
+                threshold: summary(|f| &f.ml.threshold),
+                posterior_threshold: summary(|f| &f.posterior.threshold.mean),
+            };
+            functions.psy_group.insert(condition.into(), group);
         }
-        if cells.len() < 2 {
-            continue;
-        }
-        let all: Vec<Level> = cells.iter().flat_map(|c| c.levels.clone()).collect();
-        let prefix = group_id("psy", &["pooled", condition]);
-        let levels = counts(&prefix, &all, settings.spacing, &mut values);
-        let fit = maximum_likelihood(settings.core, &levels, settings.gamma, settings.lambda);
-        likelihood(&prefix, &fit, settings, &mut values);
-        summary(condition, "threshold", &likely, &mut values);
-        summary(condition, "posterior_threshold", &bayesian, &mut values);
+        functions.psy.extend(found);
     }
-    values
+    functions
 }
 
 /// The trials that are fitted, each level once and at its place on the scale.
-fn counts(prefix: &str, rows: &[Level], spacing: Spacing, values: &mut Values) -> Vec<Level> {
+fn counts(rows: &[Level], spacing: Spacing) -> (Fitted, Vec<Level>) {
     let trials = |levels: &[Level]| levels.iter().map(|l| l.trials).sum::<f64>();
     let levels = pooled(&spacing.places(rows));
-    let mut group = values.group(prefix, "");
-    group.put("n_levels", levels.len() as f64);
-    group.put("n_trials", trials(&levels));
-    if spacing == Spacing::Log {
-        group.put("log_scale", 1.0);
-    }
     // Levels of 0 and below have no logarithm.
     let left_out = trials(rows) - trials(&levels);
-    if left_out > 0.0 {
-        group.put("n_left_out", left_out);
-    }
-    levels
+    let fitted = Fitted {
+        n_levels: Stat::count(levels.len()),
+        n_trials: Stat::of(trials(&levels)),
+        log_scale: (spacing == Spacing::Log).then(|| Stat::flag(true)),
+        n_left_out: (left_out > 0.0).then(|| Stat::of(left_out)),
+    };
+    (fitted, levels)
 }
 
-/// The functions of one cell; its thresholds by maximum likelihood and as posterior
-/// mean.
-fn one(
-    names: &[&str],
-    rows: &[Level],
-    settings: &FitSettings,
-    values: &mut Values,
-) -> (Option<f64>, Option<f64>) {
-    let prefix = &group_id("psy", names);
-    let levels = &counts(prefix, rows, settings.spacing, values);
-    let level = |place: f64| settings.spacing.level(place);
-    let fit = maximum_likelihood(settings.core, levels, settings.gamma, settings.lambda);
-    likelihood(prefix, &fit, settings, values);
-    if settings.repeats > 0 {
-        let mut draws = Draws::new(settings.seed, &format!("deviance/{prefix}"));
-        let p = fit.map(|fit| deviance_p(&fit, levels, settings.repeats, &mut draws));
-        let mut group = values.group(format!("{prefix}/ml"), reason(&fit));
-        group.maybe("deviance_p_bootstrap", p.ok());
+impl Function {
+    fn of(name: &CellName, rows: &[Level], settings: &FitSettings) -> Self {
+        let (trials, levels) = counts(rows, settings.spacing);
+        let fit = maximum_likelihood(settings.core, &levels, settings.gamma, settings.lambda);
+        let mut ml = likelihood(&fit, settings);
+        if settings.repeats > 0 {
+            let path = format!("deviance/psy/{}", name.part());
+            let mut draws = Draws::new(settings.seed, &path);
+            let p = fit.map(|fit| deviance_p(&fit, &levels, settings.repeats, &mut draws));
+            ml.deviance_p_bootstrap = Some(Stat::or(p.ok(), reason(&fit)));
+        }
+        let with_standard = |standard| comparison(&fit, settings.spacing, standard);
+        Self {
+            trials,
+            ml,
+            with_standard: settings.standard.map(with_standard),
+            ml_lapse: settings
+                .lapse_most
+                .map(|most| lapses(&levels, most, settings)),
+            map: mode(&levels, settings),
+            posterior: bayesian(&levels, settings),
+        }
     }
-    if let Some(standard) = settings.standard {
-        comparison(prefix, &fit, (settings.spacing, standard), values);
+}
+
+fn lapses(levels: &[Level], most: f64, settings: &FitSettings) -> FreeLapse {
+    let (core, experiment) = (settings.core, settings.experiment);
+    let free = free_lapse(core, levels, experiment, settings.gamma, most);
+    let curve = free.as_ref().ok().map(|f| f.curve);
+    let stat = |x: Option<f64>| Stat::or(x, reason(&free));
+    FreeLapse {
+        threshold: stat(curve.map(|c| settings.spacing.level(c.threshold))),
+        width: stat(curve.map(|c| c.width)),
+        lambda: stat(curve.map(|c| c.lambda)),
+        gamma: stat(curve.map(|c| c.gamma)),
+        deviance: stat(free.as_ref().ok().map(|f| f.deviance)),
     }
-    if let Some(most) = settings.lapse_most {
-        let free = free_lapse(
-            settings.core,
-            levels,
-            settings.experiment,
-            settings.gamma,
-            most,
-        );
-        let mut group = values.group(format!("{prefix}/ml_lapse"), reason(&free));
-        let curve = free.as_ref().ok().map(|f| f.curve);
-        group.maybe("threshold", curve.map(|c| level(c.threshold)));
-        group.maybe("width", curve.map(|c| c.width));
-        group.maybe("lambda", curve.map(|c| c.lambda));
-        group.maybe("gamma", curve.map(|c| c.gamma));
-        group.maybe("deviance", free.ok().map(|f| f.deviance));
-    }
-    (
-        fit.ok().map(|f| level(f.curve.threshold)),
-        bayesian(prefix, levels, settings, values),
-    )
 }
 
 fn reason<T>(result: &Result<T, NoThreshold>) -> String {
-    result
-        .as_ref()
-        .err()
-        .map_or_else(String::new, ToString::to_string)
+    let why = result.as_ref().err();
+    why.map_or_else(String::new, ToString::to_string)
 }
 
-fn likelihood(
-    prefix: &str,
-    fit: &Result<Fit, NoThreshold>,
-    settings: &FitSettings,
-    values: &mut Values,
-) {
+fn likelihood(fit: &Result<Fit, NoThreshold>, settings: &FitSettings) -> MaximumLikelihood {
     let found = fit.as_ref().ok();
     let spacing = settings.spacing;
-    let mut group = values.group(format!("{prefix}/ml"), reason(fit));
-    group.maybe("threshold", found.map(|f| spacing.level(f.curve.threshold)));
-    group.maybe("width", found.map(|f| f.curve.width));
+    let stat = |x: Option<f64>| Stat::or(x, reason(fit));
     let flat = "the information about threshold and width is singular";
-    let se = |se: Option<f64>| (found.is_none() || se.is_some(), se);
-    for (name, (known, se)) in [
-        ("se_threshold", se(found.and_then(|f| of_level(f, spacing)))),
-        ("se_width", se(found.and_then(|f| f.width_se))),
-    ] {
-        match known {
-            true => group.maybe(name, se),
-            false => group.put_or(name, None, flat),
-        }
-    }
-    group.maybe("deviance", found.map(|f| f.deviance));
-    group.maybe("df", found.map(|f| f.df as f64));
-    let Some(fit) = found else {
-        return;
+    let se = |se: &dyn Fn(&Fit) -> Option<f64>| match found {
+        Some(found) => Stat::or(se(found), flat),
+        None => stat(None),
     };
     // In the middle of the function, and at the usual shares.
     let middle = 0.5 * (1.0 + settings.gamma);
     let middle = (middle * 1e4).round() / 1e4;
-    for share in SHARES.into_iter().chain([middle]) {
-        let why = "the function does not have this share";
+    let level_at = |fit: &Fit, share: f64| {
         let level = fit.curve.level_at(share).map(|at| spacing.level(at));
-        group.put_or(&format!("level_at/{share}"), level, why);
+        Stat::or(level, "the function does not have this share")
+    };
+    let shares = SHARES.into_iter().chain([middle]);
+    MaximumLikelihood {
+        threshold: stat(found.map(|f| spacing.level(f.curve.threshold))),
+        width: stat(found.map(|f| f.curve.width)),
+        se_threshold: se(&|f| of_level(f, spacing)),
+        se_width: se(&|f| f.width_se),
+        deviance: stat(found.map(|f| f.deviance)),
+        df: stat(found.map(|f| f.df as f64)),
+        level_at: (shares.filter_map(|share| Some((At(share), level_at(found?, share))))).collect(),
+        deviance_p_bootstrap: None,
     }
 }
 
@@ -230,87 +384,78 @@ fn jnd(fit: &Fit, spacing: Spacing) -> (f64, Option<f64>) {
 }
 
 /// PSE, JND and Weber fraction of a comparison with `standard`.
-fn comparison(
-    prefix: &str,
-    fit: &Result<Fit, NoThreshold>,
-    (spacing, standard): (Spacing, f64),
-    values: &mut Values,
-) {
+fn comparison(fit: &Result<Fit, NoThreshold>, spacing: Spacing, standard: f64) -> WithStandard {
     let found = fit.as_ref().ok();
-    let mut group = values.group(prefix, reason(fit));
+    let stat = |x: Option<f64>| Stat::or(x, reason(fit));
     let place = found.map(|f| f.curve.threshold);
     let pse = place.map(|at| spacing.level(at));
     let se = found.and_then(|f| f.threshold_se);
     let (jnd, se_jnd) = found.map(|f| jnd(f, spacing)).unzip();
-    group.maybe("pse", pse);
-    group.maybe("se_pse", found.and_then(|f| of_level(f, spacing)));
     let half = se.zip(normal_quantile(0.975)).map(|(se, z)| se * z);
     let ends = place.zip(half);
-    group.interval(
-        "pse_ci95",
-        ends.map(|(p, h)| (spacing.level(p - h), spacing.level(p + h))),
-    );
-    group.maybe("constant_error", pse.map(|p| p - standard));
-    group.maybe("jnd", jnd);
-    group.maybe("se_jnd", se_jnd.flatten());
+    let ends = ends.map(|(p, h)| (spacing.level(p - h), spacing.level(p + h)));
     let fraction = jnd.filter(|_| standard != 0.0).map(|j| j / standard);
-    group.put_or(
-        "weber_fraction",
-        fraction,
-        "the standard is 0, or there is no JND",
-    );
+    WithStandard {
+        pse: stat(pse),
+        se_pse: stat(found.and_then(|f| of_level(f, spacing))),
+        pse_ci95: Interval::or(ends, reason(fit)),
+        constant_error: stat(pse.map(|p| p - standard)),
+        jnd: stat(jnd),
+        se_jnd: stat(se_jnd.flatten()),
+        weber_fraction: Stat::or(fraction, "the standard is 0, or there is no JND"),
+    }
 }
 
-/// Mode and posterior; the posterior mean of the threshold.
-fn bayesian(
-    prefix: &str,
-    levels: &[Level],
-    settings: &FitSettings,
-    values: &mut Values,
-) -> Option<f64> {
-    let (core, experiment) = (settings.core, settings.experiment);
-    let mode = map(core, levels, experiment, settings.support);
+fn mode(levels: &[Level], settings: &FitSettings) -> Mode {
+    let mode = map(settings.core, levels, settings.experiment, settings.support);
     let found = mode.as_ref().ok();
-    let mut group = values.group(format!("{prefix}/map"), reason(&mode));
-    let level = |place: f64| settings.spacing.level(place);
-    group.maybe("threshold", found.map(|m| level(m.curve.threshold)));
-    group.maybe("width", found.map(|m| m.curve.width));
-    group.maybe("lambda", found.map(|m| m.curve.lambda));
-    group.maybe("gamma", found.map(|m| m.curve.gamma));
-    group.maybe("eta", found.map(|m| m.eta));
-    group.maybe("log_posterior_kernel", found.map(|m| m.log_kernel));
-    let posterior = posterior(core, levels, experiment, settings.support);
+    let stat = |x: Option<f64>| Stat::or(x, reason(&mode));
+    Mode {
+        threshold: stat(found.map(|m| settings.spacing.level(m.curve.threshold))),
+        width: stat(found.map(|m| m.curve.width)),
+        lambda: stat(found.map(|m| m.curve.lambda)),
+        gamma: stat(found.map(|m| m.curve.gamma)),
+        eta: stat(found.map(|m| m.eta)),
+        log_posterior_kernel: stat(found.map(|m| m.log_kernel)),
+    }
+}
+
+fn bayesian(levels: &[Level], settings: &FitSettings) -> Posterior {
+    let posterior = posterior(settings.core, levels, settings.experiment, settings.support);
     let found = posterior.as_ref().ok();
-    let threshold = found.map(|p| p.threshold_level(settings.spacing));
-    for (name, interval) in [("threshold", threshold), ("width", found.map(|p| p.width))] {
-        let mut group = values.group(format!("{prefix}/posterior/{name}"), reason(&posterior));
-        group.maybe("mean", interval.map(|i: Interval| i.mean));
-        group.interval("ci95", interval.map(|i| i.ci95));
+    let mean = |mean: Option<f64>| PosteriorMean {
+        mean: Stat::or(mean, reason(&posterior)),
+        ci95: None,
+    };
+    let with_interval = |of: Option<study_stats::psychometric::Interval>| PosteriorMean {
+        ci95: Some(Interval::or(of.map(|i| i.ci95), reason(&posterior))),
+        ..mean(of.map(|i| i.mean))
+    };
+    let is_yes_no = settings.experiment == Experiment::YesNo;
+    Posterior {
+        threshold: with_interval(found.map(|p| p.threshold_level(settings.spacing))),
+        width: with_interval(found.map(|p| p.width)),
+        lambda: mean(found.map(|p| p.lambda)),
+        eta: mean(found.map(|p| p.eta)),
+        gamma: is_yes_no.then(|| mean(found.and_then(|p| p.gamma))),
     }
-    let mut group = values.group(format!("{prefix}/posterior"), reason(&posterior));
-    group.maybe("lambda/mean", found.map(|p| p.lambda));
-    group.maybe("eta/mean", found.map(|p| p.eta));
-    if experiment == Experiment::YesNo {
-        group.maybe("gamma/mean", found.and_then(|p| p.gamma));
-    }
-    threshold.map(|t| t.mean)
 }
 
 /// Thresholds of several participants, on natural logarithms.
-fn summary(condition: &str, name: &str, thresholds: &[(&str, Option<f64>)], values: &mut Values) {
-    let known: Vec<f64> = thresholds.iter().filter_map(|t| t.1).collect();
+fn summary(thresholds: &[Option<f64>]) -> ThresholdSummary {
+    let known: Vec<f64> = thresholds.iter().copied().flatten().collect();
     let found = group(&known);
     let why = match found {
         None if known.is_empty() => "nobody has a threshold",
         None => NOT_POSITIVE,
         Some(_) => "there is only one threshold",
     };
-    let prefix = format!("{}/{name}", group_id("psy_group", &[condition]));
-    let mut values = values.group(prefix, why);
-    values.maybe("geometric_mean", found.map(|g| g.geometric_mean));
-    values.interval("ci95", found.and_then(|g| g.ci95));
-    values.maybe("geometric_sd", found.and_then(|g| g.geometric_sd));
-    values.maybe("arithmetic_mean", found.map(|g| g.arithmetic_mean));
-    values.put("n", known.len() as f64);
-    values.put("n_undefined", (thresholds.len() - known.len()) as f64);
+    ThresholdSummary {
+        geometric_mean: Stat::or(found.map(|g| g.geometric_mean), why),
+        ci95: Interval::or(found.and_then(|g| g.ci95), why),
+        geometric_sd: Stat::or(found.and_then(|g| g.geometric_sd), why),
+        arithmetic_mean: Stat::or(found.map(|g| g.arithmetic_mean), why),
+        n: Stat::count(known.len()),
+        n_undefined: Stat::count(thresholds.len() - known.len()),
+    }
 }

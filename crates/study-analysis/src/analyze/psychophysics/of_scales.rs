@@ -1,14 +1,16 @@
 //! Magnitude estimation and MUSHRA of a study.
 
 use super::again::by_condition;
-use super::part_data::{Found, Measured, PartData, groups};
+use super::over_participants::Measured;
+use super::part_data::{Found, PartData, groups};
+use super::results::PartResults;
 use super::scales::{
     MagnitudeRow, MushraRoles, MushraRow, RealizationRow, magnitude, mushra, realizations,
 };
 use crate::analyze::Rules;
-use crate::analyze::identifiers::group_id;
-use crate::analyze::results::{Correlation, Field as _};
-use std::collections::{BTreeMap, BTreeSet};
+use crate::analyze::record::Number as _;
+use crate::analyze::results::Correlation;
+use std::collections::BTreeMap;
 use study_base::text::ModelId;
 use study_plan::protocol::parts::{FamilyRules, Part, Presentations};
 use study_plan::protocol::{Protocol, Role};
@@ -36,10 +38,12 @@ pub(super) fn of_magnitudes(
     let estimates: Vec<MagnitudeRow> = rows.iter().filter_map(estimate).collect();
     let presented = |family: &&FamilyRules| own.models.iter().any(|m| family.level_of(m).is_some());
     let family = protocol.families.iter().find(presented);
+    let mut results = PartResults::undefined("");
+    results.over.magnitude = Some(magnitude(&estimates));
     Found {
         task: "magnitude",
         trials: estimates.len(),
-        values: magnitude(&estimates),
+        results,
         warnings: Vec::new(),
         names: Vec::new(),
         data: PartData {
@@ -65,7 +69,7 @@ fn of_realizations(protocol: &Protocol, part: &Part, rows: &[&RatingRow], rules:
         })
     };
     let estimates: Vec<RealizationRow> = rows.iter().filter_map(estimate).collect();
-    let mut values = realizations(&estimates);
+    let (mut magnitudes, model) = realizations(&estimates);
     let groups = groups(rows);
     let mut logs: BTreeMap<(&str, &str), Vec<f64>> = BTreeMap::new();
     for e in estimates.iter().filter(|e| e.estimate > 0.0) {
@@ -81,16 +85,11 @@ fn of_realizations(protocol: &Protocol, part: &Part, rows: &[&RatingRow], rules:
             value: mean(logs)?,
         })
     });
-    by_condition(&measured.collect::<Vec<_>>(), &mut values);
-    let felt: BTreeSet<&str> = estimates.iter().map(|e| e.realization.as_str()).collect();
+    let again = by_condition(&measured.collect::<Vec<_>>());
     let with_vaf = protocol.models.iter().filter_map(|m| {
         let id = m.id.as_str();
-        let mean = format!(
-            "{}/geometric_mean",
-            group_id("magnitude/realization", &[id])
-        );
-        let tested = m.role == Role::Test && felt.contains(id);
-        let mean = values.number(&mean).filter(|_| tested)?;
+        let mean = magnitudes.realizations.get(id)?.geometric_mean.number();
+        let mean = mean.filter(|_| m.role == Role::Test)?;
         Some((id, m.vaf?, libm::log10(mean)))
     });
     let known: Vec<(&str, f64, f64)> = with_vaf.collect();
@@ -98,14 +97,17 @@ fn of_realizations(protocol: &Protocol, part: &Part, rows: &[&RatingRow], rules:
         let of = |pick: fn(&(&str, f64, f64)) -> f64| known.iter().map(pick).collect::<Vec<_>>();
         let names: Vec<&str> = known.iter().map(|k| k.0).collect();
         let (x, y) = (of(|k| k.1), of(|k| k.2));
-        Correlation::of(&x, &y, &names, rules).put("magnitude/vaf", &mut values);
+        magnitudes.vaf = Some(Correlation::of(&x, &y, &names, rules));
     }
+    let mut results = PartResults::undefined("");
+    results.magnitude_mixed = model;
+    (results.over.magnitude, results.over.again) = (Some(magnitudes), again);
     Found {
         task: "magnitude",
         trials: estimates.len(),
-        values,
+        results,
         warnings: Vec::new(),
-        names: felt.into_iter().map(str::to_owned).collect(),
+        names: Vec::new(),
         data: PartData::default(),
     }
 }
@@ -133,10 +135,13 @@ pub(super) fn of_mushra(
         reference: of(Role::HiddenReference).unwrap_or_default(),
         mid_anchor: of(Role::MidAnchor),
     };
+    let (kept, all) = mushra(&ratings, &roles, &Screening::default());
+    let mut results = PartResults::undefined("");
+    (results.over.mushra, results.mushra_unscreened) = (Some(kept), all);
     Found {
         task: "mushra",
         trials: ratings.len(),
-        values: mushra(&ratings, &roles, &Screening::default()),
+        results,
         warnings: Vec::new(),
         names: Vec::new(),
         data: PartData::default(),

@@ -1,11 +1,131 @@
 //! What the participants have in common: `sdt_group/…` of sensitivities, `psy_mixed/…` of
 //! thresholds in several conditions.
 
-use crate::analyze::identifiers::{group_id, pair_id};
-use crate::analyze::values::Values;
+use crate::analyze::keys::ConditionName;
+use crate::analyze::record::{Interval, Number as _, PairName, Stat, statistics};
 use std::collections::BTreeMap;
 use study_stats::lmm::{CellSummary, FixedEffects, LmmData, adjusted_means};
 use study_stats::paired::{holm, one_sample};
+
+statistics! {
+    /// Numbers of participants.
+    pub struct Sample {
+        /// their mean
+        mean: Stat,
+        /// their standard deviation
+        sd: Stat,
+        /// t interval of the mean
+        ci95: Interval,
+    }
+
+    /// Whether participants tell from chance.
+    pub struct AboveChance {
+        /// how far they are above chance
+        sample: Sample as "",
+        /// t of the test against 0
+        t: Stat,
+        /// its degrees of freedom
+        df: Stat,
+        /// its p, two-sided
+        p: Stat,
+    }
+
+    /// Sensitivities of a condition.
+    pub struct GroupSensitivity {
+        /// d′
+        d: Sample,
+        /// d′ of yes–no and 2IFC; elsewhere d′ is never below 0, and the share of correct answers less that by guessing is tested, or `share_unbiased` − ½
+        above_chance: AboveChance,
+        /// participants with a sensitivity
+        n: Stat,
+    }
+
+    /// A condition or a group.
+    pub struct Center {
+        /// number of participants
+        n: Option<Stat>,
+        /// geometric mean, where numbers have ratios
+        geometric_mean: Option<Stat>,
+        /// mean, where they have none
+        mean: Option<Stat>,
+        /// geometric standard deviation
+        geometric_sd: Option<Stat>,
+        /// standard deviation
+        sd: Option<Stat>,
+        /// of the mean
+        ci95: Option<Interval>,
+    }
+
+    /// The contrast of two conditions or groups.
+    pub struct Contrast {
+        /// ratio, where numbers have ratios
+        ratio: Option<Stat>,
+        /// difference, where they have none
+        difference: Option<Stat>,
+        /// of the ratio or difference
+        ci95: Interval,
+        /// t
+        t: Stat,
+        /// its degrees of freedom
+        df: Stat,
+        /// its p
+        p: Stat,
+        /// with Holm's correction
+        p_holm: Stat,
+        /// Hedges's g, of groups
+        hedges_g: Option<Stat>,
+    }
+
+    /// A test of several means.
+    pub struct FTest {
+        /// F
+        f: Stat as "F",
+        /// its degrees of freedom
+        df1: Stat,
+        /// those of its denominator
+        df2: Stat,
+        /// its p
+        p: Stat,
+    }
+
+    /// The mixed model number ~ condition + (1 | participant) by REML, of logarithms where numbers have ratios: F with Satterthwaite's degrees of freedom, contrasts with Kenward and Roger's.
+    pub struct ConditionModel {
+        /// whether the conditions differ
+        test: FTest as "",
+        /// standard deviation of participants
+        sd_participant: Stat,
+        /// standard deviation of what remains
+        sd_error: Stat,
+        /// number of participants
+        n_participants: Stat,
+        /// by condition
+        conditions: BTreeMap<ConditionName, Center> as "",
+        /// by pair of conditions
+        pairs: BTreeMap<PairName, Contrast> as "",
+    }
+}
+
+impl Center {
+    /// The mean or, of ratios, the geometric mean.
+    pub fn mean(&self) -> Option<f64> {
+        self.geometric_mean.number().or(self.mean.number())
+    }
+
+    /// The standard deviation or, of ratios, the geometric one.
+    pub fn sd(&self) -> Option<f64> {
+        self.geometric_sd.number().or(self.sd.number())
+    }
+}
+
+impl Contrast {
+    /// The ratio or the difference, and what it is called.
+    pub fn estimate(&self) -> (&'static str, Option<f64>) {
+        match &self.ratio {
+            Some(ratio) => ("ratio", ratio.number()),
+            None => ("difference", self.difference.number()),
+        }
+    }
+}
 
 /// The sensitivity of one participant in one condition.
 #[derive(Debug, Clone)]
@@ -19,34 +139,39 @@ pub(super) struct Told {
 }
 
 /// Means over participants of each condition; t tests that they tell it from chance.
-pub(super) fn sensitivities(told: &[Told], values: &mut Values) {
+pub(super) fn sensitivities(told: &[Told]) -> BTreeMap<ConditionName, GroupSensitivity> {
     let mut conditions: BTreeMap<&str, Vec<&Told>> = BTreeMap::new();
     for one in told {
         conditions.entry(&one.condition).or_default().push(one);
     }
-    for (condition, told) in conditions {
-        let prefix = group_id("sdt_group", &[condition]);
+    let few = "fewer than two participants have a sensitivity";
+    let sample = |x: &[f64]| {
+        let found = one_sample(x);
+        Sample {
+            mean: Stat::or(found.map(|f| f.mean), few),
+            sd: Stat::or(found.map(|f| f.sd), few),
+            ci95: Interval::or(found.map(|f| f.ci95), few),
+        }
+    };
+    let of_condition = |(condition, told): (&str, Vec<&Told>)| {
         let d: Vec<f64> = told.iter().map(|t| t.d).collect();
         let above: Vec<f64> = told.iter().map(|t| t.above_chance).collect();
-        let few = "fewer than two participants have a sensitivity";
-        for (name, x) in [("d", &d), ("above_chance", &above)] {
-            let found = one_sample(x);
-            let mut group = values.group(format!("{prefix}/{name}"), few);
-            group.maybe("mean", found.map(|f| f.mean));
-            group.maybe("sd", found.map(|f| f.sd));
-            group.interval("ci95", found.map(|f| f.ci95));
-        }
         let test = one_sample(&above);
-        let why = match test {
-            None => few,
-            Some(_) => "all participants are alike",
+        let why = test.map_or(few, |_| "all participants are alike");
+        let above_chance = AboveChance {
+            sample: sample(&above),
+            t: Stat::or(test.and_then(|t| t.t), why),
+            df: Stat::or(test.map(|t| t.n as f64 - 1.0), why),
+            p: Stat::or(test.and_then(|t| t.p), why),
         };
-        let mut group = values.group(format!("{prefix}/above_chance"), why);
-        group.maybe("t", test.and_then(|t| t.t));
-        group.maybe("df", test.map(|t| t.n as f64 - 1.0));
-        group.maybe("p", test.and_then(|t| t.p));
-        values.group(prefix, "").put("n", told.len() as f64);
-    }
+        let group = GroupSensitivity {
+            d: sample(&d),
+            above_chance,
+            n: Stat::count(told.len()),
+        };
+        (condition.into(), group)
+    };
+    conditions.into_iter().map(of_condition).collect()
 }
 
 /// Why there are no ratios of thresholds.
@@ -61,10 +186,25 @@ pub(super) struct Threshold<'a> {
     pub(super) value: f64,
 }
 
-/// The mixed model in `group`, threshold ~ condition + (1 | participant) by REML, F with Satterthwaite's
+/// A number of one participant in one condition and session.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measured {
+    /// Participant. Untrusted.
+    pub participant: String,
+    /// Group of the participant, if the study has groups.
+    pub group: Option<String>,
+    /// Session, if several sessions have the part.
+    pub session: Option<String>,
+    /// Track or realization. Untrusted.
+    pub condition: String,
+    /// A threshold, a sensitivity, a mean rating.
+    pub value: f64,
+}
+
+/// The mixed model threshold ~ condition + (1 | participant) by REML, F with Satterthwaite's
 /// degrees of freedom, contrasts with Kenward and Roger's: of natural logarithms, so that differences are ratios, unless the
 /// levels have no ratios, as those of a blend. Nothing with one condition.
-pub(super) fn mixed(group: &str, thresholds: &[Threshold<'_>], ratios: bool, values: &mut Values) {
+pub(super) fn mixed(thresholds: &[Threshold<'_>], ratios: bool) -> Option<ConditionModel> {
     let names = |of: fn(&Threshold<'_>) -> String| -> Vec<String> {
         let mut names: Vec<String> = thresholds.iter().map(of).collect();
         names.sort();
@@ -74,7 +214,7 @@ pub(super) fn mixed(group: &str, thresholds: &[Threshold<'_>], ratios: bool, val
     let conditions = names(|t| t.condition.to_owned());
     let people = names(|t| t.participant.to_owned());
     if conditions.len() < 2 {
-        return;
+        return None;
     }
     let place = |list: &[String], name: &str| list.iter().position(|n| n == name).unwrap_or(0);
     let positive = thresholds.iter().all(|t| t.value > 0.0);
@@ -97,50 +237,69 @@ pub(super) fn mixed(group: &str, thresholds: &[Threshold<'_>], ratios: bool, val
     let fit = fit.ok().filter(|_| positive || !ratios);
     let shown = |x: f64| if ratios { libm::exp(x) } else { x };
     let both = |(low, high): (f64, f64)| (shown(low), shown(high));
-    let (mean, difference) = match ratios {
-        true => ("geometric_mean", "ratio"),
-        false => ("mean", "difference"),
+    let stat = |x: Option<f64>| Stat::or(x, why.clone());
+    let interval = |ci95: Option<(f64, f64)>| Interval::or(ci95.map(both), why.clone());
+    // What is given of ratios, and what of differences.
+    let either = |x: Option<f64>| {
+        let [ratio, difference] = [ratios, !ratios].map(|shown| shown.then(|| stat(x)));
+        (ratio, difference)
     };
-    let effect = fit.as_ref().and_then(|f| f.effect);
-    let name = group;
-    let mut group = values.group(name, why.as_str());
-    group.maybe("F", effect.map(|e| e.f));
-    group.maybe("df1", effect.map(|e| e.df1));
-    group.maybe("df2", effect.and_then(|e| e.df2));
-    group.maybe("p", effect.and_then(|e| e.p));
-    let variances = fit.as_ref().map(|f| f.variances);
-    group.maybe("sd_participant", variances.map(|v| v.intercept.sqrt()));
-    group.maybe("sd_error", variances.map(|v| v.error.sqrt()));
-    group.put("n_participants", people.len() as f64);
-    for (i, condition) in conditions.iter().enumerate() {
+    let centers = conditions.iter().enumerate().map(|(i, condition)| {
         let found = fit.as_ref().map(|f| f.means[i]);
-        let mut group = values.group(group_id(name, &[condition]), why.as_str());
-        group.maybe(mean, found.map(|m| shown(m.estimate)));
-        group.interval("ci95", found.and_then(|m| m.ci95).map(both));
-    }
-    let pairs: Vec<(usize, usize)> = (0..conditions.len())
-        .flat_map(|a| (a + 1..conditions.len()).map(move |b| (a, b)))
+        let (geometric_mean, mean) = either(found.map(|m| shown(m.estimate)));
+        let center = Center {
+            geometric_mean,
+            mean,
+            ci95: Some(interval(found.and_then(|m| m.ci95))),
+            ..Center::undefined("")
+        };
+        (condition.as_str().into(), center)
+    });
+    let pairs: Vec<PairName> = (conditions.iter().enumerate())
+        .flat_map(|(i, a)| conditions[i + 1..].iter().map(|b| PairName::of(a, b)))
         .collect();
     let found = |k: usize| fit.as_ref().map(|f| f.pairs[k]);
     let p: Vec<Option<f64>> = (0..pairs.len())
         .map(|k| found(k).and_then(|c| c.p))
         .collect();
-    for ((k, (a, b)), p_holm) in pairs.iter().enumerate().zip(holm(&p)) {
+    let p_holm = holm(&p);
+    let contrasts = pairs.into_iter().enumerate().map(|(k, pair)| {
         let contrast = found(k);
-        let prefix = pair_id(name, &conditions[*a], &conditions[*b]);
-        let mut group = values.group(prefix, why.as_str());
-        group.maybe(difference, contrast.map(|c| shown(c.estimate)));
-        group.interval("ci95", contrast.and_then(|c| c.ci95).map(both));
-        group.maybe("t", contrast.and_then(|c| c.t));
-        group.maybe("df", contrast.and_then(|c| c.df));
-        group.maybe("p", p[k]);
-        group.maybe("p_holm", p_holm);
-    }
+        let (ratio, difference) = either(contrast.map(|c| shown(c.estimate)));
+        let contrast = Contrast {
+            ratio,
+            difference,
+            ci95: interval(contrast.and_then(|c| c.ci95)),
+            t: stat(contrast.and_then(|c| c.t)),
+            df: stat(contrast.and_then(|c| c.df)),
+            p: stat(p[k]),
+            p_holm: stat(p_holm[k]),
+            hedges_g: None,
+        };
+        (pair, contrast)
+    });
+    let effect = fit.as_ref().and_then(|f| f.effect);
+    let variances = fit.as_ref().map(|f| f.variances);
+    let test = FTest {
+        f: stat(effect.map(|e| e.f)),
+        df1: stat(effect.map(|e| e.df1)),
+        df2: stat(effect.and_then(|e| e.df2)),
+        p: stat(effect.and_then(|e| e.p)),
+    };
+    Some(ConditionModel {
+        test,
+        sd_participant: stat(variances.map(|v| v.intercept.sqrt())),
+        sd_error: stat(variances.map(|v| v.error.sqrt())),
+        n_participants: Stat::count(people.len()),
+        conditions: centers.collect(),
+        pairs: contrasts.collect(),
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::analyze::record::Field as _;
 
     /// Thresholds of five participants in three conditions; D has none in z.
     const THRESHOLDS: [(&str, &str, f64); 14] = [
@@ -160,15 +319,13 @@ mod tests {
         ("E", "z", 0.66),
     ];
 
-    fn of(ratios: bool) -> Values {
+    fn of(ratios: bool) -> ConditionModel {
         let thresholds = THRESHOLDS.map(|(participant, condition, value)| Threshold {
             participant,
             condition,
             value,
         });
-        let mut values = Values::default();
-        mixed("psy_mixed", &thresholds, ratios, &mut values);
-        values
+        mixed(&thresholds, ratios).unwrap()
     }
 
     /// R 4.2.2: lmer(log(t) ~ c + (1|p)) of lme4 with lmerTest and emmeans
@@ -176,7 +333,7 @@ mod tests {
     /// degrees of freedom follow.
     #[test]
     fn conditions_are_compared_by_the_mixed_model_of_logarithms() {
-        let values = of(true);
+        let values = of(true).values();
         for (id, expected) in [
             ("F", 15.39607),
             ("df1", 2.0),
@@ -194,7 +351,7 @@ mod tests {
             ("y|z/p", 0.08139892217989),
             ("x|y/p_holm", 0.01646204458111),
         ] {
-            let found = values.number(&format!("psy_mixed/{id}")).unwrap();
+            let found = values.number(id).unwrap();
             assert!(
                 (found / expected - 1.0).abs() < 2e-5,
                 "{id}: {found} {expected}"
@@ -204,11 +361,11 @@ mod tests {
 
     #[test]
     fn levels_without_ratios_have_differences() {
-        let values = of(false);
-        let number = |id: &str| values.number(&format!("psy_mixed/{id}"));
-        assert_eq!(number("x|y/ratio"), None);
-        let difference = number("x/mean").unwrap() - number("y/mean").unwrap();
-        assert!((number("x|y/difference").unwrap() - difference).abs() < 1e-9);
+        let model = of(false);
+        let (name, found) = model.pairs[&PairName::of("x", "y")].estimate();
+        let [x, y] = ["x", "y"].map(|name| model.conditions[name].mean().unwrap());
+        assert_eq!(name, "difference");
+        assert!((found.unwrap() - (x - y)).abs() < 1e-9);
     }
 
     #[test]
@@ -226,10 +383,10 @@ mod tests {
             ..t
         });
         thresholds.extend(other);
-        let mut values = Values::default();
-        mixed("psy_mixed", &thresholds, true, &mut values);
-        assert_eq!(values.reason("psy_mixed/F"), Some(NOT_POSITIVE));
-        assert_eq!(values.reason("psy_mixed/x|y/ratio"), Some(NOT_POSITIVE));
+        let model = mixed(&thresholds, true).unwrap();
+        assert_eq!(model.test.f.reason(), Some(NOT_POSITIVE));
+        let contrast = &model.pairs[&PairName::of("x", "y")];
+        assert_eq!(contrast.ratio.reason(), Some(NOT_POSITIVE));
     }
 
     #[test]
@@ -240,10 +397,9 @@ mod tests {
             d: above_chance.max(0.0) * 10.0,
             above_chance,
         });
-        let mut values = Values::default();
-        sensitivities(&told, &mut values);
-        assert!(values.number("sdt_group/c/d/mean").unwrap() > 0.2);
-        assert!(values.number("sdt_group/c/above_chance/p").unwrap() > 0.9);
-        assert_eq!(values.number("sdt_group/c/n"), Some(4.0));
+        let found = &sensitivities(&told)["c"];
+        assert!(found.d.mean.number().unwrap() > 0.2);
+        assert!(found.above_chance.p.number().unwrap() > 0.9);
+        assert_eq!(found.n.number(), Some(4.0));
     }
 }

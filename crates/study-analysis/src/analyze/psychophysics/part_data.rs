@@ -1,9 +1,12 @@
 //! What the parts of a study are analyzed from, and what is found of one.
 
 use super::findings::PartFinding;
+use super::over_participants::Measured;
+use super::results::PartResults;
 use super::tracks::TrackData;
 use crate::analyze::exclude::Applied;
 use crate::analyze::findings::Pair;
+use crate::analyze::record::Field as _;
 use crate::analyze::values::Values;
 use crate::analyze::warning::Warning;
 use std::collections::BTreeMap;
@@ -45,7 +48,7 @@ pub struct PartAnalysis {
     /// Whether answers of simulated participants are among them.
     pub simulated: bool,
     /// The statistics.
-    pub values: Values,
+    pub results: PartResults,
     /// The answers to the questions about it.
     pub findings: Vec<PartFinding>,
     /// The comparisons on which they rest: of realizations, or of thresholds.
@@ -60,6 +63,13 @@ pub struct PartAnalysis {
     pub used: Vec<(ParticipantId, u32, u32)>,
     /// What its figures draw besides.
     pub data: PartData,
+}
+
+impl PartAnalysis {
+    /// The statistics by identifier.
+    pub fn values(&self) -> Values {
+        self.results.values()
+    }
 }
 
 /// The answers of a part by level and trial.
@@ -77,21 +87,6 @@ pub struct PartData {
     pub vaf: BTreeMap<String, f64>,
     /// Thresholds and sensitivities, by which tracks, groups and sessions are compared.
     pub measured: Vec<Measured>,
-}
-
-/// A number of one participant in one condition and session.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Measured {
-    /// Participant. Untrusted.
-    pub participant: String,
-    /// Group of the participant, if the study has groups.
-    pub group: Option<String>,
-    /// Session, if several sessions have the part.
-    pub session: Option<String>,
-    /// Track or realization. Untrusted.
-    pub condition: String,
-    /// A threshold, a sensitivity, a mean rating.
-    pub value: f64,
 }
 
 /// Positive answers of one participant in one condition.
@@ -113,10 +108,10 @@ pub struct LevelData {
 pub(super) struct Found {
     pub(super) task: &'static str,
     pub(super) trials: usize,
-    pub(super) values: Values,
+    pub(super) results: PartResults,
     pub(super) warnings: Vec<Warning>,
     pub(super) data: PartData,
-    /// Items of preferences, conditions of tracks.
+    /// Conditions of tracks.
     pub(super) names: Vec<String>,
 }
 

@@ -1,13 +1,131 @@
 //! Paired preferences: `pairs/…`.
 
-use crate::analyze::identifiers::{group_id, pair_id};
+use crate::analyze::record::{
+    Declared, Field, Interval, Key, List, PairName, ParticipantName, RealizationName, Stat, Why,
+    join, statistics,
+};
+use crate::analyze::results::Correlation;
 use crate::analyze::values::Values;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use study_stats::distribution::normal_quantile;
 use study_stats::paired::holm;
 use study_stats::pairs::{
-    Comparison, Difference, Link, Model, NoAbilities, abilities, circular_triads,
+    Abilities, Comparison, Difference, Link, Model, NoAbilities, abilities, circular_triads,
 };
+
+statistics! {
+    /// A realization.
+    pub struct Ability {
+        /// its ability, the logarithm of its odds; abilities sum to 0
+        ability: Stat,
+        /// standard error
+        ability_se: Stat,
+        /// by the clustered error from ten participants on
+        ability_ci95: Interval,
+    }
+
+    /// The effect of being presented first.
+    pub struct OrderEffect {
+        /// what it adds to the difference of abilities
+        order: Stat,
+        /// standard error
+        order_se: Stat,
+        /// p
+        order_p: Stat,
+    }
+
+    /// Ties by Davidson's (1970) model.
+    pub struct Ties {
+        /// logarithm of ν
+        tie_log_nu: Stat,
+        /// its standard error
+        tie_log_nu_se: Stat,
+    }
+
+    /// The difference of two abilities.
+    pub struct AbilityDifference {
+        /// that of the first less that of the second
+        difference: Stat,
+        /// standard error
+        se: Stat,
+        /// by the clustered error from ten participants on
+        ci95: Interval,
+        /// 1/(1 + e^(−difference)): the share of comparisons that the first would win
+        preferred: Stat,
+        /// standard error by the sandwich over participants, without a factor for small samples
+        se_clustered: Option<Stat>,
+        /// by the clustered error from ten participants on
+        p: Stat,
+        /// with Holm's correction
+        p_holm: Stat,
+    }
+
+    /// How consistent a participant is, by what was preferred more often of each pair.
+    pub struct Triads {
+        /// number of circular triads
+        circular: Stat,
+        /// Kendall and Babington Smith's (1940) coefficient, 1 without any
+        consistency: Stat,
+    }
+
+    /// Paired preferences by the model of Bradley and Terry (1952).
+    pub struct Preferences {
+        /// by realization
+        items: Columns<RealizationName, Ability> as "",
+        /// where a pair was presented in both orders
+        order: Option<OrderEffect> as "",
+        /// where they are answers
+        ties: Option<Ties> as "",
+        /// ties that do not count
+        ties_left_out: Option<Stat>,
+        /// deviance over the pairs in each order
+        deviance: Stat,
+        /// its degrees of freedom
+        df: Stat,
+        /// the rank of each realization, sorted by name
+        rank: Option<List>,
+        /// by pair
+        pairs: BTreeMap<PairName, AbilityDifference> as "",
+        /// by participant, of three realizations or more
+        triads: BTreeMap<ParticipantName, Triads>,
+        /// of abilities with VAF over realizations
+        vaf: Option<Correlation>,
+    }
+}
+
+/// Records whose names follow their statistics in identifiers: `ability/M`, `ability_se/M`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Columns<K, R>(pub BTreeMap<K, R>);
+
+impl<K: Key, R: Field> Field for Columns<K, R> {
+    fn undefined(why: &Why) -> Self {
+        Self(BTreeMap::undefined(why))
+    }
+
+    fn put(&self, id: &str, values: &mut Values) {
+        for (key, record) in &self.0 {
+            for (name, value) in record.values().iter() {
+                let column = join(id, name);
+                values.insert(format!("{column}/{}", key.part()), value.clone());
+            }
+        }
+    }
+
+    fn explain(&mut self, why: &Why) {
+        self.0.explain(why);
+    }
+
+    fn declare(id: &str, doc: &'static str, all: &mut Vec<Declared>) {
+        let mut own = Vec::new();
+        R::declare(id, doc, &mut own);
+        for declared in &mut own {
+            if let Declared::Statistic { id, .. } = declared {
+                *id = format!("{id}/{}", K::PLACEHOLDER);
+            }
+        }
+        all.append(&mut own);
+    }
+}
 
 /// The fewest participants whose clustered standard error is used.
 pub(super) const ENOUGH_CLUSTERS: usize = 10;
@@ -46,8 +164,7 @@ pub(super) fn in_both_orders(rows: &[Preference]) -> bool {
 }
 
 /// Abilities, their differences, order effect and ties. Items sort by name.
-pub fn preferences(rows: &[Preference], ties: bool, order: bool) -> Values {
-    let mut values = Values::default();
+pub fn preferences(rows: &[Preference], ties: bool, order: bool) -> Preferences {
     let items: BTreeSet<&str> = rows
         .iter()
         .flat_map(|r| [r.first.as_str(), &r.second])
@@ -90,44 +207,40 @@ pub fn preferences(rows: &[Preference], ties: bool, order: bool) -> Values {
     let enough = people.len() >= ENOUGH_CLUSTERS;
     let quantile = normal_quantile(0.975).unwrap_or(f64::NAN);
     let around = |x: f64, se: f64| (x - quantile * se, x + quantile * se);
-    for (i, item) in items.iter().enumerate() {
-        let mut group = values.group("pairs", why.as_str());
-        let id = |name: &str| group_id(name, &[item]);
-        group.maybe(&id("ability"), found.map(|f| f.abilities[i]));
-        group.maybe(&id("ability_se"), found.map(|f| f.ses[i]));
+    let stat = |x: Option<f64>| Stat::or(x, why.clone());
+    let ability = |(i, item): (usize, &&str)| {
         let interval = found.map(|f| {
             let clustered = f.clustered_se(i).filter(|_| enough);
             around(f.abilities[i], clustered.unwrap_or(f.ses[i]))
         });
-        group.maybe(&id("ability_ci95_lo"), interval.map(|e| e.0));
-        group.maybe(&id("ability_ci95_hi"), interval.map(|e| e.1));
-    }
-    let mut group = values.group("pairs", why.as_str());
-    if order {
+        let ability = Ability {
+            ability: stat(found.map(|f| f.abilities[i])),
+            ability_se: stat(found.map(|f| f.ses[i])),
+            ability_ci95: Interval::or(interval, why.clone()),
+        };
+        (RealizationName::from(*item), ability)
+    };
+    let order = order.then(|| {
         let effect = found.and_then(|f| f.order);
-        group.maybe("order", effect.map(|e| e.estimate));
-        group.maybe("order_se", effect.map(|e| e.se));
-        group.maybe("order_p", effect.map(|e| e.p));
-    }
-    if ties {
-        let why = if why.is_empty() {
-            "there are no ties"
-        } else {
-            &why
+        OrderEffect {
+            order: stat(effect.map(|e| e.estimate)),
+            order_se: stat(effect.map(|e| e.se)),
+            order_p: stat(effect.map(|e| e.p)),
+        }
+    });
+    let davidson = ties.then(|| {
+        let why = match why.as_str() {
+            "" => "there are no ties",
+            why => why,
         };
         let tie = found.and_then(|f| f.tie);
-        group.put_or("tie_log_nu", tie.map(|e| e.estimate), why);
-        group.put_or("tie_log_nu_se", tie.map(|e| e.se), why);
-    } else {
-        let tied = comparisons.iter().map(|c| c.tied).sum();
-        group.put("ties_left_out", tied);
-    }
-    group.maybe("deviance", found.map(|f| f.deviance));
-    group.maybe("df", found.map(|f| f.df as f64));
-    if let Some(fit) = found {
-        let ranks = fit.ranks().into_iter().map(|r| r as f64).collect();
-        group.list("rank", ranks);
-    }
+        Ties {
+            tie_log_nu: Stat::or(tie.map(|e| e.estimate), why.to_owned()),
+            tie_log_nu_se: Stat::or(tie.map(|e| e.se), why.to_owned()),
+        }
+    });
+    let tied = || Stat::of(comparisons.iter().map(|c| c.tied).sum());
+    let ranks = |f: &Abilities| List::of(f.ranks().into_iter().map(|r| r as f64).collect());
     let pairs: Vec<(usize, usize)> = (0..items.len())
         .flat_map(|a| (a + 1..items.len()).map(move |b| (a, b)))
         .collect();
@@ -138,35 +251,46 @@ pub fn preferences(rows: &[Preference], ties: bool, order: bool) -> Values {
     let p: Vec<Option<f64>> = (differences.iter())
         .map(|d| d.as_ref().map(|d| deciding(d).p))
         .collect();
-    for (((a, b), difference), (p, p_holm)) in
-        pairs.iter().zip(&differences).zip(p.iter().zip(holm(&p)))
-    {
-        let mut group = values.group(pair_id("pairs", items[*a], items[*b]), why.as_str());
-        group.maybe("difference", difference.map(|d| d.effect.estimate));
-        group.maybe("se", difference.map(|d| d.effect.se));
-        let effect = difference.as_ref().map(deciding);
-        group.interval("ci95", effect.map(|e| around(e.estimate, e.se)));
-        group.maybe("preferred", difference.map(|d| d.preferred));
-        if people.len() > 1 {
-            let clustered = difference.and_then(|d| d.clustered);
-            group.maybe("se_clustered", clustered.map(|e| e.se));
-        }
-        group.maybe("p", *p);
-        group.maybe("p_holm", p_holm);
+    let p_holm = holm(&p);
+    let of_pair = |(k, (a, b)): (usize, &(usize, usize))| {
+        let difference = differences[k].as_ref();
+        let effect = difference.map(deciding);
+        let clustered = difference.and_then(|d| d.clustered);
+        let found = AbilityDifference {
+            difference: stat(difference.map(|d| d.effect.estimate)),
+            se: stat(difference.map(|d| d.effect.se)),
+            ci95: Interval::or(effect.map(|e| around(e.estimate, e.se)), why.clone()),
+            preferred: stat(difference.map(|d| d.preferred)),
+            se_clustered: (people.len() > 1).then(|| stat(clustered.map(|e| e.se))),
+            p: stat(p[k]),
+            p_holm: stat(p_holm[k]),
+        };
+        (PairName::of(items[*a], items[*b]), found)
+    };
+    Preferences {
+        items: Columns(items.iter().enumerate().map(ability).collect()),
+        order,
+        ties: davidson,
+        ties_left_out: (!ties).then(tied),
+        deviance: stat(found.map(|f| f.deviance)),
+        df: stat(found.map(|f| f.df as f64)),
+        rank: found.map(ranks),
+        pairs: pairs.iter().enumerate().map(of_pair).collect(),
+        triads: match items.len() {
+            0..=2 => BTreeMap::new(),
+            _ => triads(&items, &people, &comparisons),
+        },
+        vaf: None,
     }
-    if items.len() > 2 {
-        triads(&items, &people, &comparisons, &mut values);
-    }
-    values
 }
 
 /// How consistent each participant is, by what was preferred more often of each pair.
-fn triads(items: &[&str], people: &[&str], comparisons: &[Comparison], values: &mut Values) {
-    for (cluster, name) in people
-        .iter()
-        .enumerate()
-        .filter(|(_, name)| !name.is_empty())
-    {
+fn triads(
+    items: &[&str],
+    people: &[&str],
+    comparisons: &[Comparison],
+) -> BTreeMap<ParticipantName, Triads> {
+    let of_participant = |(cluster, name): (usize, &&str)| {
         let mut wins = vec![0.0; items.len() * items.len()];
         for c in comparisons.iter().filter(|c| c.cluster == cluster) {
             wins[c.first * items.len() + c.second] += c.first_preferred;
@@ -179,10 +303,16 @@ fn triads(items: &[&str], people: &[&str], comparisons: &[Comparison], values: &
             .collect();
         let found = circular_triads(items.len(), &preferred);
         let why = "a pair was not compared, or neither was preferred more often";
-        let mut group = values.group(group_id("pairs/triads", &[name]), why);
-        group.maybe("circular", found.map(|f| f.circular));
-        group.maybe("consistency", found.map(|f| f.consistency));
-    }
+        let triads = Triads {
+            circular: Stat::or(found.map(|f| f.circular), why),
+            consistency: Stat::or(found.map(|f| f.consistency), why),
+        };
+        (ParticipantName::from(*name), triads)
+    };
+    let known = people.iter().enumerate();
+    (known.filter(|(_, name)| !name.is_empty()))
+        .map(of_participant)
+        .collect()
 }
 
 /// The reason with the names of the items.
@@ -217,6 +347,19 @@ fn reason(error: &NoAbilities, items: &[&str]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::analyze::record::Number as _;
+
+    #[test]
+    fn names_follow_the_statistics_of_columns() {
+        let name = |name: &str| RealizationName::from(name);
+        let columns = Columns(BTreeMap::from([(name("a/b"), Stat::of(2.0))]));
+        let mut values = Values::default();
+        columns.put("pairs/ability", &mut values);
+        assert_eq!(values.number("pairs/ability/a%2Fb"), Some(2.0));
+        let mut all = Vec::new();
+        Columns::<RealizationName, Stat>::declare("pairs/ability", "", &mut all);
+        assert!(matches!(&all[..], [Declared::Statistic { id, .. }] if id == "pairs/ability/M"));
+    }
 
     /// Participants who always prefer the same of two, by turns: their answers are not
     /// independent, and the clustered error is larger.
@@ -233,11 +376,16 @@ mod tests {
                 },
             };
             let rows: Vec<Preference> = (0..8 * people).map(row).collect();
-            let values = preferences(&rows, false, false);
-            let get = |id: &str| values.number(&format!("pairs/a|b/{id}")).unwrap();
-            let half = 0.5 * (get("ci95_hi") - get("ci95_lo"));
-            assert!(get("se_clustered") > 1.5 * get("se"));
-            [get("se"), get("se_clustered")].map(|se| (half / se - 1.96).abs() < 1e-3)
+            let found = preferences(&rows, false, false);
+            let pair = &found.pairs[&PairName::of("a", "b")];
+            let (low, high) = pair.ci95.ends().unwrap();
+            let half = 0.5 * (high - low);
+            let (se, clustered) = (
+                pair.se.number().unwrap(),
+                pair.se_clustered.number().unwrap(),
+            );
+            assert!(clustered > 1.5 * se);
+            [se, clustered].map(|se| (half / se - 1.96).abs() < 1e-3)
         };
         assert_eq!(decides(9), [true, false]);
         assert_eq!(decides(10), [false, true]);

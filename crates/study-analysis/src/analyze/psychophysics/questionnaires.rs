@@ -2,14 +2,15 @@
 
 use super::again::again;
 use super::findings::{PartFacts, of_groups_and_sessions};
-use super::part_data::{Measured, PartAnalysis, PartData, StudyData};
-use crate::analyze::identifiers::group_id;
+use super::over_participants::Measured;
+use super::part_data::{PartAnalysis, PartData, StudyData};
+use super::results::{ItemAnswers, PartResults, QuestionnaireResult};
+use crate::analyze::record::{Interval, Stat};
 use crate::analyze::select::{Include, Whose, state_counts};
-use crate::analyze::values::Values;
 use crate::analyze::warning::Warning;
 use std::collections::{BTreeMap, BTreeSet};
 use study_base::text::counted;
-use study_plan::protocol::questionnaires::{Inventory, Questionnaire};
+use study_plan::protocol::questionnaires::{Inventory, Item, Questionnaire};
 use study_plan::protocol::{Answer, Protocol};
 use study_session::outcome::ParticipantRow;
 use study_session::outcome::fold::History;
@@ -61,7 +62,7 @@ fn one(protocol: &Protocol, own: &Questionnaire, rows: &[ParticipantRow]) -> Par
     };
     let rows: Vec<&ParticipantRow> = rows.iter().filter(asked).collect();
     let several = protocol.sessions.len() > 1;
-    let mut values = Values::default();
+    let mut score_of = BTreeMap::new();
     let mut scores: Vec<Measured> = Vec::new();
     for row in &rows {
         let all: Option<Vec<f64>> = answers(row).into_iter().collect();
@@ -73,9 +74,8 @@ fn one(protocol: &Protocol, own: &Questionnaire, rows: &[ParticipantRow]) -> Par
             Some(session) => format!("{participant}@{session}"),
             None => participant.clone(),
         };
-        values
-            .group("questionnaire/score", "an item has no answer")
-            .maybe(&name, score);
+        let stat = Stat::or(score, "an item has no answer");
+        score_of.insert(name.as_str().into(), stat);
         scores.extend(score.map(|value| Measured {
             participant,
             group: row.group.as_ref().map(|g| g.as_str().to_owned()),
@@ -84,29 +84,34 @@ fn one(protocol: &Protocol, own: &Questionnaire, rows: &[ParticipantRow]) -> Par
             value,
         }));
     }
-    over_participants(&scores, &mut values);
-    for (i, item) in items.iter().enumerate() {
+    let of_item = |(i, item): (usize, &Item)| {
         let known: Vec<f64> = rows.iter().filter_map(|row| answers(row)[i]).collect();
-        let prefix = group_id("questionnaire/item", &[item.name]);
-        let mut group = values.group(prefix, "fewer than two have answered it");
-        group.put("n", known.len() as f64);
-        group.maybe("mean", mean(&known));
-        group.maybe("sd", sd(&known));
-    }
+        let few = "fewer than two have answered it";
+        let answers = ItemAnswers {
+            n: Stat::count(known.len()),
+            mean: Stat::or(mean(&known), few),
+            sd: Stat::or(sd(&known), few),
+        };
+        (item.name.into(), answers)
+    };
     let incomplete = rows.len() - scores.len();
-    values
-        .group("questionnaire", "")
-        .put("n_incomplete", incomplete as f64);
     let sessions: Vec<&str> = protocol.sessions.iter().map(|s| s.id.as_str()).collect();
     let sessions = if several { &sessions[..] } else { &[] };
-    again(&scores, sessions, false, &mut values);
+    let mut results = PartResults::undefined("");
+    results.over.again = again(&scores, sessions, false);
+    results.questionnaire = Some(QuestionnaireResult {
+        score: score_of,
+        item: items.iter().enumerate().map(of_item).collect(),
+        n_incomplete: Stat::count(incomplete),
+        ..over_participants(&scores)
+    });
     let who: BTreeSet<_> = rows.iter().map(|r| &r.participant).collect();
     let alpha = protocol.analysis.alpha();
-    let findings = of_groups_and_sessions(&PartFacts {
-        values: &values,
+    let facts = PartFacts {
         alpha,
         participants: who.len(),
-    });
+    };
+    let findings = of_groups_and_sessions(&facts, &results.over.again);
     let warning = || Warning {
         code: "incomplete-questionnaires",
         text: format!(
@@ -123,7 +128,7 @@ fn one(protocol: &Protocol, own: &Questionnaire, rows: &[ParticipantRow]) -> Par
         pilot: rows.iter().any(|r| r.pilot),
         simulated: rows.iter().any(|r| r.simulated),
         findings,
-        values,
+        results,
         pairs: Vec::new(),
         warnings: (incomplete > 0).then(warning).into_iter().collect(),
         exclusions: Vec::new(),
@@ -134,19 +139,22 @@ fn one(protocol: &Protocol, own: &Questionnaire, rows: &[ParticipantRow]) -> Par
 }
 
 /// The mean score of each participant, and what the participants have in common.
-fn over_participants(scores: &[Measured], values: &mut Values) {
+fn over_participants(scores: &[Measured]) -> QuestionnaireResult {
     let mut own: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
     for m in scores {
         own.entry(&m.participant).or_default().push(m.value);
     }
     let means: Vec<f64> = own.values().filter_map(|x| mean(x)).collect();
     let found = one_sample(&means);
-    let mut group = values.group("questionnaire", "fewer than two participants have a score");
-    group.put("n", means.len() as f64);
-    group.maybe("mean", mean(&means));
-    group.maybe("median", quantile(&sorted(&means), 0.5));
-    group.maybe("sd", found.map(|f| f.sd));
-    group.interval("ci95", found.map(|f| f.ci95));
+    let few = "fewer than two participants have a score";
+    QuestionnaireResult {
+        n: Stat::count(means.len()),
+        mean: Stat::or(mean(&means), few),
+        median: Stat::or(quantile(&sorted(&means), 0.5), few),
+        sd: Stat::or(found.map(|f| f.sd), few),
+        ci95: Interval::or(found.map(|f| f.ci95), few),
+        ..QuestionnaireResult::undefined("")
+    }
 }
 
 fn score(kind: Inventory, answers: &[f64]) -> Option<f64> {

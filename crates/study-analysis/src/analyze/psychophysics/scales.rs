@@ -1,12 +1,99 @@
 //! Magnitude estimation, `magnitude/…`, and ratings with hidden reference and anchors,
 //! `mushra/…`.
 
-use super::over_participants::{Threshold, mixed};
-use crate::analyze::identifiers::group_id;
-use crate::analyze::values::Values;
+use super::over_participants::{ConditionModel, Threshold, mixed};
+use crate::analyze::keys::{At, ConditionName};
+use crate::analyze::record::{Interval, ParticipantName, RealizationName, Stat, statistics};
+use crate::analyze::results::Correlation;
 use std::collections::{BTreeMap, BTreeSet};
 use study_stats::magnitude::{Estimate, Magnitude, magnitude as estimate};
 use study_stats::mushra::{Screening, condition};
+
+statistics! {
+    /// The estimates of a level or a realization, after the participants' own means were made equal (Lane, Catania & Stevens 1961).
+    pub struct GeometricMean {
+        /// geometric mean over participants
+        geometric_mean: Stat,
+        /// t interval on logarithms
+        ci95: Interval,
+    }
+
+    /// The power law a·xⁿ by least squares on the mean logarithms.
+    pub struct PowerLaw {
+        /// n
+        exponent: Stat,
+        /// log10 a
+        log10_coefficient: Stat,
+        /// share of the variance of the mean logarithms
+        r_squared: Stat,
+        /// over participants
+        exponent_over_participants: MeanExponent,
+    }
+
+    /// The exponent over participants.
+    pub struct MeanExponent {
+        /// its mean
+        mean: Stat,
+        /// t interval
+        ci95: Interval,
+    }
+
+    /// A participant.
+    pub struct OwnExponent {
+        /// the exponent of the participant's estimates
+        exponent: Stat,
+    }
+
+    /// Estimated magnitudes.
+    pub struct Magnitudes {
+        /// estimates of 0 and less
+        n_left_out: Stat,
+        /// by level
+        levels: BTreeMap<At, GeometricMean> as "level",
+        /// by realization
+        realizations: BTreeMap<RealizationName, GeometricMean> as "realization",
+        /// of levels
+        law: Option<PowerLaw> as "",
+        /// by participant, of levels
+        participants: BTreeMap<ParticipantName, OwnExponent> as "",
+        /// of log10 of the geometric means with VAF over test realizations
+        vaf: Option<Correlation>,
+    }
+
+    /// Whether a participant tells reference and anchor (after ITU-R BS.1534-3).
+    pub struct Screened {
+        /// share of trials whose hidden reference is rated below 90
+        reference_below: Stat,
+        /// share of trials whose mid anchor is rated above 90
+        anchor_above: Stat,
+        /// whether one of them is more than 15 %: a flag, nothing is deleted
+        screened: Stat,
+    }
+
+    /// The ratings of a condition.
+    pub struct Rated {
+        /// median of all ratings
+        median: Stat,
+        /// lower quartile
+        q1: Stat,
+        /// upper quartile
+        q3: Stat,
+        /// mean over participants
+        mean: Stat,
+        /// half its t interval
+        ci95_half: Stat,
+    }
+
+    /// Ratings beside a reference.
+    pub struct Mushra {
+        /// participants who are not screened
+        n_kept: Stat,
+        /// by participant
+        participants: BTreeMap<ParticipantName, Screened> as "",
+        /// over those who are not screened
+        conditions: BTreeMap<ConditionName, Rated> as "",
+    }
+}
 
 /// One estimate.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,57 +106,63 @@ pub struct MagnitudeRow {
     pub estimate: f64,
 }
 
-/// The estimates of participants, in the order of `people`, and how many are left out.
+/// The estimates of participants, in the order of `people`.
 fn estimated<'a>(
     people: &[&str],
     rows: impl Iterator<Item = (&'a str, f64, f64)>,
-) -> (Magnitude, Values) {
+) -> (Magnitude, Magnitudes) {
     let of_row = |(participant, level, estimate)| Estimate {
         participant: people.binary_search(&participant).unwrap_or_default(),
         level,
         estimate,
     };
     let found = estimate(&rows.map(of_row).collect::<Vec<_>>());
-    let mut values = Values::default();
-    values
-        .group("magnitude", "")
-        .put("n_left_out", found.left_out as f64);
-    (found, values)
+    let magnitudes = Magnitudes {
+        n_left_out: Stat::of(found.left_out as f64),
+        ..Magnitudes::undefined("")
+    };
+    (found, magnitudes)
+}
+
+/// The geometric mean of each level.
+fn geometric_means(found: &Magnitude) -> impl Iterator<Item = (f64, GeometricMean)> {
+    let why = "there is one participant";
+    found.levels.iter().map(move |(level, mean)| {
+        let mean = GeometricMean {
+            geometric_mean: Stat::or(mean.map(|m| m.mean), why),
+            ci95: Interval::or(mean.and_then(|m| m.ci95), why),
+        };
+        (*level, mean)
+    })
 }
 
 /// Geometric means, exponent and coefficient of the power law.
-pub fn magnitude(rows: &[MagnitudeRow]) -> Values {
+pub fn magnitude(rows: &[MagnitudeRow]) -> Magnitudes {
     let people: BTreeSet<&str> = rows.iter().map(|r| r.participant.as_str()).collect();
     let people: Vec<&str> = people.into_iter().collect();
     let rows = (rows.iter()).map(|row| (row.participant.as_str(), row.level, row.estimate));
-    let (found, mut values) = estimated(&people, rows);
-    for (level, mean) in &found.levels {
-        // A level always has a decimal point: 1.0.
-        let mut group = values.group(
-            format!("magnitude/level/{level:?}"),
-            "there is one participant",
-        );
-        group.maybe("geometric_mean", mean.map(|m| m.mean));
-        group.interval("ci95", mean.and_then(|m| m.ci95));
+    let (found, magnitudes) = estimated(&people, rows);
+    let few = "there are fewer than two levels above 0";
+    let over = "fewer than two participants have an exponent";
+    let law = PowerLaw {
+        exponent: Stat::or(found.law.map(|l| l.exponent), few),
+        log10_coefficient: Stat::or(found.law.map(|l| l.log10_coefficient), few),
+        r_squared: Stat::or(found.law.and_then(|l| l.r_squared), few),
+        exponent_over_participants: MeanExponent {
+            mean: Stat::or(found.exponent.map(|e| e.mean), over),
+            ci95: Interval::or(found.exponent.and_then(|e| e.ci95), over),
+        },
+    };
+    let own = people.iter().zip(&found.exponents).map(|(person, own)| {
+        let exponent = Stat::or(*own, few);
+        ((*person).into(), OwnExponent { exponent })
+    });
+    Magnitudes {
+        levels: (geometric_means(&found).map(|(level, mean)| (At(level), mean))).collect(),
+        law: Some(law),
+        participants: own.collect(),
+        ..magnitudes
     }
-    let mut group = values.group("magnitude", "there are fewer than two levels above 0");
-    group.maybe("exponent", found.law.map(|l| l.exponent));
-    group.maybe("log10_coefficient", found.law.map(|l| l.log10_coefficient));
-    group.maybe("r_squared", found.law.and_then(|l| l.r_squared));
-    for (person, exponent) in people.iter().zip(&found.exponents) {
-        let mut group = values.group(
-            group_id("magnitude", &[person]),
-            "there are fewer than two levels above 0",
-        );
-        group.maybe("exponent", *exponent);
-    }
-    let mut group = values.group(
-        "magnitude/exponent_over_participants",
-        "fewer than two participants have an exponent",
-    );
-    group.maybe("mean", found.exponent.map(|e| e.mean));
-    group.interval("ci95", found.exponent.and_then(|e| e.ci95));
-    values
 }
 
 /// One estimate of a realization.
@@ -85,7 +178,7 @@ pub(super) struct RealizationRow {
 
 /// Geometric means of realizations, as of levels, and their comparison by a mixed model of the
 /// logarithms: one mean of each participant and realization.
-pub(super) fn realizations(rows: &[RealizationRow]) -> Values {
+pub(super) fn realizations(rows: &[RealizationRow]) -> (Magnitudes, Option<ConditionModel>) {
     let mut names: Vec<&str> = rows.iter().map(|r| r.realization.as_str()).collect();
     names.sort_unstable();
     names.dedup();
@@ -98,14 +191,10 @@ pub(super) fn realizations(rows: &[RealizationRow]) -> Values {
         let level = place(&names, &row.realization) as f64;
         (row.participant.as_str(), level, row.estimate)
     });
-    let (found, mut values) = estimated(&people, levels);
-    for (place, mean) in &found.levels {
-        let name = names[*place as usize];
-        let prefix = group_id("magnitude/realization", &[name]);
-        let mut group = values.group(prefix, "there is one participant");
-        group.maybe("geometric_mean", mean.map(|m| m.mean));
-        group.interval("ci95", mean.and_then(|m| m.ci95));
-    }
+    let (found, mut magnitudes) = estimated(&people, levels);
+    magnitudes.realizations = geometric_means(&found)
+        .map(|(place, mean)| (names[place as usize].into(), mean))
+        .collect();
     let mut logs: BTreeMap<(&str, &str), Vec<f64>> = BTreeMap::new();
     for row in rows.iter().filter(|r| r.estimate > 0.0) {
         let cell = (row.participant.as_str(), row.realization.as_str());
@@ -120,8 +209,7 @@ pub(super) fn realizations(rows: &[RealizationRow]) -> Values {
             })
         })
         .collect();
-    mixed("magnitude_mixed", &cells, true, &mut values);
-    values
+    (magnitudes, mixed(&cells, true))
 }
 
 /// One rating.
@@ -146,8 +234,11 @@ pub struct MushraRoles {
 
 /// Who is screened, and every condition over those who are not; if somebody is screened, over
 /// all as well.
-pub fn mushra(rows: &[MushraRow], roles: &MushraRoles, screening: &Screening) -> Values {
-    let mut values = Values::default();
+pub fn mushra(
+    rows: &[MushraRow],
+    roles: &MushraRoles,
+    screening: &Screening,
+) -> (Mushra, BTreeMap<ConditionName, Rated>) {
     let people: BTreeSet<&str> = rows.iter().map(|r| r.participant.as_str()).collect();
     let conditions: BTreeSet<&str> = rows.iter().map(|r| r.condition.as_str()).collect();
     let ratings = |person: &str, condition: &str| -> Vec<f64> {
@@ -157,44 +248,56 @@ pub fn mushra(rows: &[MushraRow], roles: &MushraRoles, screening: &Screening) ->
         own.map(|r| r.rating).collect()
     };
     let mut kept = Vec::new();
-    let mut all = Vec::new();
-    for person in people {
-        all.push(person);
+    let mut participants = BTreeMap::new();
+    for person in &people {
         let reference = ratings(person, &roles.reference);
         let anchor = (roles.mid_anchor.as_ref()).map_or_else(Vec::new, |a| ratings(person, a));
         let found = screening.judge(&reference, &anchor);
-        let mut group = values.group(group_id("mushra", &[person]), "it was not rated");
-        group.maybe("reference_below", found.reference_below);
-        group.maybe("anchor_above", found.anchor_above);
-        group.put("screened", f64::from(u8::from(found.screened)));
+        let screened = Screened {
+            reference_below: Stat::or(found.reference_below, "it was not rated"),
+            anchor_above: Stat::or(found.anchor_above, "it was not rated"),
+            screened: Stat::flag(found.screened),
+        };
+        participants.insert((*person).into(), screened);
         if !found.screened {
-            kept.push(person);
+            kept.push(*person);
         }
     }
-    values.group("mushra", "").put("n_kept", kept.len() as f64);
-    let over = [("mushra", &kept), ("mushra_unscreened", &all)];
-    let one_screened = kept.len() < all.len();
-    // The same numbers twice if nobody is screened.
-    for (prefix, people) in &over[..if one_screened { 2 } else { 1 }] {
-        for name in &conditions {
+    let over = |people: &[&str]| -> BTreeMap<ConditionName, Rated> {
+        let rated = |name: &&str| {
             let own: Vec<Vec<f64>> = people.iter().map(|person| ratings(person, name)).collect();
             let found = condition(&own);
-            let why = "nobody is left who rated it";
-            let mut group = values.group(group_id(prefix, &[name]), why);
-            group.maybe("median", found.map(|c| c.median));
-            group.maybe("q1", found.map(|c| c.quartiles.0));
-            group.maybe("q3", found.map(|c| c.quartiles.1));
-            group.maybe("mean", found.map(|c| c.mean));
+            let stat = |x: Option<f64>| Stat::or(x, "nobody is left who rated it");
             let half = found.and_then(|c| c.ci95_half);
-            group.put_or("ci95_half", half, "there is one participant");
-        }
-    }
-    values
+            let rated = Rated {
+                median: stat(found.map(|c| c.median)),
+                q1: stat(found.map(|c| c.quartiles.0)),
+                q3: stat(found.map(|c| c.quartiles.1)),
+                mean: stat(found.map(|c| c.mean)),
+                ci95_half: Stat::or(half, "there is one participant"),
+            };
+            ((*name).into(), rated)
+        };
+        conditions.iter().map(rated).collect()
+    };
+    let all: Vec<&str> = people.into_iter().collect();
+    // The same numbers twice if nobody is screened.
+    let unscreened = match kept.len() == all.len() {
+        true => BTreeMap::new(),
+        false => over(&all),
+    };
+    let mushra = Mushra {
+        n_kept: Stat::count(kept.len()),
+        participants,
+        conditions: over(&kept),
+    };
+    (mushra, unscreened)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::analyze::record::{Number as _, PairName};
 
     /// Three participants and realizations; estimates with moduli 1, 10 and 3.
     fn estimates() -> Vec<RealizationRow> {
@@ -219,21 +322,24 @@ mod tests {
     #[test]
     fn realizations_have_the_geometric_means_of_their_estimates() {
         let rows = estimates();
-        let values = realizations(&rows);
+        let (magnitudes, model) = realizations(&rows);
         let of = |name: &str| -> f64 {
             let own = rows.iter().filter(|r| r.realization == name);
             let logs: Vec<f64> = own.map(|r| r.estimate.ln()).collect();
             (logs.iter().sum::<f64>() / logs.len() as f64).exp()
         };
-        let found = |id: &str| values.number(id).unwrap_or(f64::NAN);
         for name in ["a", "b", "c"] {
-            let mean = found(&format!("magnitude/realization/{name}/geometric_mean"));
+            let mean = magnitudes.realizations[name]
+                .geometric_mean
+                .number()
+                .unwrap();
             assert!((mean / of(name) - 1.0).abs() < 1e-12, "{name}: {mean}");
         }
-        let ratio = found("magnitude_mixed/a|b/ratio");
+        let model = model.unwrap();
+        let ratio = model.pairs[&PairName::of("a", "b")].ratio.number().unwrap();
         assert!((ratio / (of("a") / of("b")) - 1.0).abs() < 1e-9, "{ratio}");
-        assert!(found("magnitude_mixed/p") < 0.05);
-        assert_eq!(values.get("magnitude/exponent"), None);
+        assert!(model.test.p.number().unwrap() < 0.05);
+        assert_eq!(magnitudes.law, None);
     }
 
     #[test]
@@ -254,18 +360,16 @@ mod tests {
             mid_anchor: None,
         };
         let all = |rows: &[MushraRow]| mushra(rows, &roles, &Screening::default());
-        let kept = all(&rows);
-        assert!(
-            kept.iter()
-                .all(|(id, _)| !id.starts_with("mushra_unscreened/"))
-        );
+        let (kept, nobody) = all(&rows);
+        assert!(nobody.is_empty());
         rows.extend([row("C", "ref", 20.0), row("C", "x", 80.0)]);
-        let values = all(&rows);
-        assert_eq!(values.number("mushra/C/screened"), Some(1.0));
-        for (id, value) in kept.iter().filter(|(id, _)| id.starts_with("mushra/x/")) {
-            assert_eq!(values.get(id), Some(value), "{id}");
-        }
-        assert_eq!(values.number("mushra_unscreened/x/mean"), Some(60.0));
-        assert_eq!(values.number("mushra_unscreened/x/median"), Some(60.0));
+        let (found, unscreened) = all(&rows);
+        assert!(found.participants["C"].screened.is_set());
+        assert_eq!(found.conditions["x"], kept.conditions["x"]);
+        let with = &unscreened["x"];
+        assert_eq!(
+            (with.mean.number(), with.median.number()),
+            (Some(60.0), Some(60.0))
+        );
     }
 }

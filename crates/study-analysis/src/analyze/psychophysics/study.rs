@@ -4,22 +4,23 @@ use super::again::{again, by_condition};
 use super::discriminations::of_tracks;
 use super::excluded;
 use super::findings::{
-    PartFacts, of_groups_and_sessions, of_preferences, of_realizations, of_sensitivities,
-    of_thresholds,
+    PartFacts, PartFinding, PartQuestion, of_groups_and_sessions, of_model, of_preferences,
+    of_realizations, told_apart,
 };
 use super::of_scales::{of_magnitudes, of_mushra};
+use super::over_participants::Measured;
 use super::part_data::{
-    Found, Intervals, Measured, PartAnalysis, PartData, StudyData, asked, chosen, groups,
-    sessions_of,
+    Found, Intervals, PartAnalysis, PartData, StudyData, asked, chosen, groups, sessions_of,
 };
-use super::preferences::{Choice, Preference, in_both_orders, preferences};
+use super::preferences::{Choice, Preference, Preferences, in_both_orders, preferences};
 use super::questionnaires::of_questionnaires;
+use super::results::PartResults;
 use crate::analyze::Rules;
 use crate::analyze::exclude;
-use crate::analyze::identifiers::group_id;
-use crate::analyze::results::{Correlation, Field as _};
+use crate::analyze::findings::Pair;
+use crate::analyze::record::{Field as _, Number as _};
+use crate::analyze::results::Correlation;
 use crate::analyze::select::{Include, Whose, state_counts};
-use crate::analyze::values::Values;
 use crate::analyze::warning::Warning;
 use std::collections::{BTreeMap, BTreeSet};
 use study_base::text::{ModelId, PartId, ParticipantId};
@@ -61,29 +62,14 @@ pub fn parts(study: &StudyData<'_>, include: Include) -> Vec<PartAnalysis> {
         let found = |rows: &[&RatingRow]| of_part_task(study, part, rows, &intervals, &rules);
         let mut own = found(&rows)?;
         if rows.len() < all.len() {
-            let before = found(&all)?;
-            without_exclusions(&before.values, &mut own.values);
+            own.results.before_exclusion = Some(found(&all)?.results.before_exclusion());
         }
         let who: BTreeSet<_> = rows.iter().map(|r| &r.participant).collect();
         let facts = PartFacts {
-            values: &own.values,
             alpha: rules.alpha,
             participants: who.len(),
         };
-        let names: Vec<&str> = own.names.iter().map(String::as_str).collect();
-        let (mut findings, pairs) = match &part.task {
-            Task::Pairs(_) => of_preferences(&facts, &own.names),
-            Task::Magnitude(_) => of_realizations(&facts, &names),
-            _ => of_thresholds(&facts, &names),
-        };
-        let told = |name: &&&str| {
-            own.values
-                .get(&group_id("sdt_group", &[name, "n"]))
-                .is_some()
-        };
-        let told: Vec<&str> = names.iter().filter(told).copied().collect();
-        findings.extend(of_sensitivities(&facts, &told));
-        findings.extend(of_groups_and_sessions(&facts));
+        let (findings, pairs) = findings(&facts, &own);
         let uncompared = match part.task {
             Task::Pairs(_) => Some(
                 "groups are compared by what they prefer, and sessions are not compared: abilities are those of \
@@ -113,7 +99,7 @@ pub fn parts(study: &StudyData<'_>, include: Include) -> Vec<PartAnalysis> {
             participants: who.len(),
             pilot: rows.iter().any(|r| r.pilot),
             simulated: rows.iter().any(|r| r.simulated),
-            values: own.values,
+            results: own.results,
             findings,
             pairs,
             warnings: own.warnings,
@@ -128,6 +114,27 @@ pub fn parts(study: &StudyData<'_>, include: Include) -> Vec<PartAnalysis> {
     let parts = protocol.parts.iter().filter_map(one);
     let questionnaires = of_questionnaires(study, include);
     parts.chain(questionnaires).collect()
+}
+
+/// The findings of a part, and the comparisons on which they rest.
+fn findings(facts: &PartFacts, own: &Found) -> (Vec<PartFinding>, Vec<Pair>) {
+    let (results, over) = (&own.results, &own.results.over);
+    let (mut found, pairs) = match (&results.pairs, &over.magnitude) {
+        (Some(preferences), _) => of_preferences(facts, preferences),
+        (None, Some(magnitude)) => {
+            let model = results.magnitude_mixed.as_ref();
+            of_realizations(facts, model, magnitude.vaf.as_ref())
+        }
+        (None, None) => {
+            let model = over.psy_mixed.as_ref();
+            let (found, pairs) = of_model(facts, PartQuestion::Thresholds, model);
+            (Vec::from_iter(found), pairs)
+        }
+    };
+    let told = |name: &String| Some(told_apart(facts, name, over.sdt_group.get(name.as_str())?));
+    found.extend(own.names.iter().filter_map(told));
+    found.extend(of_groups_and_sessions(facts, &over.again));
+    (found, pairs)
 }
 
 /// The statistics of these trials of a part; `None` of ratings.
@@ -196,39 +203,17 @@ fn of_ratings(
             })
         })
         .collect();
-    let mut values = Values::default();
     let ids: Vec<&str> = sessions.iter().flatten().map(|s| s.as_str()).collect();
-    again(&measured, &ids, false, &mut values);
+    let mut results = PartResults::undefined("");
+    results.over.again = again(&measured, &ids, false);
     Some(Found {
         task: "rating",
         trials: rows.len(),
-        values,
+        results,
         warnings: Vec::new(),
         data: PartData::default(),
         names: Vec::new(),
     })
-}
-
-/// Adds what depends on the exclusions, as it would be without them.
-fn without_exclusions(before: &Values, values: &mut Values) {
-    for group in [
-        "pairs/ability/",
-        "pairs/vaf/pearson/",
-        "magnitude/",
-        "mushra/",
-        "psy_group/",
-        "psy_mixed/",
-        "sdt_group/",
-        "groups/",
-        "groups_conditions/",
-        "sessions/",
-        "retest/",
-    ] {
-        let ids = before.iter().filter(|(id, _)| id.starts_with(group));
-        for (id, _) in ids {
-            values.copy(before, id, format!("before_exclusion/{id}"));
-        }
-    }
 }
 
 fn of_pairs(
@@ -241,23 +226,24 @@ fn of_pairs(
 ) -> Found {
     let chosen = |row: &&RatingRow| preference(part, row, intervals);
     let chosen: Vec<Preference> = rows.iter().filter_map(chosen).collect();
-    let mut values = preferences(&chosen, pairs.tie, in_both_orders(&chosen));
-    by_condition(&shares(&chosen, &groups(rows)), &mut values);
-    let names: BTreeSet<&String> = chosen.iter().flat_map(|p| [&p.first, &p.second]).collect();
+    let mut found = preferences(&chosen, pairs.tie, in_both_orders(&chosen));
     let models = study.protocol.models.iter();
     let vaf: BTreeMap<String, f64> = models
         .filter_map(|m| Some((m.id.as_str().to_owned(), m.vaf?)))
-        .filter(|(id, _)| names.contains(id))
+        .filter(|(id, _)| found.items.0.contains_key(id.as_str()))
         .collect();
     if !vaf.is_empty() {
-        with_vaf(&vaf, rules, &mut values);
+        found.vaf = Some(with_vaf(&found, &vaf, rules));
     }
+    let mut results = PartResults::undefined("");
+    results.over.again = by_condition(&shares(&chosen, &groups(rows)));
+    results.pairs = Some(found);
     Found {
         task: "pairs",
         trials: chosen.len(),
-        values,
+        results,
         warnings: Vec::new(),
-        names: names.into_iter().cloned().collect(),
+        names: Vec::new(),
         data: PartData {
             vaf,
             ..PartData::default()
@@ -291,8 +277,8 @@ fn shares(chosen: &[Preference], groups: &BTreeMap<String, String>) -> Vec<Measu
 }
 
 /// The correlation of abilities with VAF over realizations, as that of mean ratings.
-fn with_vaf(vaf: &BTreeMap<String, f64>, rules: &Rules, values: &mut Values) {
-    let ability = |name: &str| values.number(&group_id("pairs/ability", &[name]));
+fn with_vaf(found: &Preferences, vaf: &BTreeMap<String, f64>, rules: &Rules) -> Correlation {
+    let ability = |name: &str| found.items.0.get(name)?.ability.number();
     let known = vaf
         .iter()
         .filter_map(|(name, vaf)| Some((name.as_str(), *vaf, ability(name)?)));
@@ -306,7 +292,7 @@ fn with_vaf(vaf: &BTreeMap<String, f64>, rules: &Rules, values: &mut Values) {
     } else if !is_constant(&x) && is_constant(&y) {
         correlation.explain(&"all abilities are equal".into());
     }
-    correlation.put("pairs/vaf", values);
+    correlation
 }
 
 fn preference(part: &Part, row: &RatingRow, intervals: &Intervals<'_>) -> Option<Preference> {

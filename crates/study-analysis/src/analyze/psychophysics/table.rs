@@ -1,9 +1,9 @@
 //! Trials of somebody else's experiment, from a CSV.
 
 use super::preferences::{Choice, Preference, in_both_orders, preferences};
+use super::results::PartResults;
 use super::scales::{MagnitudeRow, MushraRoles, MushraRow, magnitude, mushra};
 use super::trials::{Asked, TrialCount, TrialSettings, discrimination};
-use crate::analyze::values::Values;
 use std::io::BufRead;
 use study_base::text::Untrusted;
 use study_stats::mushra::Screening;
@@ -101,22 +101,26 @@ pub fn analyze_table(
     input: impl BufRead,
     kind: TableKind,
     settings: &TrialSettings,
-) -> Result<(Values, usize), TableError> {
+) -> Result<(PartResults, usize), TableError> {
     let rows = Rows::read(name, input, kind)?;
-    let values = match kind {
-        TableKind::Trials(asked) => discrimination(asked, &rows.trials(asked)?, settings),
+    let mut results = PartResults::undefined("");
+    match kind {
+        TableKind::Trials(asked) => {
+            results = discrimination(asked, &rows.trials(asked)?, settings);
+        }
         TableKind::Pairs => {
             let pairs = rows.pairs()?;
             let ties = pairs.iter().any(|p| matches!(p.choice, Choice::Tie(_)));
-            preferences(&pairs, ties, in_both_orders(&pairs))
+            results.pairs = Some(preferences(&pairs, ties, in_both_orders(&pairs)));
         }
-        TableKind::Magnitude => magnitude(&rows.estimates()?),
+        TableKind::Magnitude => results.over.magnitude = Some(magnitude(&rows.estimates()?)),
         TableKind::Mushra => {
             let (ratings, roles) = rows.ratings()?;
-            mushra(&ratings, &roles, &Screening::default())
+            let (kept, all) = mushra(&ratings, &roles, &Screening::default());
+            (results.over.mushra, results.mushra_unscreened) = (Some(kept), all);
         }
-    };
-    Ok((values, rows.records.len()))
+    }
+    Ok((results, rows.records.len()))
 }
 
 struct Rows<'a> {

@@ -1,24 +1,82 @@
 //! Adaptive tracks: `track/…`.
 
-use crate::analyze::identifiers::group_id;
-use crate::analyze::values::Values;
+use crate::analyze::keys::{CellName, ParameterName};
+use crate::analyze::record::{List, Stat, statistics};
 use crate::analyze::warning::Warning;
+use std::collections::BTreeMap;
 use study_plan::procedure::{Rule, Scale, Staircase, Summary};
 use study_plan::protocol::{Protocol, TrackRules};
 use study_session::outcome::fold::History;
 
-/// Whose track it is.
-#[derive(Debug, Clone, Copy)]
-pub struct TrackName<'a> {
-    /// Participant. Untrusted.
-    pub participant: &'a str,
-    /// Track. Untrusted.
-    pub track: &'a str,
-}
+statistics! {
+    /// A track of a participant.
+    pub struct TrackResult {
+        /// trials that moved it
+        n_trials: Stat,
+        /// whether it came to its end
+        finished: Stat,
+        /// of a staircase
+        staircase: Option<StaircaseResult> as "",
+        /// of QUEST+
+        quest_plus: Option<QuestPlusResult> as "",
+        /// of a track with easy trials
+        easy: Option<EasyTrials> as "",
+    }
 
-impl TrackName<'_> {
-    fn prefix(&self) -> String {
-        group_id("track", &[self.participant, self.track])
+    /// A staircase.
+    pub struct StaircaseResult {
+        /// its levels as presented
+        level: List,
+        /// the trials of its reversals, from 1
+        reversal_trial: List,
+        /// the levels of its reversals
+        reversal_level: List,
+        /// number of reversals
+        n_reversals: Stat,
+        /// trials in which a limit held the level back
+        n_held: Stat,
+        /// the mean of the last reversals, a geometric mean where steps are ratios or decibels
+        estimate: Stat,
+        /// standard deviation of these reversals
+        estimate_spread: Option<Stat>,
+        /// the same of their decimal logarithms, where steps are ratios or decibels
+        estimate_spread_log10: Option<Stat>,
+        /// the share of positive answers at which the rule settles
+        target: Option<Stat>,
+    }
+
+    /// QUEST+.
+    pub struct QuestPlusResult {
+        /// what the rule proposed on a dimension, by trial
+        proposed: BTreeMap<ParameterName, List>,
+        /// the expected entropy of each proposal
+        expected_entropy: Option<List>,
+        /// the entropy at the end
+        posterior_entropy: Option<Stat>,
+        /// the posterior at the end
+        posterior: BTreeMap<ParameterName, MarginalResult>,
+    }
+
+    /// The posterior of a parameter.
+    pub struct MarginalResult {
+        /// its mean
+        mean: Stat,
+        /// its standard deviation
+        sd: Stat,
+        /// its value at the mode of the joint posterior
+        mode: Stat,
+        /// the mode of its own posterior
+        marginal_mode: Stat,
+        /// the probability of the two ends of its grid
+        at_edge: Stat,
+    }
+
+    /// Easy trials, which move no staircase.
+    pub struct EasyTrials {
+        /// number of easy trials
+        n_easy: Stat,
+        /// those with a wrong answer
+        n_easy_wrong: Stat,
     }
 }
 
@@ -57,9 +115,9 @@ pub(super) fn of_session(
     protocol: &Protocol,
     rules: &TrackRules,
     history: &History,
-    name: TrackName<'_>,
-    (values, warnings): (&mut Values, &mut Vec<Warning>),
-) -> Option<TrackData> {
+    name: &CellName,
+    warnings: &mut Vec<Warning>,
+) -> Option<(TrackResult, TrackData)> {
     let recorded = history.recorded(rules);
     let start = history.start()?;
     let mut track = protocol.of(&start.assigned).start(rules, start.seat).ok()?;
@@ -76,37 +134,31 @@ pub(super) fn of_session(
     trials.first()?;
     let summary = track.summary();
     let ruled: Vec<usize> = (0..trials.len()).filter(|&i| !trials[i].easy).collect();
-    values.extend(match &rules.rule {
+    let mut result = match &rules.rule {
         Rule::Staircase(rule) => {
             let levels: Vec<f64> = ruled.iter().map(|&i| trials[i].level).collect();
-            staircase(name, rule, &levels, &summary)
+            staircase(rule, &levels, &summary)
         }
         Rule::QuestPlus(_) => {
             let proposed = recorded.iter().filter_map(|one| one.proposed).collect();
-            quest_plus(name, &[("level", proposed)], None, &summary)
+            quest_plus(&[("level", proposed)], None, &summary)
         }
-        Rule::Constant(_) => {
-            let mut values = Values::default();
-            let mut group = values.group(name.prefix(), "");
-            group.put("n_trials", f64::from(summary.trials));
-            group.put("finished", f64::from(u8::from(summary.finished)));
-            values
-        }
-    });
+        Rule::Constant(_) => TrackResult::of(&summary),
+    };
     let easy = trials.iter().filter(|t| t.easy);
     let (easy, wrong) = (easy.clone().count(), easy.filter(|t| !t.positive).count());
     if easy > 0 {
-        let mut group = values.group(name.prefix(), "");
-        group.put("n_easy", easy as f64);
-        group.put("n_easy_wrong", wrong as f64);
+        result.easy = Some(EasyTrials {
+            n_easy: Stat::count(easy),
+            n_easy_wrong: Stat::count(wrong),
+        });
     }
+    let (participant, track) = (name.participant.as_str(), name.condition.as_str());
     if wrong as f64 > MOST_LAPSES * easy as f64 {
         warnings.push(Warning {
             code: "lapses",
             text: format!(
-                "{}, {}: {wrong} of {easy} easy trials are wrong, more than {:.0} %",
-                name.participant,
-                name.track,
+                "{participant}, {track}: {wrong} of {easy} easy trials are wrong, more than {:.0} %",
                 100.0 * MOST_LAPSES
             ),
         });
@@ -115,98 +167,95 @@ pub(super) fn of_session(
         warnings.push(Warning {
             code: "at-a-limit",
             text: format!(
-                "{}, {}: a limit held the level back in {} trials; the mean of the reversals is biased",
-                name.participant, name.track, summary.held
+                "{participant}, {track}: a limit held the level back in {} trials; the mean of the reversals is biased",
+                summary.held
             ),
         });
     }
-    Some(TrackData {
-        participant: name.participant.to_owned(),
-        track: name.track.to_owned(),
+    let data = TrackData {
+        participant: participant.to_owned(),
+        track: track.to_owned(),
         reversals: (summary.reversals.iter())
             .filter_map(|r| ruled.get((r.trial as usize).checked_sub(1)?).copied())
             .collect(),
         estimate: summary.estimate,
         trials,
-    })
+    };
+    Some((result, data))
+}
+
+impl TrackResult {
+    /// What all rules have.
+    fn of(summary: &Summary) -> Self {
+        Self {
+            n_trials: Stat::of(f64::from(summary.trials)),
+            finished: Stat::flag(summary.finished),
+            staircase: None,
+            quest_plus: None,
+            easy: None,
+        }
+    }
 }
 
 /// A staircase: its levels as presented, and what they add up to.
-pub fn staircase(
-    name: TrackName<'_>,
-    rule: &Staircase,
-    levels: &[f64],
-    summary: &Summary,
-) -> Values {
-    let mut values = Values::default();
-    let mut group = values.group(name.prefix(), "there are too few reversals");
-    group.list("level", levels.to_vec());
-    let reversals = &summary.reversals;
-    group.list(
-        "reversal_trial",
-        reversals.iter().map(|r| f64::from(r.trial)).collect(),
-    );
-    group.list(
-        "reversal_level",
-        reversals.iter().map(|r| r.level).collect(),
-    );
-    group.put("n_reversals", reversals.len() as f64);
-    group.put("n_trials", f64::from(summary.trials));
-    group.put("n_held", f64::from(summary.held));
-    group.put("finished", f64::from(u8::from(summary.finished)));
-    group.maybe("estimate", summary.estimate);
-    let spread = match rule.scale {
-        Scale::Lin => "estimate_spread",
-        Scale::Log | Scale::Db => "estimate_spread_log10",
+pub fn staircase(rule: &Staircase, levels: &[f64], summary: &Summary) -> TrackResult {
+    let few = "there are too few reversals";
+    let reversals = summary.reversals.iter();
+    let spread = || Some(Stat::or(summary.spread, few));
+    let (estimate_spread, estimate_spread_log10) = match rule.scale {
+        Scale::Lin => (spread(), None),
+        Scale::Log | Scale::Db => (None, spread()),
     };
-    group.maybe(spread, summary.spread);
-    if let Some(target) = rule.target() {
-        group.put("target", target);
+    let staircase = StaircaseResult {
+        level: List::of(levels.to_vec()),
+        reversal_trial: List::of(reversals.clone().map(|r| f64::from(r.trial)).collect()),
+        reversal_level: List::of(reversals.clone().map(|r| r.level).collect()),
+        n_reversals: Stat::count(reversals.len()),
+        n_held: Stat::of(f64::from(summary.held)),
+        estimate: Stat::or(summary.estimate, few),
+        estimate_spread,
+        estimate_spread_log10,
+        target: rule.target().map(Stat::of),
+    };
+    TrackResult {
+        staircase: Some(staircase),
+        ..TrackResult::of(summary)
     }
-    values
 }
 
 /// A QUEST+ track: what was proposed on each dimension, with its expected entropy and the
 /// entropy at the end, where they are known, and the posterior at the end.
 pub fn quest_plus(
-    name: TrackName<'_>,
     proposed: &[(&str, Vec<f64>)],
     entropies: Option<(&[f64], f64)>,
     summary: &Summary,
-) -> Values {
-    let mut values = Values::default();
-    let mut group = values.group(name.prefix(), "");
-    for (dimension, levels) in proposed {
-        group.list(&group_id("proposed", &[dimension]), levels.clone());
+) -> TrackResult {
+    let proposed = proposed.iter();
+    let quest_plus = QuestPlusResult {
+        proposed: (proposed.map(|(name, levels)| ((*name).into(), List::of(levels.clone()))))
+            .collect(),
+        expected_entropy: entropies.map(|(expected, _)| List::of(expected.to_vec())),
+        posterior_entropy: entropies.map(|(_, posterior)| Stat::of(posterior)),
+        posterior: (summary.posterior.iter())
+            .map(|of| {
+                let marginal = MarginalResult {
+                    mean: Stat::of(of.mean),
+                    sd: Stat::of(of.sd),
+                    mode: Stat::of(of.mode),
+                    marginal_mode: Stat::of(of.marginal_mode),
+                    at_edge: Stat::of(of.at_edge),
+                };
+                (of.name.as_str().into(), marginal)
+            })
+            .collect(),
+    };
+    TrackResult {
+        quest_plus: Some(quest_plus),
+        ..TrackResult::of(summary)
     }
-    if let Some((expected, posterior)) = entropies {
-        group.list("expected_entropy", expected.to_vec());
-        group.put("posterior_entropy", posterior);
-    }
-    group.put("n_trials", f64::from(summary.trials));
-    group.put("finished", f64::from(u8::from(summary.finished)));
-    for marginal in &summary.posterior {
-        let prefix = format!(
-            "{}/{}",
-            name.prefix(),
-            group_id("posterior", &[&marginal.name])
-        );
-        let mut group = values.group(prefix, "");
-        group.put("mean", marginal.mean);
-        group.put("sd", marginal.sd);
-        group.put("mode", marginal.mode);
-        group.put("marginal_mode", marginal.marginal_mode);
-        group.put("at_edge", marginal.at_edge);
-    }
-    values
 }
 
 /// The track of each trial of interleaved tracks, from 1.
-pub fn track_order(participant: &str, order: &[usize]) -> Values {
-    let mut values = Values::default();
-    let order = order.iter().map(|t| (t + 1) as f64).collect();
-    values
-        .group(group_id("track", &[participant]), "")
-        .list("order", order);
-    values
+pub fn track_order(order: &[usize]) -> List {
+    List::of(order.iter().map(|t| (t + 1) as f64).collect())
 }

@@ -3,7 +3,7 @@
 
 use super::detection::{Detection, Task, detection};
 use super::fits::{FitCell, FitSettings, psychometric};
-use crate::analyze::values::Values;
+use super::results::PartResults;
 use std::collections::BTreeMap;
 use study_stats::detection::Answers;
 use study_stats::psychometric::{Core, Experiment, Level, Spacing, Support};
@@ -120,8 +120,12 @@ type Cells<'a> = BTreeMap<(&'a str, &'a str), Vec<&'a TrialCount>>;
 
 /// Psychometric functions of trials with levels, and sensitivities of conditions with one
 /// level at most.
-pub fn discrimination(asked: Asked, trials: &[TrialCount], settings: &TrialSettings) -> Values {
-    let mut values = Values::default();
+pub fn discrimination(
+    asked: Asked,
+    trials: &[TrialCount],
+    settings: &TrialSettings,
+) -> PartResults {
+    let mut results = PartResults::undefined("");
     let mut cells = Cells::new();
     for trial in trials {
         let key = (trial.participant.as_str(), trial.condition.as_str());
@@ -136,21 +140,21 @@ pub fn discrimination(asked: Asked, trials: &[TrialCount], settings: &TrialSetti
             })
             .filter(|cell| !cell.levels.is_empty())
             .collect();
-        values.extend(psychometric(
-            &fits,
-            &FitSettings {
-                core: settings.core,
-                spacing: settings.spacing,
-                experiment,
-                gamma,
-                lambda: settings.lambda,
-                lapse_most: Some(MOST_LAPSES),
-                standard: settings.standard.filter(|_| asked == Asked::Comparison),
-                support: settings.support,
-                repeats: settings.repeats,
-                seed: settings.seed,
-            },
-        ));
+        let settings = FitSettings {
+            core: settings.core,
+            spacing: settings.spacing,
+            experiment,
+            gamma,
+            lambda: settings.lambda,
+            lapse_most: Some(MOST_LAPSES),
+            standard: settings.standard.filter(|_| asked == Asked::Comparison),
+            support: settings.support,
+            repeats: settings.repeats,
+            seed: settings.seed,
+        };
+        let functions = psychometric(&fits, &settings);
+        (results.psy, results.pooled) = (functions.psy, functions.pooled);
+        results.over.psy_group = functions.psy_group;
     }
     if let Some(task) = asked.task() {
         let found: Vec<Detection> = (cells.iter())
@@ -164,9 +168,9 @@ pub fn discrimination(asked: Asked, trials: &[TrialCount], settings: &TrialSetti
                 })
             })
             .collect();
-        values.extend(detection(task, &found));
+        results.sdt = detection(task, &found);
     }
-    values
+    results
 }
 
 /// What counts for the function: catch trials do not.

@@ -1,10 +1,13 @@
 //! The numbers that R has to come to: identifier, value, tolerance.
 
 use crate::analyze::psychophysics::PartAnalysis;
+use crate::analyze::psychophysics::results::Preferences;
+use crate::analyze::results::{Correlation, Field, Key, Number as _};
 use crate::analyze::{Analysis, group_id};
+use std::collections::BTreeMap;
 
 /// Most realizations with a VAF of which R goes through every permutation.
-const MAX_PERMUTED: f64 = 8.0;
+const MAX_PERMUTED: usize = 8;
 
 /// An identifier, its value if it has one, and the tolerance.
 type Number = (String, Option<f64>, &'static str);
@@ -25,8 +28,8 @@ pub(super) fn of_ratings(analysis: &Analysis) -> Vec<Number> {
         ids.extend(["n", "mean", "sd"].map(|what| (format!("{group}/{what}"), CLOSED)));
     }
     ids.extend(["n_models", "pearson/r", "pearson/p_t"].map(|w| (format!("corr/{w}"), CLOSED)));
-    let models = analysis.values.number("corr/n_models");
-    if models.is_some_and(|n| n <= MAX_PERMUTED) {
+    let models = analysis.results.evidence.corr.n_models.number();
+    if models.is_some_and(|n| n <= MAX_PERMUTED as f64) {
         ids.push(("corr/pearson/p_exact_two_sided".to_owned(), CLOSED));
     }
     let linear = [
@@ -57,56 +60,105 @@ pub(super) fn of_ratings(analysis: &Analysis) -> Vec<Number> {
 
 /// Of a part, with the part's id before each identifier.
 pub(super) fn of_part(part: &PartAnalysis) -> Vec<Number> {
-    let permuted = |group: &str| {
-        let n = part.values.number(&format!("{group}/n_models"));
-        n.is_some_and(|n| n <= MAX_PERMUTED)
-    };
-    let one = |id: &str| {
-        let (group, what) = id.rsplit_once('/')?;
-        let of_vaf = group
-            .strip_suffix("/pearson")
-            .filter(|_| what == "p_exact_two_sided");
-        let tolerance = tolerance(part.task, group, what)?;
-        of_vaf.is_none_or(permuted).then_some(tolerance)
-    };
-    (part.values.iter())
-        .filter_map(|(id, _)| Some((id, one(id)?)))
-        .map(|(id, tolerance)| {
-            let value = part.values.number(id);
-            (format!("{}:{id}", part.part), value, tolerance)
-        })
-        .collect()
+    let (results, over) = (&part.results, &part.results.over);
+    let mut numbers = Numbers(Vec::new());
+    if let Some(pairs) = &results.pairs {
+        numbers.of_preferences(pairs);
+    }
+    if let Some(magnitude) = &over.magnitude {
+        let law = ["exponent", "log10_coefficient"];
+        numbers.add("magnitude", &magnitude.law, &law, CLOSED);
+        let means = &magnitude.realizations;
+        numbers.each("magnitude/realization", means, &["geometric_mean"], CLOSED);
+        numbers.of_vaf("magnitude/vaf", magnitude.vaf.as_ref(), CLOSED);
+    }
+    for (group, model) in [
+        ("magnitude_mixed", &results.magnitude_mixed),
+        ("psy_mixed", &over.psy_mixed),
+        ("sessions", &over.again.sessions),
+    ] {
+        numbers.add(
+            group,
+            &model.as_ref().map(|m| m.test.clone()),
+            &TEST,
+            LINEAR,
+        );
+    }
+    if let Some(mushra) = &over.mushra {
+        numbers.each("mushra", &mushra.conditions, &["median", "mean"], CLOSED);
+    }
+    for (name, group) in &over.sdt_group {
+        let id = format!("sdt_group/{}/above_chance", name.part());
+        numbers.add(&id, &group.above_chance, &["t", "p"], CLOSED);
+    }
+    if let Some(own) = &over.again.groups {
+        numbers.add("groups", &own.test, &TEST, CLOSED);
+        let center = ["mean", "sd", "geometric_mean", "geometric_sd"];
+        numbers.each("groups", &own.groups, &center, CLOSED);
+        let contrast = ["difference", "ratio", "t", "df", "p"];
+        numbers.each("groups", &own.pairs, &contrast, CLOSED);
+    }
+    let interaction = ["F", "df1", "df2", "p", "eps_gg", "p_gg"];
+    let profiles = &over.again.groups_conditions;
+    numbers.add("groups_conditions", profiles, &interaction, CLOSED);
+    let retest = ["icc_agreement", "icc_consistency", "sem"];
+    numbers.add("retest", &over.again.retest, &retest, CLOSED);
+    let mut all = numbers.0;
+    all.sort_by(|a, b| a.0.cmp(&b.0));
+    let named = |(id, value, tolerance)| (format!("{}:{id}", part.part), value, tolerance);
+    all.into_iter().map(named).collect()
 }
 
-/// The tolerance of a statistic of a part; `None` of one that R does not compute.
-fn tolerance(task: &str, group: &str, what: &str) -> Option<&'static str> {
-    const TEST: [&str; 4] = ["F", "df1", "df2", "p"];
-    let of = |names: &[&str]| names.contains(&what);
-    // Names of the data have no separators in identifiers.
-    let (first, name) = group.split_once('/').unwrap_or((group, ""));
-    let pair = name.contains('|');
-    match (first, name) {
-        ("pairs", "") => {
-            of(&["order", "order_se", "tie_log_nu", "tie_log_nu_se"]).then_some(FITTED)
+const TEST: [&str; 4] = ["F", "df1", "df2", "p"];
+
+struct Numbers(Vec<Number>);
+
+impl Numbers {
+    /// Adds those of a record's own fields that R computes.
+    fn add(&mut self, id: &str, record: &impl Field, fields: &[&str], tolerance: &'static str) {
+        let values = record.values();
+        let own = fields.iter().filter(|field| values.get(field).is_some());
+        let number = |field: &&str| (format!("{id}/{field}"), values.number(field), tolerance);
+        self.0.extend(own.map(number));
+    }
+
+    /// The same of every record of a map.
+    fn each<K: Key, R: Field>(
+        &mut self,
+        id: &str,
+        records: &BTreeMap<K, R>,
+        fields: &[&str],
+        tolerance: &'static str,
+    ) {
+        for (name, record) in records {
+            self.add(&format!("{id}/{}", name.part()), record, fields, tolerance);
         }
-        ("pairs", "ability" | "ability_se") => Some(FITTED),
-        ("pairs", "vaf/pearson") => of(&["r", "p_exact_two_sided"]).then_some(FITTED),
-        ("pairs", _) if pair => of(&["difference", "se"]).then_some(FITTED),
-        ("magnitude", "vaf/pearson") => of(&["r", "p_exact_two_sided"]).then_some(CLOSED),
-        ("magnitude", "") => of(&["exponent", "log10_coefficient"]).then_some(CLOSED),
-        ("magnitude", name) if name.starts_with("realization/") => {
-            of(&["geometric_mean"]).then_some(CLOSED)
+    }
+
+    fn of_vaf(&mut self, id: &str, vaf: Option<&Correlation>, tolerance: &'static str) {
+        let Some(vaf) = vaf else {
+            return;
+        };
+        let all = ["r", "p_exact_two_sided"];
+        let fields = if vaf.n() <= MAX_PERMUTED {
+            &all[..]
+        } else {
+            &all[..1]
+        };
+        self.add(&format!("{id}/pearson"), &vaf.pearson, fields, tolerance);
+    }
+
+    fn of_preferences(&mut self, pairs: &Preferences) {
+        self.add("pairs", &pairs.order, &["order", "order_se"], FITTED);
+        let ties = ["tie_log_nu", "tie_log_nu_se"];
+        self.add("pairs", &pairs.ties, &ties, FITTED);
+        for (name, item) in &pairs.items.0 {
+            for (what, of) in [("ability", &item.ability), ("ability_se", &item.ability_se)] {
+                let id = format!("pairs/{what}/{}", name.part());
+                self.0.push((id, of.number(), FITTED));
+            }
         }
-        ("magnitude_mixed" | "psy_mixed" | "sessions", "") => of(&TEST).then_some(LINEAR),
-        ("mushra", name) if task == "mushra" && !name.is_empty() => {
-            of(&["median", "mean"]).then_some(CLOSED)
-        }
-        ("sdt_group", name) if name.ends_with("/above_chance") => of(&["t", "p"]).then_some(CLOSED),
-        ("groups", "") => of(&TEST).then_some(CLOSED),
-        ("groups", _) if pair => of(&["difference", "ratio", "t", "df", "p"]).then_some(CLOSED),
-        ("groups", _) => of(&["mean", "sd", "geometric_mean", "geometric_sd"]).then_some(CLOSED),
-        ("groups_conditions", "") => (of(&TEST) || of(&["eps_gg", "p_gg"])).then_some(CLOSED),
-        ("retest", "") => of(&["icc_agreement", "icc_consistency", "sem"]).then_some(CLOSED),
-        _ => None,
+        self.each("pairs", &pairs.pairs, &["difference", "se"], FITTED);
+        self.of_vaf("pairs/vaf", pairs.vaf.as_ref(), FITTED);
     }
 }

@@ -1,5 +1,7 @@
 use super::super::{Assumptions, Scale, Vaf, merge, run_chunk};
 use super::*;
+use crate::analyze::psychophysics::results::CellName;
+use crate::analyze::results::Number as _;
 use study_base::text::{ModelId, PartId};
 use study_plan::procedure::{Constant, Rule};
 use study_plan::protocol::parts::{Compared, FitRules};
@@ -243,11 +245,9 @@ fn thresholds_are_those_of_the_analysis() {
             trials: 1.0,
         })
         .collect();
-    let values = crate::analyze::psychophysics::discrimination(asked, &counts, &track.settings);
-    assert_eq!(
-        values.number("psy/P/c/posterior/threshold/mean"),
-        Some(found)
-    );
+    let results = crate::analyze::psychophysics::discrimination(asked, &counts, &track.settings);
+    let function = &results.psy[&CellName::of("P", "c")];
+    assert_eq!(function.posterior.threshold.mean.number(), Some(found));
     // A participant differs by a factor, or by a number of levels.
     assert_eq!(of_participant(typical, 0.1, false).threshold, 0.6);
     let doubled = of_participant(typical, libm::log(2.0), true);

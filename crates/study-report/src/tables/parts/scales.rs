@@ -1,26 +1,21 @@
 //! The tables of estimated magnitudes, of ratings beside a reference and of questionnaires.
 
-use super::{names, spelled};
-use crate::apa::{interval_or_dash, plain, two};
-use crate::table::{Builder, Cell, Table, page};
-use study_analysis::analyze::{Values, unescaped};
+use super::column;
+use crate::apa::{interval_or_dash, name, plain, two};
+use crate::table::{Builder, Cell, Table};
+use study_analysis::analyze::psychophysics::results::{ConditionName, PartResults, Rated};
+use study_analysis::analyze::results::Number as _;
 use study_base::text::counted;
 
 /// Estimates of levels or of realizations.
-pub(super) fn magnitudes(values: &Values) -> Table {
-    let get = |(kind, name): (&str, &str), what: &str| {
-        values.number(&format!("magnitude/{kind}/{name}/{what}"))
-    };
-    let all = |kind: &'static str| {
-        let names = names(values, &format!("magnitude/{kind}"));
-        names.into_iter().map(move |name| (kind, name))
-    };
-    let number = |text: &str| text.parse().unwrap_or(f64::MAX);
-    let mut levels: Vec<(&str, &str)> = all("level").collect();
-    levels.sort_by(|a, b| number(a.1).total_cmp(&number(b.1)));
-    let exponent = values.number("magnitude/exponent").map(|exponent| {
-        let interval = values.interval("magnitude/exponent_over_participants/ci95");
-        let left_out = values.number("magnitude/n_left_out").unwrap_or_default();
+pub(super) fn magnitudes(results: &PartResults) -> Table {
+    let found = results.over.magnitude.as_ref();
+    let law = found.and_then(|m| m.law.as_ref());
+    let exponent = law.and_then(|law| law.exponent.number()).map(|exponent| {
+        let interval = law.and_then(|law| law.exponent_over_participants.ci95.ends());
+        let left_out = found
+            .and_then(|m| m.n_left_out.number())
+            .unwrap_or_default();
         format!(
             "Exponent {} {}, over participants. {} left out, because not above 0.",
             two(exponent),
@@ -28,37 +23,35 @@ pub(super) fn magnitudes(values: &Values) -> Table {
             counted(left_out as usize, "estimate", "estimates"),
         )
     });
-    let rows = levels.into_iter().chain(all("realization"));
-    let mean = page("geometric mean").file("geometric_mean");
-    Builder::new("Estimated magnitudes", rows, &get)
-        .column(page("").file("level"), &|(kind, name)| match name.parse() {
-            Ok(level) if kind == "level" => Cell::Number(Some(level), plain),
-            _ => Cell::Name(unescaped(name)),
+    let levels = found.into_iter().flat_map(|m| &m.levels);
+    let levels = levels.map(|(level, mean)| (Ok(level.0), mean));
+    let realizations = found.into_iter().flat_map(|m| &m.realizations);
+    let realizations = realizations.map(|(name, mean)| (Err(name.as_str()), mean));
+    Builder::new("Estimated magnitudes", levels.chain(realizations))
+        .column(column("", "level"), &|(of, _)| match of {
+            Ok(level) => Cell::Number(Some(level), plain),
+            Err(name) => Cell::Name(name.to_owned()),
         })
-        .stat_as(mean, "geometric_mean", plain)
-        .interval(page("95 %").file("geometric_mean_ci95"), "ci95", plain)
+        .field(column("geometric mean", "geometric_mean"), plain, |r| {
+            &r.1.geometric_mean
+        })
+        .ends(column("95 %", "geometric_mean_ci95"), plain, &|r| {
+            r.1.ci95.ends()
+        })
         .notes(exponent)
 }
 
 /// Ratings beside a reference.
-pub(super) fn ratings(values: &Values) -> Table {
-    let get = |name: &str, what: &str| values.number(&format!("mushra/{name}/{what}"));
-    let of = |what: &str| -> Vec<&str> {
-        let suffix = format!("/{what}");
-        (values.iter())
-            .filter_map(|(id, _)| id.strip_prefix("mushra/")?.strip_suffix(&suffix))
-            .collect()
+pub(super) fn ratings(results: &PartResults) -> Table {
+    let found = results.over.mushra.as_ref();
+    let unscreened = |(condition, kept): (&ConditionName, &Rated)| {
+        let all = results.mushra_unscreened.get(condition);
+        all.unwrap_or(kept).mean.number()
     };
-    let unscreened = |condition: &str| {
-        let id = format!("mushra_unscreened/{condition}/mean");
-        match values.get(&id) {
-            Some(_) => values.number(&id),
-            None => get(condition, "mean"),
-        }
-    };
-    let screened: Vec<String> = (of("screened").into_iter())
-        .filter(|p| get(p, "screened") == Some(1.0))
-        .map(spelled)
+    let participants = found.into_iter().flat_map(|m| &m.participants);
+    let screened: Vec<String> = participants
+        .filter(|(_, found)| found.screened.is_set())
+        .map(|(who, _)| name(who.as_str()))
         .collect();
     let screened = (!screened.is_empty()).then(|| {
         format!(
@@ -66,49 +59,54 @@ pub(super) fn ratings(values: &Values) -> Table {
             screened.join(", ")
         )
     });
-    let half = page("95 %").file("mean_ci95_half");
-    let all = page("with screened").file("mean_unscreened");
-    Builder::new("Ratings from 0 to 100", of("median"), &get)
-        .name("", "condition", &unescaped)
-        .stat("median", "median", plain)
-        .ends(page("quartiles").file("quartile"), plain, &|c| {
-            get(c, "q1").zip(get(c, "q3"))
+    let conditions = found.into_iter().flat_map(|m| &m.conditions);
+    Builder::new("Ratings from 0 to 100", conditions)
+        .name("", "condition", &|c| c.0.as_str().to_owned())
+        .field(column("median", "median"), plain, |c| &c.1.median)
+        .ends(column("quartiles", "quartile"), plain, &|c| {
+            c.1.q1.number().zip(c.1.q3.number())
         })
-        .stat("mean", "mean", plain)
-        .stat_as(half, "ci95_half", |h| format!("± {}", plain(h)))
-        .number(all, plain, &unscreened)
+        .field(column("mean", "mean"), plain, |c| &c.1.mean)
+        .field(
+            column("95 %", "mean_ci95_half"),
+            |h| format!("± {}", plain(h)),
+            |c| &c.1.ci95_half,
+        )
+        .number(
+            column("with screened", "mean_unscreened"),
+            plain,
+            &unscreened,
+        )
         .notes(screened)
 }
 
 /// The score of each participant in a questionnaire.
-pub(super) fn scores(values: &Values) -> Table {
-    let get = |name: &str, what: &str| values.number(&format!("questionnaire/{what}/{name}"));
-    let participants =
-        (values.iter()).filter_map(|(id, _)| id.strip_prefix("questionnaire/score/"));
-    let number = |what: &str| values.number(&format!("questionnaire/{what}"));
-    let mean = number("mean").zip(number("n")).map(|(mean, n)| {
-        format!(
+pub(super) fn scores(results: &PartResults) -> Table {
+    let found = results.questionnaire.as_ref();
+    let mean = found.and_then(|q| {
+        Some(format!(
             "Score: mean {} {} of {}.",
-            plain(mean),
-            interval_or_dash(values.interval("questionnaire/ci95"), plain),
-            counted(n as usize, "participant", "participants"),
-        )
+            plain(q.mean.number()?),
+            interval_or_dash(q.ci95.ends(), plain),
+            counted(q.n.number()? as usize, "participant", "participants"),
+        ))
     });
-    Builder::new("Scores", participants, &get)
-        .name("", "participant", &unescaped)
-        .stat("score", "score", plain)
+    let scores = found.into_iter().flat_map(|q| &q.score);
+    Builder::new("Scores", scores)
+        .name("", "participant", &|s| s.0.as_str().to_owned())
+        .field(column("score", "score"), plain, |s| s.1)
         .notes(mean)
 }
 
 /// The answers to the items of a questionnaire, as they were given.
-pub(super) fn items(values: &Values) -> Table {
-    let get = |item: &str, what: &str| values.number(&format!("questionnaire/item/{item}/{what}"));
-    let mut items: Vec<&str> = names(values, "questionnaire/item").into_iter().collect();
+pub(super) fn items(results: &PartResults) -> Table {
+    let items = results.questionnaire.iter().flat_map(|q| &q.item);
+    let mut items: Vec<_> = items.collect();
     // 2 before 10; names as they are.
-    items.sort_by_key(|item| item.parse::<u32>().unwrap_or(0));
-    Builder::new("Items, as answered", items, &get)
-        .name("item", "item", &unescaped)
-        .stat("mean", "mean", two)
-        .stat("SD", "sd", two)
+    items.sort_by_key(|item| item.0.as_str().parse::<u32>().unwrap_or(0));
+    Builder::new("Items, as answered", items)
+        .name("item", "item", &|i| i.0.as_str().to_owned())
+        .field(column("mean", "mean"), two, |i| &i.1.mean)
+        .field(column("SD", "sd"), two, |i| &i.1.sd)
         .done()
 }

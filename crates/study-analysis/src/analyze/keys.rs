@@ -1,0 +1,183 @@
+//! Names of the data by which statistics are kept.
+
+use super::identifiers::escaped;
+use std::borrow::{Borrow, Cow};
+use std::cmp::Ordering;
+
+/// A name of the data by which records are kept.
+pub trait Key: Ord {
+    /// What stands for it in a reference.
+    const PLACEHOLDER: &'static str;
+    /// Its part of an identifier.
+    fn part(&self) -> Cow<'_, str>;
+}
+
+/// Names of one kind, as keys.
+macro_rules! names {
+    ($($(#[doc = $doc:literal])+ $name:ident = $placeholder:literal,)*) => {$(
+        $(#[doc = $doc])+
+        #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+        pub struct $name(String);
+
+        impl $name {
+            /// The name as the data have it. Untrusted.
+            pub fn as_str(&self) -> &str {
+                &self.0
+            }
+        }
+
+        impl From<&str> for $name {
+            fn from(name: &str) -> Self {
+                Self(name.to_owned())
+            }
+        }
+
+        impl Borrow<str> for $name {
+            fn borrow(&self) -> &str {
+                &self.0
+            }
+        }
+
+        impl Key for $name {
+            const PLACEHOLDER: &'static str = $placeholder;
+
+            fn part(&self) -> Cow<'_, str> {
+                escaped(&self.0)
+            }
+        }
+    )*};
+}
+
+names! {
+    /// The name of a realization.
+    RealizationName = "M",
+    /// The name of a reference, anchor or physical sample.
+    ReferenceName = "R",
+    /// The name of a hidden duplicate.
+    DuplicateName = "D",
+    /// The name of a participant.
+    ParticipantName = "S",
+    /// The name of a covariate of realizations.
+    CovariateName = "NAME",
+    /// The name of a site.
+    SiteName = "SITE",
+    /// The name of a condition: a track or a session.
+    ConditionName = "CONDITION",
+    /// The name of a group of participants.
+    GroupName = "GROUP",
+    /// The name of a dimension or a parameter of a QUEST+ track.
+    ParameterName = "PARAMETER",
+    /// The name of an item of a questionnaire.
+    ItemName = "NAME",
+}
+
+/// Two realizations. The one whose name sorts first comes first.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct PairName {
+    first: String,
+    second: String,
+}
+
+impl PairName {
+    /// The pair of two names, in either order.
+    pub fn of(a: &str, b: &str) -> Self {
+        Self {
+            first: a.min(b).to_owned(),
+            second: a.max(b).to_owned(),
+        }
+    }
+
+    /// Both names, sorted.
+    pub fn names(&self) -> [&str; 2] {
+        [&self.first, &self.second]
+    }
+}
+
+impl Key for PairName {
+    const PLACEHOLDER: &'static str = "a|b";
+
+    fn part(&self) -> Cow<'_, str> {
+        format!("{}|{}", escaped(&self.first), escaped(&self.second)).into()
+    }
+}
+
+/// The number of a repetition.
+impl Key for u32 {
+    const PLACEHOLDER: &'static str = "R";
+
+    fn part(&self) -> Cow<'_, str> {
+        self.to_string().into()
+    }
+}
+
+/// A participant in a condition.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct CellName {
+    /// The participant.
+    pub participant: ParticipantName,
+    /// The condition.
+    pub condition: ConditionName,
+}
+
+impl CellName {
+    /// The cell of these names.
+    pub fn of(participant: &str, condition: &str) -> Self {
+        Self {
+            participant: participant.into(),
+            condition: condition.into(),
+        }
+    }
+}
+
+impl Key for CellName {
+    const PLACEHOLDER: &'static str = "PARTICIPANT/CONDITION";
+
+    fn part(&self) -> Cow<'_, str> {
+        format!("{}/{}", self.participant.part(), self.condition.part()).into()
+    }
+}
+
+/// A level, or a share of answers. In identifiers a level always has a decimal point: 1.0.
+#[derive(Debug, Clone, Copy)]
+pub struct At(pub f64);
+
+impl PartialEq for At {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for At {}
+
+impl PartialOrd for At {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for At {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.0.total_cmp(&other.0)
+    }
+}
+
+impl Key for At {
+    const PLACEHOLDER: &'static str = "X";
+
+    fn part(&self) -> Cow<'_, str> {
+        format!("{:?}", self.0).into()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn levels_sort_by_size_and_have_a_decimal_point() {
+        let mut levels = [10.0, 9.0, 0.5].map(At);
+        levels.sort();
+        let ids = levels.map(|at| at.part().into_owned());
+        assert_eq!(ids, ["0.5", "9.0", "10.0"]);
+    }
+}
