@@ -9,7 +9,8 @@ use std::fmt::Write as _;
 use std::fs::{self, File};
 use std::io::BufReader;
 use std::path::Path;
-use study_analysis::analyze::results::{Declared, Results};
+use study_analysis::analyze::psychophysics::results::PartResults;
+use study_analysis::analyze::results::{Declared, Field as _, Results};
 use study_analysis::analyze::{Rules, analyze};
 use study_session::outcome::ratings::Ratings;
 
@@ -17,7 +18,7 @@ const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 const START: &str = "<!-- The statistics: written by a test from their declarations. -->\n";
 const END: &str = "<!-- End of the statistics. -->\n";
 
-/// The document that defines the statistics of a group.
+/// The document that defines the statistics of a group of ratings.
 fn document(id: &str) -> &'static str {
     match id {
         _ if id.starts_with("lmm_") || id == "slope_variance" => "statistics-mixed",
@@ -26,8 +27,20 @@ fn document(id: &str) -> &'static str {
     }
 }
 
+/// The name of the group of an identifier.
+fn first(id: &str) -> &str {
+    id.split('/').next().unwrap_or_default()
+}
+
+fn of_parts() -> Vec<Declared> {
+    let mut all = Vec::new();
+    PartResults::declare("", "", &mut all);
+    all
+}
+
 /// A table of the statistics whose identifiers begin alike, and where each record is.
 struct Section {
+    document: &'static str,
     id: String,
     about: Vec<String>,
     rows: Vec<(String, String)>,
@@ -37,6 +50,8 @@ struct Section {
 #[derive(Default)]
 struct Sections {
     all: Vec<Section>,
+    /// Whether the statistics are those of parts that are no ratings.
+    of_parts: bool,
     /// Where each record is in full.
     written: BTreeMap<&'static str, String>,
 }
@@ -44,10 +59,15 @@ struct Sections {
 impl Sections {
     /// The section of an identifier.
     fn section(&mut self, id: &str) -> &mut Section {
-        let first = |id: &str| id.split('/').next().unwrap().to_owned();
-        let at = self.all.iter().position(|s| first(&s.id) == first(id));
-        let at = at.unwrap_or_else(|| {
+        let group = first(id);
+        let document = match self.of_parts {
+            true => "statistics-psychophysics",
+            false => document(group),
+        };
+        let is_it = |s: &Section| first(&s.id) == group && s.document == document;
+        let at = self.all.iter().position(is_it).unwrap_or_else(|| {
             self.all.push(Section {
+                document,
                 id: id.to_owned(),
                 about: Vec::new(),
                 rows: Vec::new(),
@@ -141,13 +161,14 @@ fn line(doc: &str) -> String {
 fn page(name: &str) -> String {
     let mut sections = Sections::default();
     sections.add("", &Results::declared());
+    sections.of_parts = true;
+    sections.add("", &of_parts());
     let mut out = String::new();
     for section in &sections.all {
-        let group = section.id.split('/').next().unwrap();
-        if document(group) != name {
+        if section.document != name {
             continue;
         }
-        let _ = writeln!(out, "\n### `{group}`\n");
+        let _ = writeln!(out, "\n### `{}`\n", first(&section.id));
         for about in &section.about {
             let _ = writeln!(out, "{}.\n", capital(about));
         }
@@ -170,8 +191,8 @@ fn capital(text: &str) -> String {
     first.unwrap_or_default() + letters.as_str()
 }
 
-fn statistics() -> Vec<(String, &'static str, bool)> {
-    let all = Results::declared().into_iter();
+fn statistics(all: Vec<Declared>) -> Vec<(String, &'static str, bool)> {
+    let all = all.into_iter();
     all.filter_map(|declared| match declared {
         Declared::Statistic { id, doc, list } => Some((id, doc, list)),
         Declared::Group { .. } => None,
@@ -179,11 +200,28 @@ fn statistics() -> Vec<(String, &'static str, bool)> {
     .collect()
 }
 
+/// What stands for names of the data.
+const NAMES: [&str; 13] = [
+    "M",
+    "R",
+    "D",
+    "S",
+    "NAME",
+    "SITE",
+    "PARTICIPANT",
+    "CONDITION",
+    "GROUP",
+    "PARAMETER",
+    "ITEM",
+    "X",
+    "P",
+];
+
 /// Regular expressions of the identifiers of a statistic.
 fn patterns(id: &str) -> Vec<String> {
     let part = |part: &str| match part {
-        "M" | "R" | "D" | "S" | "NAME" | "SITE" => "[^/]+".to_owned(),
-        "a|b" | "j|k" => r"[^/|]+\|[^/|]+".to_owned(),
+        "a|b" | "A|B" | "j|k" => r"[^/|]+\|[^/|]+".to_owned(),
+        name if NAMES.contains(&name) => "[^/]+".to_owned(),
         word => word.to_owned(),
     };
     let parts: Vec<String> = id.split('/').map(part).collect();
@@ -196,18 +234,21 @@ fn patterns(id: &str) -> Vec<String> {
     }
 }
 
-fn all_patterns() -> Vec<String> {
-    statistics().iter().flat_map(|s| patterns(&s.0)).collect()
+fn all_patterns(all: Vec<Declared>) -> Vec<String> {
+    let all = statistics(all);
+    all.iter().flat_map(|s| patterns(&s.0)).collect()
 }
 
 /// The part of the schema that describes the statistics.
 fn described() -> Value {
-    let schemas = statistics().into_iter().flat_map(|(id, doc, list)| {
-        let of = if list { "list" } else { "statistic" };
-        let schema = json!({ "$ref": format!("#/$defs/{of}"), "description": line(doc) });
-        let of = move |pattern| (pattern, schema.clone());
-        patterns(&id).into_iter().map(of)
-    });
+    let schemas = statistics(Results::declared())
+        .into_iter()
+        .flat_map(|(id, doc, list)| {
+            let of = if list { "list" } else { "statistic" };
+            let schema = json!({ "$ref": format!("#/$defs/{of}"), "description": line(doc) });
+            let of = move |pattern| (pattern, schema.clone());
+            patterns(&id).into_iter().map(of)
+        });
     json!({
         "type": "object",
         "description": "statistics by identifier; null if undefined",
@@ -257,7 +298,12 @@ fn compare(path: &Path, wanted: &str) {
 
 #[test]
 fn the_documents_have_the_declared_statistics() {
-    for name in ["statistics", "statistics-mixed", "statistics-ordinal"] {
+    for name in [
+        "statistics",
+        "statistics-mixed",
+        "statistics-ordinal",
+        "statistics-psychophysics",
+    ] {
         let path = Path::new(ROOT).join(format!("docs/{name}.md"));
         let text = fs::read_to_string(&path).unwrap();
         let (before, rest) = text.split_once(START).unwrap();
@@ -280,7 +326,7 @@ fn the_schema_has_the_declared_statistics() {
 
 #[test]
 fn what_an_analysis_has_is_declared() {
-    let patterns = all_patterns();
+    let patterns = all_patterns(Results::declared());
     for set in ["sim_paper", "sim_one_rep", "nist_norris", "nist_numacc1"] {
         let path = Path::new(ROOT).join(format!("tests/golden/data/{set}/data.csv"));
         let file = BufReader::new(File::open(path).unwrap());
@@ -300,12 +346,21 @@ fn what_an_analysis_has_is_declared() {
 fn the_identifiers_in_the_r_script_are_declared() {
     let path = Path::new(ROOT).join("crates/study-analysis/src/export/analysis.R");
     let script = fs::read_to_string(path).unwrap();
-    let written = script.split("value[\"").skip(1);
-    let ids: Vec<&str> = written.filter_map(|rest| rest.split('"').next()).collect();
-    assert!(ids.len() > 10, "{ids:?}");
-    let patterns = all_patterns();
-    for id in ids {
-        assert!(patterns.iter().any(|p| fits(p, id)), "{id}");
+    let written = |start| script.split(start).skip(1);
+    let ids = |start| written(start).filter_map(|rest: &str| rest.split('"').next());
+    let of_ratings: Vec<&str> = ids("value[\"").collect();
+    let of_others: Vec<&str> = ids("put(\"").collect();
+    assert!(of_ratings.len() > 10 && of_others.len() > 10);
+    for (ids, declared) in [(of_ratings, Results::declared()), (of_others, of_parts())] {
+        let patterns = all_patterns(declared);
+        for id in ids {
+            let known = match id.strip_suffix('/') {
+                // A name follows.
+                Some(id) => patterns.iter().any(|p| begins(p, id)),
+                None => patterns.iter().any(|p| fits(p, id)),
+            };
+            assert!(known, "{id}");
+        }
     }
 }
 
@@ -313,9 +368,11 @@ fn the_identifiers_in_the_r_script_are_declared() {
 /// beginning of some.
 #[test]
 fn the_identifiers_in_the_documents_are_declared() {
-    let patterns = all_patterns();
-    let first = |id: &str| id.split('/').next().unwrap_or_default().to_owned();
-    let groups: BTreeSet<String> = statistics().iter().map(|s| first(&s.0)).collect();
+    let mut declared = Results::declared();
+    declared.extend(of_parts());
+    let groups = statistics(declared.clone());
+    let groups: BTreeSet<&str> = groups.iter().map(|s| first(&s.0)).collect();
+    let patterns = all_patterns(declared);
     let mut seen = 0;
     let mut unknown = BTreeSet::new();
     for entry in fs::read_dir(Path::new(ROOT).join("docs")).unwrap() {
@@ -326,7 +383,7 @@ fn the_identifiers_in_the_documents_are_declared() {
         let text = fs::read_to_string(&path).unwrap();
         for id in text.split('`').skip(1).step_by(2) {
             let word = |c: char| c.is_ascii_alphanumeric() || "_/|-".contains(c);
-            if !id.contains('/') || !id.chars().all(word) || !groups.contains(&first(id)) {
+            if !id.contains('/') || !id.chars().all(word) || !groups.contains(first(id)) {
                 continue;
             }
             seen += 1;

@@ -1,9 +1,9 @@
 //! The numbers that R has to come to: identifier, value, tolerance.
 
+use crate::analyze::Analysis;
 use crate::analyze::psychophysics::PartAnalysis;
 use crate::analyze::psychophysics::results::Preferences;
 use crate::analyze::results::{Correlation, Field, Key, Number as _};
-use crate::analyze::{Analysis, group_id};
 use std::collections::BTreeMap;
 
 /// Most realizations with a VAF of which R goes through every permutation.
@@ -22,24 +22,26 @@ const ORDINAL: &str = "2e-3";
 
 /// Of the analysis of ratings.
 pub(super) fn of_ratings(analysis: &Analysis) -> Vec<Number> {
-    let mut ids: Vec<(String, &'static str)> = Vec::new();
-    for realization in &analysis.realizations {
-        let group = group_id("desc", &[&realization.id]);
-        ids.extend(["n", "mean", "sd"].map(|what| (format!("{group}/{what}"), CLOSED)));
-    }
-    ids.extend(["n_models", "pearson/r", "pearson/p_t"].map(|w| (format!("corr/{w}"), CLOSED)));
-    let models = analysis.results.evidence.corr.n_models.number();
-    if models.is_some_and(|n| n <= MAX_PERMUTED as f64) {
-        ids.push(("corr/pearson/p_exact_two_sided".to_owned(), CLOSED));
+    let (results, evidence) = (&analysis.results, &analysis.results.evidence);
+    let mut numbers = Numbers(Vec::new());
+    let described = ["n", "mean", "sd"];
+    numbers.each("desc", &results.descriptives.desc, &described, CLOSED);
+    let correlation = ["n_models", "pearson/r", "pearson/p_t"];
+    numbers.add("corr", &evidence.corr, &correlation, CLOSED);
+    if evidence.corr.n() <= MAX_PERMUTED {
+        let exact = ["p_exact_two_sided"];
+        numbers.add("corr/pearson", &evidence.corr.pearson, &exact, CLOSED);
     }
     let linear = [
         "slope",
         "slope_se",
         "slope_satterthwaite_df",
         "slope_satterthwaite_p",
+        "var_subject",
+        "var_model",
+        "sigma2",
     ];
-    let variances = ["var_subject", "var_model", "sigma2"];
-    ids.extend((linear.iter().chain(&variances)).map(|w| (format!("lmm_vaf_crossed/{w}"), LINEAR)));
+    numbers.add("lmm_vaf_crossed", &evidence.crossed, &linear, LINEAR);
     let ordinal = [
         "beta/vaf",
         "se/vaf",
@@ -48,14 +50,9 @@ pub(super) fn of_ratings(analysis: &Analysis) -> Vec<Number> {
         "loglik",
         "lrt_chi2",
     ];
-    ids.extend(ordinal.map(|w| (format!("clmm_vaf_crossed/{w}"), ORDINAL)));
-    let values = &analysis.values;
-    (ids.into_iter())
-        .map(|(id, tolerance)| {
-            let value = values.number(&id);
-            (id, value, tolerance)
-        })
-        .collect()
+    let crossed = &results.ordinal.clmm_vaf_crossed;
+    numbers.add("clmm_vaf_crossed", crossed, &ordinal, ORDINAL);
+    numbers.0
 }
 
 /// Of a part, with the part's id before each identifier.
