@@ -296,6 +296,7 @@ fn references_and_duplicates_have_tables_and_screening_columns() {
     ] {
         assert!(text.contains(expected), "{expected}: {text}");
     }
+    assert!(text.contains("; they differ, t(3) = "), "{text}");
     let d = a.values.number("reference/R/b/mean_diff").unwrap();
     let shown = format!("b 4 {d:.3}").replace('-', "−");
     assert!(

@@ -122,6 +122,8 @@ fn pages(
     let protocol = &mut loaded.protocol;
     protocol.session.entry = entry;
     protocol.design.practice.clear();
+    // The realizations of parts, too, are rated here in the order of the test.
+    protocol.parts.clear();
     for model in &mut protocol.models {
         if model.role == Role::Practice {
             model.role = Role::Test;
@@ -162,7 +164,8 @@ fn pages(
     panic!("no second trial:\n{}", pages.last().unwrap())
 }
 
-const PROTOCOLS: [&str; 3] = [
+const PROTOCOLS: [&str; 4] = [
+    "protocols/keyboard",
     "protocols/turn-signal",
     "protocols/turn-signal-extended",
     "protocols/turn-signal-passive",

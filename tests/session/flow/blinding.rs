@@ -34,6 +34,14 @@ fn a_device_that_names_its_table_is_not_quoted() {
         );
         assert!(kept, "the journal has the words as they were");
     }
+    // A force can tell realizations apart, too.
+    let mut rig = Rig::new(plain());
+    rig.until("Playing")
+        .send(Input::DeviceFault("5.25 N is too much".to_owned()));
+    let Screen::DeviceTrouble { what, .. } = rig.view().screen else {
+        panic!("{:?}", rig.view().screen);
+    };
+    assert_eq!(what, "… N is too much");
 }
 
 #[test]

@@ -249,6 +249,10 @@ fn earlier_ratings_stay_correctable_and_saved() {
 
 #[test]
 fn after_a_long_gap_the_operator_chooses() {
+    let soon = left_at(&plain(), 3.9 * 3600.0, |rig| {
+        rig.until_reference(4);
+    });
+    assert_eq!(screen(&soon), "Reference", "within four hours it goes on");
     let mut rig = left_at(&plain(), 5.0 * 3600.0, |rig| {
         rig.until_reference(4);
     });

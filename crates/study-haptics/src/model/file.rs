@@ -62,14 +62,17 @@ fn read(mut root: Table<'_, '_>) -> Option<Realization> {
         branch(value, nodes, own)
     };
     let (positive, negative) = (branch("positive"), branch("negative"));
-    if let (Some(trained), Some(x_mm)) = (&trained, &x_mm)
-        && (x_mm[0] < trained.x_mm[0] || x_mm[x_mm.len() - 1] > trained.x_mm[1])
-    {
-        root.fault_at(
-            &x_key,
-            Fault::warning(format!("there are nodes outside `trained.{x_key}`"))
-                .hint("the target was not identified there"),
-        );
+    if let (Some(trained), Some(x_mm)) = (&trained, &x_mm) {
+        let [low, high] = trained.x_mm;
+        // Multiples of dx are rounded.
+        let rounding = 1e-9 * (high - low);
+        if x_mm[0] < low - rounding || x_mm[x_mm.len() - 1] > high + rounding {
+            root.fault_at(
+                &x_key,
+                Fault::warning(format!("there are nodes outside `trained.{x_key}`"))
+                    .hint("the target was not identified there"),
+            );
+        }
     }
     root.finish();
     Some(Realization {

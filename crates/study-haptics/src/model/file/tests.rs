@@ -210,6 +210,12 @@ fn every_fault_has_its_line() {
 }
 
 #[test]
+fn a_node_is_outside_by_more_than_the_rounding_of_its_multiple() {
+    assert!(faults("[0, 2], v", "[0, 1.9999999999999996], v").is_empty());
+    assert_eq!(faults("[0, 2], v", "[0, 1.9999], v").len(), 1);
+}
+
+#[test]
 fn a_newer_format_is_refused_without_further_faults() {
     let newer = "study-model/3\"\ncolor = \"red";
     assert_eq!(
