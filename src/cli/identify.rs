@@ -136,7 +136,16 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         Some(comparison) => comparison.best().and_then(Candidate::failure),
         None => best.and_then(|best| compare::failure(&cells[best])),
     };
-    if let Some((failed, best)) = failed.zip(best) {
+    // A baseline that is asked for is what others are compared with.
+    let is_baseline = |method| {
+        matches!(
+            method,
+            Method::Static | Method::Segments(_) | Method::Spring
+        )
+    };
+    let baseline =
+        args.method.is_some() && best.is_some_and(|best| is_baseline(cells[best].method));
+    if let Some((failed, best)) = failed.zip(best).filter(|_| !baseline) {
         let provenance = &mut cells[best].realization.provenance;
         let note = provenance.note.take().unwrap_or_default();
         provenance.note = Some(format!("failed: {failed}; {note}"));
@@ -191,11 +200,6 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     }
     match (failed, best.map(|best| results.cells[best].method)) {
         (Some(failed), Some(method)) => {
-            // a baseline is what others are compared with
-            let baseline = matches!(
-                method,
-                Method::Static | Method::Segments(_) | Method::Spring
-            );
             let said = format!("{} failed: {failed}", method.as_str());
             if all_fail || (args.method.is_some() && !baseline) {
                 let hint = "without --method the methods are compared on data left out";
