@@ -295,6 +295,17 @@ pub struct Progress {
 }
 
 /// Analyzes ratings under the given rules.
+///
+/// ```
+/// # use study_analysis::analyze::{Rules, analyze};
+/// # use study_session::outcome::ratings::{Ratings, RatingsError};
+/// let table = "subject,model,rating\nP1,a,1\nP1,b,4\nP2,a,2\nP2,b,5\nP3,a,1\nP3,b,6\n";
+/// let ratings = Ratings::read_csv("t.csv", table.as_bytes(), None)?;
+/// let found = analyze(&ratings, &Rules::default());
+/// // All three prefer b.
+/// assert_eq!(found.values.number("desc/b/mean"), Some(5.0));
+/// # Ok::<(), RatingsError>(())
+/// ```
 pub fn analyze(ratings: &Ratings, rules: &Rules) -> Analysis {
     analyze_with_progress(ratings, rules, &Progress::default())
 }

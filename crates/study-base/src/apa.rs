@@ -2,6 +2,12 @@
 //! decimal point of a number that cannot exceed 1, p between "< .001" and "> .999".
 
 /// A number with some decimals; powers of ten for very large and very small ones.
+///
+/// ```
+/// # use study_base::apa::number;
+/// assert_eq!(number(-1.25, 1), "−1.2");
+/// assert_eq!(number(-0.001, 2), "0.00");
+/// ```
 pub fn number(x: f64, decimals: usize) -> String {
     let size = x.abs();
     let shown = if size >= 1e12 || (size > 0.0 && size < 1e-5) {
@@ -32,6 +38,13 @@ pub fn r(x: f64) -> String {
 }
 
 /// A p with its sign: `= .023`, `< .001`, `> .999`. [`p_beside`] the level .05.
+///
+/// ```
+/// # use study_base::apa::p;
+/// assert_eq!((p(0.0234), p(0.0004)), ("= .023".into(), "< .001".into()));
+/// // The side of .05 shows.
+/// assert_eq!(p(0.0496), "= .0496");
+/// ```
 pub fn p(x: f64) -> String {
     p_beside(x, 0.05)
 }

@@ -146,6 +146,14 @@ impl Findings {
     }
 
     /// All faults as text for a terminal, with ANSI styles if `color`.
+    ///
+    /// ```
+    /// # use study_base::diagnostic::{Fault, Findings};
+    /// let mut findings = Findings::new("protocol.toml", "[design]\nseed = -1\n");
+    /// findings.faults.push(Fault::error("the seed is negative").at(16..18));
+    /// assert_eq!(findings.line_and_column(16), (2, 8));
+    /// assert!(findings.render(false).contains("error: the seed is negative"));
+    /// ```
     pub fn render(&self, color: bool) -> String {
         let renderer = if color {
             Renderer::styled()
@@ -214,6 +222,13 @@ fn floor_char_boundary(text: &str, byte: usize) -> usize {
 }
 
 /// The candidate nearest to a misspelt word, if one is near enough.
+///
+/// ```
+/// # use study_base::diagnostic::did_you_mean;
+/// let keys = ["repetitions", "seed"];
+/// assert_eq!(did_you_mean("repetition", keys), Some("repetitions"));
+/// assert_eq!(did_you_mean("colour", keys), None);
+/// ```
 pub fn did_you_mean<'a>(
     given: &str,
     candidates: impl IntoIterator<Item = &'a str>,

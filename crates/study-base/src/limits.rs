@@ -40,6 +40,14 @@ impl Limit {
     }
 
     /// `value` clamped to [−limit, limit]; NaN becomes 0, no force.
+    ///
+    /// ```
+    /// # use study_base::limits::Limit;
+    /// let limit = Limit::new(12.0)?;
+    /// assert_eq!((limit.clamp(-20.0), limit.clamp(f64::NAN)), (-12.0, 0.0));
+    /// assert!(Limit::new(f64::NAN).is_err());
+    /// # Ok::<(), study_base::limits::BadLimit>(())
+    /// ```
     pub fn clamp(self, value: f64) -> f64 {
         if value.is_nan() {
             0.0

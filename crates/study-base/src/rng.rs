@@ -30,6 +30,15 @@ impl Stream {
     ///
     /// key = SHA-256(tag, 0x00, seed as 8 bytes little-endian, then for each name
     /// its length in bytes as 4 bytes little-endian and its UTF-8 bytes).
+    ///
+    /// ```
+    /// # use study_base::rng::Stream;
+    /// let mut order = ["A", "B", "C", "D"];
+    /// Stream::new(2007, &["order", "1"]).shuffle(&mut order);
+    /// let mut again = ["A", "B", "C", "D"];
+    /// Stream::new(2007, &["order", "1"]).shuffle(&mut again);
+    /// assert_eq!(order, again);
+    /// ```
     pub fn new(seed: u64, path: &[&str]) -> Self {
         let mut hash = Sha256::new();
         hash.update(VERSION.as_bytes());

@@ -13,6 +13,11 @@ use unicode_width::UnicodeWidthStr as _;
 
 /// Borrowed text whose `Display` is safe to print on one line: characters that
 /// [`is_unsafe`] are printed as `\u{…}`, line breaks and tabs as `\n`, `\r`, `\t`.
+///
+/// ```
+/// # use study_base::text::Untrusted;
+/// assert_eq!(Untrusted("left\x1b[2J\nright").to_string(), "left\\u{1b}[2J\\nright");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Untrusted<'a>(pub &'a str);
 
@@ -90,6 +95,11 @@ pub fn cut_end(text: &str, columns: usize) -> String {
 
 /// A text of at most some terminal columns; `…` after the first third marks a missing
 /// middle. Names of realizations often start alike.
+///
+/// ```
+/// # use study_base::text::cut_middle;
+/// assert_eq!(cut_middle("turn-signal-play-0.5", 12), "tur…play-0.5");
+/// ```
 pub fn cut_middle(text: &str, columns: usize) -> String {
     if columns_of(text) <= columns {
         return text.to_owned();
@@ -247,6 +257,12 @@ macro_rules! identifier {
 
 identifier!(
     /// A participant's pseudonym: `[A-Za-z0-9_-]{1,32}`. Names a folder.
+    ///
+    /// ```
+    /// # use study_base::text::ParticipantId;
+    /// assert!(ParticipantId::new("P01").is_ok());
+    /// assert!(ParticipantId::new("../P01").is_err());
+    /// ```
     ParticipantId, "participant id", 32, "A-Z a-z 0-9 _ -", &['_', '-']
 );
 impl ParticipantId {

@@ -202,6 +202,11 @@ pub fn identify(connection: &mut dyn Connection, nonce: u32) -> Result<Identity,
 
 /// Quantile of sorted values by the nearest rank, `fraction` between 0 and 1; `None`
 /// without values.
+///
+/// ```
+/// # use study_device::check::quantile;
+/// assert_eq!(quantile(&[1.0, 2.0, 3.0, 10.0], 0.5), Some(2.0));
+/// ```
 pub fn quantile(sorted: &[f64], fraction: f64) -> Option<f64> {
     let rank = (fraction * sorted.len() as f64).ceil() as usize;
     let last = sorted.len().checked_sub(1)?;

@@ -22,6 +22,15 @@ const CODES: u64 = 900;
 /// A distinct code for each realization, determined by the study's seed and the order
 /// of the ids. Adding an id at the end changes no other code. Studies with more than 450
 /// realizations get more digits. A code is never part of an id.
+///
+/// ```
+/// # use study_device::manual::codes;
+/// # use study_base::text::ModelId;
+/// let ids = ["old", "new"].map(|id| ModelId::new(id).expect("an id"));
+/// let codes = codes(2007, &[&ids[0], &ids[1]]);
+/// assert_ne!(codes[&ids[0]], codes[&ids[1]]);
+/// assert!(codes.values().all(|code| code.len() == 3));
+/// ```
 pub fn codes(seed: u64, ids: &[&ModelId]) -> BTreeMap<ModelId, String> {
     let mut stream = Stream::new(seed, &["manual", "codes"]);
     let mut from = 100;

@@ -262,6 +262,15 @@ pub enum RecordingFault {
 
 /// Reads a recording.
 ///
+/// ```
+/// # use study_haptics::recording::{self, RecordingError};
+/// let csv = "t_s,x_mm,f_n\n0,0,2\n0.5,4,3\n1,2,1\n";
+/// let recording = recording::read("press.csv", csv.as_bytes())?;
+/// assert_eq!((recording.len(), recording.duration_s()), (3, 1.0));
+/// assert_eq!(recording.range_mm(), [0.0, 4.0]);
+/// # Ok::<(), RecordingError>(())
+/// ```
+///
 /// # Errors
 /// [`RecordingError`] with the line of the first fault.
 pub fn read(name: impl Into<String>, input: impl BufRead) -> Result<Recording, RecordingError> {

@@ -194,6 +194,17 @@ impl ScheduleError {
 ///
 /// For several seats, make a [`Planner`] once.
 ///
+/// ```
+/// # use study_plan::protocol::{Seat, example};
+/// # use study_plan::schedule::{ScheduleError, plan};
+/// let trials = plan(&example::protocol(4, 2), None, Seat::Row(1))?;
+/// // Blocked: each realization once in the first four trials.
+/// let mut first: Vec<_> = trials[..4].iter().filter_map(|trial| trial.model()).collect();
+/// first.sort();
+/// assert_eq!(first.iter().map(|id| id.as_str()).collect::<String>(), "ABCD");
+/// # Ok::<(), ScheduleError>(())
+/// ```
+///
 /// # Errors
 /// [`ScheduleError`] if the design is infeasible, or the given order of this seat
 /// is incomplete or breaks a constraint.

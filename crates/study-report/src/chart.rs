@@ -301,6 +301,11 @@ pub fn fitted(text: &str, size: f64, room: f64) -> String {
 }
 
 /// An escaped text of at most some columns, shortened in the middle.
+///
+/// ```
+/// # use study_report::chart::shortened;
+/// assert_eq!(shortened("turn-signal-play-0.5", 12), "tur…play-0.5");
+/// ```
 pub fn shortened(text: &str, columns: usize) -> String {
     cut_middle(&Untrusted(text).to_string(), columns)
 }

@@ -45,6 +45,12 @@ impl Color {
     }
 
     /// Relative luminance (WCAG 2), from 0 (black) to 1 (white).
+    ///
+    /// ```
+    /// # use study_report::picture::Color;
+    /// assert!((Color::WHITE.luminance() - 1.0).abs() < 1e-12);
+    /// assert_eq!(Color(0, 0, 0x80).text_on(), Color::WHITE);
+    /// ```
     pub fn luminance(self) -> f64 {
         let linear = |c: u8| {
             let c = f64::from(c) / 255.0;
@@ -221,6 +227,13 @@ impl Picture {
     }
 
     /// The picture as an SVG document, which can also be embedded in HTML.
+    ///
+    /// ```
+    /// # use study_report::picture::{Anchor, Picture, Text};
+    /// let mut picture = Picture::new("example", "An example", 120.0, 40.0);
+    /// picture.text(Text::new((60.0, 20.0), "a < b", 10.0, Anchor::Middle));
+    /// assert!(picture.to_svg().contains("a &lt; b"));
+    /// ```
     pub fn to_svg(&self) -> String {
         svg::svg(self)
     }

@@ -4,6 +4,11 @@
 const BARS: [char; 9] = [' ', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 
 /// One bar for each count, relative to `most`; counts above 0 are always visible.
+///
+/// ```
+/// # use study_report::plot::bars;
+/// assert_eq!(bars(&[0.0, 1.0, 4.0, 8.0], 8.0, ""), " ▁▄█");
+/// ```
 pub fn bars(counts: &[f64], most: f64, gap: &str) -> String {
     let bar = |n: &f64| {
         let eighths = if most > 0.0 {

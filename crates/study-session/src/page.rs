@@ -372,6 +372,11 @@ pub fn unsaved_lines(names: &[String], most: usize, columns: usize) -> Vec<Strin
 }
 
 /// A duration in s as `m:ss` or `h:mm:ss`; `0:00` if it is not finite.
+///
+/// ```
+/// # use study_session::page::clock;
+/// assert_eq!((clock(75.0), clock(3675.0)), ("1:15".into(), "1:01:15".into()));
+/// ```
 pub fn clock(seconds: f64) -> String {
     let s = match seconds.is_finite() {
         true => seconds.clamp(0.0, 1e9) as u64,

@@ -53,6 +53,16 @@ pub struct Icc {
 /// ICC1 = (T − W)/(T + (k−1)W), ICC2 = (T − E)/(T + (k−1)E + k(R − E)/n),
 /// ICC3 = (T − E)/(T + (k−1)E). Intervals as in Shrout & Fleiss (1979).
 /// `None` for fewer than two targets or raters.
+///
+/// ```
+/// # use study_stats::agreement::icc;
+/// // Six targets and four raters, Shrout & Fleiss (1979), table 2.
+/// let rows = [[9., 2., 5., 8.], [6., 1., 3., 2.], [8., 4., 6., 8.],
+///             [7., 1., 2., 6.], [10., 5., 6., 9.], [6., 2., 4., 7.]];
+/// let found = icc(&rows).unwrap();
+/// let values = [found.icc1, found.icc2, found.icc3].map(|c| format!("{:.2}", c.unwrap().value));
+/// assert_eq!(values, ["0.17", "0.29", "0.71"]);
+/// ```
 pub fn icc<R: AsRef<[f64]>>(rows: &[R]) -> Option<Icc> {
     let rows = rectangular(rows)?;
     let (n, k) = (rows.len(), rows[0].len());
@@ -200,6 +210,12 @@ const MAX_DISTINCT: usize = 1000;
 /// units (a pair has the weight 1/(m − 1) in a unit of m ratings) and their margins n
 /// (Krippendorff 2011). Units with one rating do not contribute. `None` if all ratings
 /// are equal or more than 1000 are distinct.
+///
+/// ```
+/// # use study_stats::agreement::krippendorff;
+/// let alpha = krippendorff(&[[1.0, 1.0], [2.0, 2.0], [3.0, 3.0]]);
+/// assert_eq!((alpha.nominal, alpha.ordinal), (Some(1.0), Some(1.0)));
+/// ```
 pub fn krippendorff<U: AsRef<[f64]>>(units: &[U]) -> Alpha {
     const NONE: Alpha = Alpha {
         nominal: None,

@@ -73,6 +73,13 @@ pub struct TwoWay {
 
 /// One-way analysis of a table with a row for each subject and a column for each
 /// realization. `None` for fewer than two rows or columns.
+///
+/// ```
+/// # use study_stats::anova::one_way;
+/// // With two realizations F is the square of the paired t.
+/// let found = one_way(&[[4.0, 5.0], [2.0, 4.0], [3.0, 6.0]]).unwrap();
+/// assert_eq!(format!("{:.3}", found.effect.f.unwrap()), "12.000");
+/// ```
 pub fn one_way<R: AsRef<[f64]>>(rows: &[R]) -> Option<OneWay> {
     let rows = &rectangular(rows)?;
     let k = rows[0].len();

@@ -41,6 +41,13 @@ pub fn correlation_bf10(r: f64, n: usize) -> Option<f64> {
 /// With g = eᵘ the integrand is smooth and decreases on both sides faster than any
 /// power; there the trapezoidal rule converges faster than any power of its step.
 /// `None` for fewer than two numbers or if it overflows.
+///
+/// ```
+/// # use study_stats::bayes::jzs_bf10;
+/// // t = 0 speaks for no difference, the more so with more participants.
+/// assert!(jzs_bf10(0.0, 100, 0.707) < jzs_bf10(0.0, 20, 0.707));
+/// assert!(jzs_bf10(0.0, 20, 0.707) < Some(1.0 / 3.0));
+/// ```
 pub fn jzs_bf10(t: f64, n: usize, scale: f64) -> Option<f64> {
     if n < 2 || !t.is_finite() {
         return None;

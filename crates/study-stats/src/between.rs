@@ -161,6 +161,13 @@ fn hedges_g(a: &[f64], b: &[f64], difference: f64) -> Option<f64> {
 }
 
 /// Student's t test, by the variance within both groups. `None` without such a variance.
+///
+/// ```
+/// # use study_stats::between::difference;
+/// let found = difference(&[3.0, 4.0, 5.0], &[1.0, 2.0, 3.0]).unwrap();
+/// assert_eq!((found.difference, found.df), (2.0, 4.0));
+/// assert_eq!(format!("{:.3}", found.t), "2.449");
+/// ```
 pub fn difference(a: &[f64], b: &[f64]) -> Option<Difference> {
     let test = one_way(&[a.to_vec(), b.to_vec()])?;
     let variance = test.f.map(|_| test.ss_error / test.df2)?;

@@ -7,6 +7,13 @@ use super::rank::{doubled_ranks, mid_ranks};
 
 /// Pearson's r = Sxy/√(Sxx Syy). `None` if a column is constant, for fewer than two
 /// pairs or unequal lengths.
+///
+/// ```
+/// # use study_stats::correlation::{pearson, spearman};
+/// let (x, y) = ([1.0, 2.0, 3.0, 4.0], [1.0, 4.0, 9.0, 16.0]);
+/// assert_eq!(format!("{:.4}", pearson(&x, &y).unwrap()), "0.9844");
+/// assert!((spearman(&x, &y).unwrap() - 1.0).abs() < 1e-12);
+/// ```
 pub fn pearson(x: &[f64], y: &[f64]) -> Option<f64> {
     if x.len() < 2 || x.len() != y.len() || is_constant(x) || is_constant(y) {
         return None;
@@ -28,6 +35,12 @@ pub fn spearman(x: &[f64], y: &[f64]) -> Option<f64> {
 /// n₀ = n(n−1)/2 and n₁, n₂ the tied pairs of either column (Kendall 1945).
 /// `None` if a column is constant, for unequal lengths, or for more than 5000 pairs: the
 /// work grows with their square.
+///
+/// ```
+/// # use study_stats::correlation::kendall;
+/// // Five pairs of six are in the same order, one is not.
+/// assert_eq!(format!("{:.4}", kendall(&[1., 2., 3., 4.], &[1., 2., 4., 3.]).unwrap()), "0.6667");
+/// ```
 pub fn kendall(x: &[f64], y: &[f64]) -> Option<f64> {
     if x.len() > 5000 || x.len() != y.len() {
         return None;
@@ -57,6 +70,13 @@ pub fn p_of_r(r: f64, df: f64) -> Option<f64> {
 
 /// Fisher's 95 % interval of a correlation: tanh(atanh r ± 1.96/√`weight`), where
 /// `weight` is n − 3 for a plain correlation. `None` for |r| = 1 or unless `weight` > 0.
+///
+/// ```
+/// # use study_stats::correlation::fisher_interval;
+/// // r = .5 of 28 pairs.
+/// let (low, high) = fisher_interval(0.5, 25.0).unwrap();
+/// assert_eq!(format!("{low:.3} {high:.3}"), "0.156 0.736");
+/// ```
 pub fn fisher_interval(r: f64, weight: f64) -> Option<(f64, f64)> {
     if r.abs() >= 1.0 || weight <= 0.0 {
         return None;

@@ -140,6 +140,13 @@ pub fn variance(x: &[f64]) -> Option<f64> {
 }
 
 /// The standard deviation √(Σ(x − x̄)²/(n − 1)). `None` for fewer than two numbers.
+///
+/// ```
+/// # use study_stats::describe::{mean, sd};
+/// let x = [2.0, 4.0, 4.0, 4.0, 5.0, 5.0, 7.0, 9.0];
+/// assert_eq!(mean(&x), Some(5.0));
+/// assert_eq!(sd(&x), Some((32.0f64 / 7.0).sqrt()));
+/// ```
 pub fn sd(x: &[f64]) -> Option<f64> {
     variance(x).map(f64::sqrt)
 }
@@ -147,6 +154,12 @@ pub fn sd(x: &[f64]) -> Option<f64> {
 /// The p-quantile of ascending numbers, 0 ≤ p ≤ 1, of type 7 (Hyndman & Fan 1996, R's
 /// default): with h = (n − 1)p, linear interpolation between the numbers at ⌊h⌋ and
 /// ⌊h⌋ + 1, counted from 0. `None` for no numbers.
+///
+/// ```
+/// # use study_stats::describe::quantile;
+/// // As R: quantile(c(1, 2, 3, 4)).
+/// assert_eq!(quantile(&[1.0, 2.0, 3.0, 4.0], 0.25), Some(1.75));
+/// ```
 pub fn quantile(sorted: &[f64], p: f64) -> Option<f64> {
     let last = sorted.len().checked_sub(1)?;
     let h = last as f64 * p.clamp(0.0, 1.0);

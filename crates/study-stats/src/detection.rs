@@ -126,6 +126,15 @@ pub struct YesNo {
 }
 
 /// Sensitivity and criterion of "yes" answers to signals and catch trials.
+///
+/// ```
+/// # use study_stats::detection::{Answers, yes_no};
+/// let answers = Answers { hits: 69.0, n_hits: 100.0, false_alarms: 31.0, n_false_alarms: 100.0 };
+/// let found = yes_no(&answers).unwrap();
+/// // Without correction 0.99; no criterion, because both rates are as far from .5.
+/// assert_eq!(format!("{:.2}", found.d_uncorrected.unwrap()), "0.99");
+/// assert!(found.criterion.abs() < 1e-12);
+/// ```
 pub fn yes_no(answers: &Answers) -> Option<YesNo> {
     let rates = answers.corrected()?;
     let (hit, false_alarm) = rates.z()?;
@@ -231,6 +240,13 @@ pub struct Choice {
 
 /// One of `m` intervals has the signal, without bias:
 /// Pc = ∫φ(x − d′)Φ(x)^(m−1)dx. `None` unless m ≥ 2 and there are trials.
+///
+/// ```
+/// # use study_stats::detection::forced_choice;
+/// // 76 % correct of two intervals: d′ = √2 z(.76).
+/// let found = forced_choice(76.0, 100.0, 2).unwrap();
+/// assert_eq!(format!("{:.2}", found.d.unwrap()), "1.00");
+/// ```
 pub fn forced_choice(correct: f64, trials: f64, m: u32) -> Option<Choice> {
     choice(correct, trials, share_of_choice(m)?)
 }

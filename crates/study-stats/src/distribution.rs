@@ -26,6 +26,11 @@ pub fn normal_cdf(z: f64) -> f64 {
 }
 
 /// The z with P(Z ≤ z) = p for the standard normal Z. `None` unless 0 < p < 1.
+///
+/// ```
+/// # use study_stats::distribution::normal_quantile;
+/// assert_eq!(format!("{:.6}", normal_quantile(0.975).unwrap()), "1.959964");
+/// ```
 pub fn normal_quantile(p: f64) -> Option<f64> {
     if !(p > 0.0 && p < 1.0) {
         return None;
@@ -86,6 +91,11 @@ pub fn f_upper(f: f64, df1: f64, df2: f64) -> Option<f64> {
 }
 
 /// P(X > x) for χ² with `df` degrees of freedom. `None` unless `df` > 0 and x is finite.
+///
+/// ```
+/// # use study_stats::distribution::chi2_upper;
+/// assert_eq!(format!("{:.4}", chi2_upper(3.841459, 1.0).unwrap()), "0.0500");
+/// ```
 pub fn chi2_upper(x: f64, df: f64) -> Option<f64> {
     if !(df > 0.0 && x.is_finite()) {
         return None;
@@ -114,6 +124,11 @@ fn beta_of(a: f64, b: f64, p: f64, q: f64) -> Option<f64> {
 }
 
 /// The t with P(T ≤ t) = p for Student's T. `None` unless 0 < p < 1 and `df` > 0.
+///
+/// ```
+/// # use study_stats::distribution::t_quantile;
+/// assert_eq!(format!("{:.3}", t_quantile(0.975, 10.0).unwrap()), "2.228");
+/// ```
 pub fn t_quantile(p: f64, df: f64) -> Option<f64> {
     if !(p > 0.0 && p < 1.0 && df > 0.0) {
         return None;

@@ -32,6 +32,14 @@ pub struct Friedman {
 
 /// Friedman's test: χ² = (k−1) Σⱼ(Rⱼ − n(k+1)/2)² / (Σᵢⱼ rᵢⱼ² − nk(k+1)²/4), with the
 /// correction for ties (Conover 1999, §5.8). `None` for fewer than two rows or columns.
+///
+/// ```
+/// # use study_stats::friedman::friedman;
+/// // Three subjects who agree on three realizations: one of 3!² relative orders.
+/// let test = friedman(&[[1.0, 2.0, 3.0], [2.0, 4.0, 6.0], [1.0, 5.0, 7.0]]).unwrap();
+/// assert_eq!((test.chi2, test.kendall_w), (Some(6.0), Some(1.0)));
+/// assert_eq!(test.exact_p, Some(1.0 / 36.0));
+/// ```
 pub fn friedman<R: AsRef<[f64]>>(rows: &[R]) -> Option<Friedman> {
     let rows = rectangular(rows)?;
     let (n, k) = (rows.len(), rows[0].len());

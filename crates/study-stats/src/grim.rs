@@ -143,6 +143,18 @@ pub struct Published {
 }
 
 /// The sums of ratings whose mean is rounded to the printed one.
+///
+/// ```
+/// # use study_stats::grim::{Published, possible_sums};
+/// # fn main() -> Result<(), study_stats::grim::NotADecimal> {
+/// // No 25 whole numbers have the mean 3.47.
+/// let (mean, sd) = ("3.47".parse()?, "1.00".parse()?);
+/// let printed = Published { mean, sd, n: 25, each: None, scale: (1, 7) };
+/// assert!(possible_sums(&printed).is_empty());
+/// assert_eq!(possible_sums(&Published { mean: "3.48".parse()?, ..printed }), [87]);
+/// # Ok(())
+/// # }
+/// ```
 pub fn possible_sums(q: &Published) -> Vec<i128> {
     let n = i128::from(q.n);
     let near = q.mean.digits * n / q.mean.unit();

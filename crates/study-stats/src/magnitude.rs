@@ -67,6 +67,14 @@ pub struct PowerLaw {
 /// Geometric means after modulus equalization (Lane, Catania & Stevens 1961), in log10:
 /// a participant's mean of each level; minus the participant's mean over the levels,
 /// plus the grand mean. Estimates that are not above 0 are left out.
+///
+/// ```
+/// # use study_stats::magnitude::{Estimate, magnitude};
+/// // Numbers that grow with the root of the level.
+/// let estimate = |level: f64| Estimate { participant: 0, level, estimate: 3.0 * level.sqrt() };
+/// let found = magnitude(&[estimate(1.0), estimate(10.0), estimate(100.0)]);
+/// assert!((found.law.unwrap().exponent - 0.5).abs() < 1e-12);
+/// ```
 pub fn magnitude(estimates: &[Estimate]) -> Magnitude {
     let good = |e: &&Estimate| e.estimate > 0.0 && e.estimate.is_finite() && e.level.is_finite();
     let kept: Vec<&Estimate> = estimates.iter().filter(good).collect();

@@ -27,6 +27,13 @@ pub struct OneSample {
 }
 
 /// One-sample t test of the mean against 0. `None` for fewer than two numbers.
+///
+/// ```
+/// # use study_stats::paired::one_sample;
+/// // The extra sleep of Student (1908), one drug less the other.
+/// let test = one_sample(&[1.2, 2.4, 1.3, 1.3, 0.0, 1.0, 1.8, 0.8, 4.6, 1.4]).unwrap();
+/// assert_eq!(format!("{:.4} {:.6}", test.t.unwrap(), test.p.unwrap()), "4.0621 0.002833");
+/// ```
 pub fn one_sample(x: &[f64]) -> Option<OneSample> {
     let n = x.len();
     let (m, s) = (mean(x)?, sd(x)?);
@@ -60,6 +67,13 @@ pub struct Equivalence {
 
 /// Tests whether the mean of x lies within ±`margin`. `None` for fewer than two numbers,
 /// if all are equal, or unless `margin` > 0.
+///
+/// ```
+/// # use study_stats::paired::equivalence;
+/// let test = equivalence(&[0.1, -0.2, 0.0, 0.2, -0.1], 0.5).unwrap();
+/// assert!(test.p < 0.05);
+/// assert!(-0.5 < test.ci90.0 && test.ci90.1 < 0.5);
+/// ```
 pub fn equivalence(x: &[f64], margin: f64) -> Option<Equivalence> {
     let test = one_sample(x)?;
     let sem = test.sd / (test.n as f64).sqrt();
@@ -116,6 +130,14 @@ pub struct Paired {
 /// differences rounded to 10⁻¹⁰ of the columns' size, so that rounding errors cancel; so
 /// are differences that are then all equal. `None` for fewer than two subjects or unequal
 /// lengths.
+///
+/// ```
+/// # use study_stats::paired::paired;
+/// // All five ratings of a are higher: the smallest exact p, 2/2⁵.
+/// let test = paired(&[5.0, 6.0, 7.0, 5.0, 6.0], &[4.0, 4.0, 4.0, 1.0, 1.0]).unwrap();
+/// assert_eq!(test.p_exact, Some(0.0625));
+/// assert_eq!(test.rank_biserial, Some(1.0));
+/// ```
 pub fn paired(a: &[f64], b: &[f64]) -> Option<Paired> {
     if a.len() != b.len() {
         return None;
@@ -233,6 +255,11 @@ impl Wilcoxon {
 /// Holm's (1979) adjusted p values, in the given order: of the m defined ones, the i-th
 /// smallest is multiplied by m − i + 1, then made monotone and limited to 1. Undefined
 /// ones stay `None`.
+///
+/// ```
+/// # use study_stats::paired::holm;
+/// assert_eq!(holm(&[Some(0.01), None, Some(0.03)]), [Some(0.02), None, Some(0.03)]);
+/// ```
 pub fn holm(p: &[Option<f64>]) -> Vec<Option<f64>> {
     let mut order: Vec<(usize, f64)> = p
         .iter()

@@ -413,6 +413,13 @@ pub struct Triads {
 /// The circular triads of one round: each pair once, as (preferred, other).
 /// d = T(T − 1)(2T − 1)/12 − ½Σw². `None` with fewer than three items, or unless each
 /// pair occurs once.
+///
+/// ```
+/// # use study_stats::pairs::circular_triads;
+/// // a over b, b over c, c over a.
+/// let found = circular_triads(3, &[(0, 1), (1, 2), (2, 0)]).unwrap();
+/// assert_eq!((found.circular, found.consistency), (1.0, 0.0));
+/// ```
 pub fn circular_triads(items: usize, preferred: &[(usize, usize)]) -> Option<Triads> {
     let mut seen = vec![false; items * items];
     let mut wins = vec![0.0; items];

@@ -54,6 +54,15 @@ pub struct PermutationTest {
 /// Permutation test of the correlation of x and y. `random` is used only above
 /// [`MAX_EXACT`] pairs. `None` if the correlation is not defined, for unequal lengths,
 /// fewer than three pairs or more than 1000 (Kendall: 100).
+///
+/// ```
+/// # use study_stats::permutation::{Statistic, test};
+/// # use study_stats::random::SplitMix64;
+/// let (x, y) = ([1.0, 2.0, 3.0, 4.0, 5.0], [2.0, 3.0, 5.0, 8.0, 13.0]);
+/// let found = test(Statistic::Spearman, &x, &y, &mut SplitMix64::new(1)).unwrap();
+/// // Only this order of 5! and its reverse are as extreme.
+/// assert_eq!((found.exact, found.two_sided), (true, 2.0 / 120.0));
+/// ```
 pub fn test(
     statistic: Statistic,
     x: &[f64],

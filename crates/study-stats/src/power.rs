@@ -100,6 +100,12 @@ pub fn detectable_correlation(n: usize, target: f64, alpha: f64) -> Option<f64> 
 /// The smallest mean difference, in standard deviations of the differences (Cohen's
 /// d_z), that `n` subjects show with this power: δ/√n. `None` for fewer than two
 /// subjects, and as for [`detectable`].
+///
+/// ```
+/// # use study_stats::power::detectable_difference;
+/// // What G*Power calls d_z with 34 subjects, power .80 and α = .05.
+/// assert_eq!(format!("{:.1}", detectable_difference(34, 0.8, 0.05).unwrap()), "0.5");
+/// ```
 pub fn detectable_difference(n: usize, target: f64, alpha: f64) -> Option<f64> {
     let ncp = detectable(target, n as f64 - 1.0, alpha).filter(|_| n > 1)?;
     Some(ncp / (n as f64).sqrt())

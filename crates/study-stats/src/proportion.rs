@@ -43,6 +43,13 @@ pub fn share(clusters: &[(f64, f64)]) -> Option<Share> {
 /// The exact interval of a probability with this coverage, from `hits` of `trials`
 /// independent trials (Clopper & Pearson 1934), by quantiles of F. `None` without trials,
 /// for more hits than trials, or a `level` outside (0, 1).
+///
+/// ```
+/// # use study_stats::proportion::clopper_pearson;
+/// // No hit in 20 trials.
+/// let (low, high) = clopper_pearson(0, 20, 0.95).unwrap();
+/// assert_eq!((low, format!("{high:.3}")), (0.0, "0.168".into()));
+/// ```
 pub fn clopper_pearson(hits: u64, trials: u64, level: f64) -> Option<(f64, f64)> {
     if trials == 0 || hits > trials || !(level > 0.0 && level < 1.0) {
         return None;

@@ -5,6 +5,12 @@ use super::describe;
 /// The score of the System Usability Scale from its ten answers, from 1 to 5, in their order:
 /// 0 to 100 (Brooke 1996). Agreement counts for the odd items and against the even ones.
 /// `None` if answers are missing or not on the scale.
+///
+/// ```
+/// # use study_stats::questionnaire::sus;
+/// assert_eq!(sus(&[5.0, 1.0, 5.0, 1.0, 5.0, 1.0, 5.0, 1.0, 5.0, 1.0]), Some(100.0));
+/// assert_eq!(sus(&[3.0; 10]), Some(50.0));
+/// ```
 pub fn sus(answers: &[f64]) -> Option<f64> {
     if answers.len() != 10 || answers.iter().any(|a| !(1.0..=5.0).contains(a)) {
         return None;

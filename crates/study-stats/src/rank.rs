@@ -3,6 +3,11 @@
 use super::describe::rounded;
 
 /// Mid-ranks, from 1: numbers that agree to 10⁻¹⁰ share the mean of their ranks.
+///
+/// ```
+/// # use study_stats::rank::mid_ranks;
+/// assert_eq!(mid_ranks(&[3.0, 1.0, 3.0, 7.0]), [2.5, 1.0, 2.5, 4.0]);
+/// ```
 pub fn mid_ranks(x: &[f64]) -> Vec<f64> {
     doubled_ranks(x).iter().map(|&r| r as f64 / 2.0).collect()
 }

@@ -28,6 +28,15 @@ pub struct Line {
 
 /// The least-squares line. `None` for fewer than three points, unequal lengths, or if x
 /// or y is constant.
+///
+/// ```
+/// # use study_stats::regression::line;
+/// // The first of Anscombe's (1973) quartet: y = 3 + x/2.
+/// let x = [10., 8., 13., 9., 11., 14., 6., 4., 12., 7., 5.];
+/// let y = [8.04, 6.95, 7.58, 8.81, 8.33, 9.96, 7.24, 4.26, 10.84, 4.82, 5.68];
+/// let fit = line(&x, &y).unwrap();
+/// assert_eq!(format!("{:.2} {:.3} {:.2}", fit.intercept, fit.slope, fit.r2), "3.00 0.500 0.67");
+/// ```
 pub fn line(x: &[f64], y: &[f64]) -> Option<Line> {
     let n = x.len() as f64;
     if x.len() < 3 || x.len() != y.len() || is_constant(x) || is_constant(y) {

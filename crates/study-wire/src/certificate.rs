@@ -386,6 +386,12 @@ impl Certificate {
 }
 
 /// Damping that the device itself needs to render a spring, K T (½ + n), N·s/m.
+///
+/// ```
+/// # use study_wire::certificate::spring_damping_n_s_per_m;
+/// // 2 N/mm at 4 kHz without delay: K T/2.
+/// assert_eq!(spring_damping_n_s_per_m(2.0, 4000.0, 0.0), 0.25);
+/// ```
 pub fn spring_damping_n_s_per_m(stiffness_n_per_mm: f64, rate_hz: f64, delay: f64) -> f64 {
     1000.0 * stiffness_n_per_mm * (0.5 + delay) / rate_hz
 }

@@ -49,6 +49,13 @@ impl<R: Real> Estimator<R> {
 }
 
 /// A handle that turns about an axis: x is the length of the arc at the lever arm.
+///
+/// ```
+/// # use study_wire::estimate::Lever;
+/// let lever = Lever { arm_mm: 50.0 };
+/// assert_eq!(lever.mm(0.5), 25.0);
+/// assert_eq!(lever.torque_n_m(4.0), 0.2);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lever {
     /// Distance of the hand from the axis, mm.

@@ -50,6 +50,11 @@ impl fmt::Display for FrameError {
 }
 
 /// CRC-32 of `bytes`.
+///
+/// ```
+/// # use study_wire::frame::crc32;
+/// assert_eq!(crc32(b"123456789"), 0xCBF4_3926);
+/// ```
 pub fn crc32(bytes: &[u8]) -> u32 {
     CRC.checksum(bytes)
 }

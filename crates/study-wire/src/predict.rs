@@ -157,6 +157,15 @@ impl<R: Real> Motion<R> {
 }
 
 /// The direction state z with its memory of the last position.
+///
+/// ```
+/// # use study_wire::predict::{Direction, DirectionState, Motion};
+/// let mut state = DirectionState::new();
+/// let rule = Direction::Play { delta_mm: 0.5 };
+/// state.step(rule, Motion::at_rest(1.0));
+/// // Half of δ back: between both directions.
+/// assert_eq!(state.step(rule, Motion::at_rest(0.75)), 0.0);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DirectionState<R = f64> {
     z: R,
@@ -222,6 +231,17 @@ pub(crate) fn clamp<R: Real>(value: R, limit: R) -> R {
 
 /// The force of the table for direction z, N. Outside the nodes the parameters of the
 /// first or last node apply at the actual position.
+///
+/// ```
+/// # use study_wire::predict::{BranchView, Lookup, Motion, TableView, force_n};
+/// // A spring of 0.2 N/mm about 15 mm, with 0.5 N of friction.
+/// let none = &[0.0; 2][..];
+/// let branch = |f0_n| BranchView { m_kg: none, b_n_s_per_mm: none, k_n_per_mm: &[0.2; 2], f0_n };
+/// let (positive, negative) = (branch(&[-2.5; 2]), branch(&[-3.5; 2]));
+/// let table = TableView { x_mm: &[0.0, 30.0], positive, negative, lookup: Lookup::Linear };
+/// assert_eq!(force_n(&table, 1.0, Motion::at_rest(20.0)), 1.5);
+/// assert_eq!(force_n(&table, -1.0, Motion::at_rest(20.0)), 0.5);
+/// ```
 pub fn force_n<R: Real>(table: &TableView<'_, R>, z: R, motion: Motion<R>) -> R {
     let (left, weight) = locate(table.x_mm, table.lookup, motion.x_mm);
     let plus = R::HALF * (R::ONE + z);
@@ -282,6 +302,13 @@ fn branch_force_n<R: Real>(
 
 /// Index of the node to the left of x and the weight of the next node, in [0, 1).
 /// Beyond the ends the parameters are constant.
+///
+/// ```
+/// # use study_wire::predict::{Lookup, locate};
+/// let nodes = [0.0, 2.0, 4.0];
+/// assert_eq!(locate(&nodes, Lookup::Linear, 2.5), (1, 0.25));
+/// assert_eq!(locate(&nodes, Lookup::Nearest, 3.5), (2, 0.0));
+/// ```
 pub fn locate<R: Real>(nodes: &[R], lookup: Lookup, x_mm: R) -> (usize, R) {
     let last = nodes.len() - 1;
     // `>` is false for NaN, which uses the first node.

@@ -54,6 +54,13 @@ pub struct Floor {
 
 /// The floor of the permutation test with these VAF. `None` if VAF are drawn, do not vary,
 /// or are fewer than three.
+///
+/// ```
+/// # use study_analysis::power::floor;
+/// // Five realizations: 5! orders, of which one is the most extreme.
+/// let floor = floor(&[55.0, 70.0, 80.0, 90.0, 96.0], 0.05).unwrap();
+/// assert_eq!((floor.smallest_p, floor.can_reject), (1.0 / 120.0, true));
+/// ```
 pub fn floor(vaf: &[f64], alpha: f64) -> Option<Floor> {
     let smallest_p = permutation::floor(vaf)?;
     Some(Floor {

@@ -1,12 +1,13 @@
 //! A strict reader of TOML that reports every fault rather than the first.
 //!
-//! ```text
-//! let document = Document::parse(text);            // syntax faults collected
+//! ```
+//! # use study_base::diagnostic::table::Document;
+//! let document = Document::parse("[design]\nrepetitions = \"3\"\nsead = 1\n");
 //! let mut root = document.root();
-//! let mut design = root.table("design");           // Option<Table>
-//! design.u32("repetitions")                        // type faults collected
-//! design.finish();                                 // unknown keys collected
-//! let faults = document.finish().faults;
+//! let mut design = root.table("design").expect("it is there");
+//! assert_eq!(design.u32("repetitions"), None); // not a number
+//! design.finish(); // an unknown key
+//! assert_eq!(document.finish().faults.len(), 2);
 //! ```
 //!
 //! The span of every value that is read is recorded under its path

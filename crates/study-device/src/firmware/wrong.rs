@@ -108,6 +108,12 @@ wrongs! {
 
 impl Wrong {
     /// The one with this name on the command line.
+    ///
+    /// ```
+    /// # use study_device::firmware::Wrong;
+    /// // A weak motor shows only on a scale.
+    /// assert!(Wrong::named("weak-motor").is_some_and(Wrong::is_physical));
+    /// ```
     pub fn named(name: &str) -> Option<Self> {
         let (wrong, ..) = Self::ALL.iter().find(|(_, own, _)| *own == name)?;
         Some(*wrong)

@@ -11,6 +11,15 @@ use std::time::Duration;
 const SECONDS: usize = 600;
 
 /// Estimate of the device's clock.
+///
+/// ```
+/// # use study_device::host::DeviceClock;
+/// # use std::time::Duration;
+/// let mut clock = DeviceClock::default();
+/// // Asked at 1 s, answered 10 ms later: about 1005 ms here are 400 ms there.
+/// clock.add(Duration::from_millis(1000), Duration::from_millis(1010), 400);
+/// assert_eq!(clock.at(Duration::from_millis(2005)), Some(1400));
+/// ```
 #[derive(Debug, Clone, Default)]
 pub struct DeviceClock {
     /// Last reading, extended beyond 32 bits, ms.

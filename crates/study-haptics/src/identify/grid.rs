@@ -50,6 +50,13 @@ impl Plan {
     }
 
     /// Number of realizations.
+    ///
+    /// ```
+    /// # use study_haptics::identify::grid::Plan;
+    /// # use study_haptics::identify::resample::Resample;
+    /// // Three λ with two distances of the nodes.
+    /// assert_eq!(Plan::ewls(&[0.99, 0.995, 0.999], &[0.5, 1.0], Resample::Point).cells(), 6);
+    /// ```
     pub fn cells(&self) -> usize {
         let cells = |method: &Method| {
             if method.has_dx() { self.dx_mm.len() } else { 1 }

@@ -36,6 +36,11 @@ study_base::named! {
 
 /// The multiples of `dx_mm` in [`low`, `high`], mm; empty if dx is not positive or
 /// there would be more than [`MAX_NODES`].
+///
+/// ```
+/// # use study_haptics::identify::resample::nodes;
+/// assert_eq!(nodes(0.3, 2.2, 0.5), [0.5, 1.0, 1.5, 2.0]);
+/// ```
 pub fn nodes(low: f64, high: f64, dx_mm: f64) -> Vec<f64> {
     let first = (low / dx_mm).ceil();
     let last = (high / dx_mm).floor();

@@ -158,6 +158,11 @@ pub fn prepare(recording: &Recording, settings: Settings) -> Result<Recording, S
 }
 
 /// The velocity by central differences, one-sided at the ends, mm/s.
+///
+/// ```
+/// # use study_haptics::identify::signal::difference;
+/// assert_eq!(difference(&[0.0, 1.0, 4.0], 0.5), [2.0, 4.0, 6.0]);
+/// ```
 pub fn difference(x_mm: &[f64], step_s: f64) -> Vec<f64> {
     let last = x_mm.len().saturating_sub(1);
     (0..x_mm.len())

@@ -40,6 +40,13 @@ impl Units {
     }
 
     /// A length in mm at the end of a lever arm of `lever_mm`, in these units.
+    ///
+    /// ```
+    /// # use study_haptics::model::Units;
+    /// // 90 degrees of a lever of 40 mm are 20 π mm.
+    /// let angle = Units::Degrees.of_mm(20.0 * std::f64::consts::PI, 40.0);
+    /// assert!((angle - 90.0).abs() < 1e-9);
+    /// ```
     pub fn of_mm(self, mm: f64, lever_mm: f64) -> f64 {
         mm / self.at_lever(lever_mm).x
     }

@@ -117,6 +117,12 @@ impl Parameters {
     }
 
     /// The built-in target with this name, `a` or `b` in either case.
+    ///
+    /// ```
+    /// # use study_haptics::plant::Parameters;
+    /// assert_eq!(Parameters::named("a"), Some(Parameters::a()));
+    /// assert!(Parameters::named("z").is_none());
+    /// ```
     pub fn named(name: &str) -> Option<Self> {
         match name {
             "a" | "A" => Some(Self::a()),

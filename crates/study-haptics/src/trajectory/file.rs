@@ -27,6 +27,17 @@ const SHAPES: [(&str, Shape); 2] = [("triangular", Shape::Triangular), ("linear"
 
 /// Reads a trajectory file; `path` is for messages. `None` if and only if the findings
 /// contain an error.
+///
+/// ```
+/// # use study_haptics::trajectory::file::parse;
+/// let text = "format = \"study-trajectory/1\"\noffset_mm = 10\nduration_s = 4\nramp_s = 0.5\n\
+///     parts = [{ kind = \"sine\", amplitude_mm = 3, frequency_hz = 1 }]\n";
+/// let (trajectory, _) = parse("sine.toml", text);
+/// let trajectory = trajectory.unwrap();
+/// // A quarter of a period.
+/// assert!((trajectory.at(2.25).x_mm - 13.0).abs() < 1e-9);
+/// assert_eq!(trajectory.total_s(), 5.0);
+/// ```
 pub fn parse(path: &str, text: &str) -> (Option<Trajectory>, Findings) {
     table::parse(path, text, read)
 }

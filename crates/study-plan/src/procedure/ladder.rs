@@ -57,6 +57,13 @@ impl Ladder {
     }
 
     /// The step whose level is nearest; of two that are equally near, the lower one.
+    ///
+    /// ```
+    /// # use study_plan::procedure::{Ladder, ProcedureError};
+    /// let ladder = Ladder::new(vec![0.0, 1.0, 2.0, 4.0])?;
+    /// assert_eq!(ladder.nearest(3.2), 3);
+    /// # Ok::<(), ProcedureError>(())
+    /// ```
     pub fn nearest(&self, level: f64) -> usize {
         let above = self.levels.partition_point(|l| *l < level);
         if above == 0 {

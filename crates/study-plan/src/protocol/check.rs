@@ -134,6 +134,12 @@ fn birth_dates(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
 
 /// Trials of a session, practice included, unless an orders file has fewer; with staircases
 /// the most.
+///
+/// ```
+/// # use study_plan::protocol::{check, example};
+/// // Five realizations, three times each.
+/// assert_eq!(check::trials(&example::protocol(5, 3)), 15);
+/// ```
 pub fn trials(protocol: &Protocol) -> u32 {
     if !protocol.parts.is_empty() {
         let parts = protocol.parts.iter();

@@ -132,6 +132,13 @@ pub struct Named {
 }
 
 /// Reads a protocol file; `path` is only for messages.
+///
+/// ```
+/// # use study_plan::protocol::file::parse;
+/// let parsed = parse("protocol.toml", "format = \"study-protocol/1\"\n[design]\nrepetition = 3\n");
+/// assert!(parsed.protocol.is_none());
+/// assert!(parsed.findings.render(false).contains("did you mean `repetitions`?"));
+/// ```
 pub fn parse(path: &str, text: &str) -> Parsed {
     let length = text.len();
     if length > MAX_FILE_BYTES {

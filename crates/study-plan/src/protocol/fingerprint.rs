@@ -51,6 +51,15 @@ pub struct Parts {
 
 impl Parts {
     /// The fingerprints.
+    ///
+    /// ```
+    /// # use study_plan::protocol::{example, fingerprint::parts};
+    /// let of = |repetitions| parts(&example::protocol(3, repetitions), &Default::default(), None);
+    /// let (once, twice) = (of(1).fingerprints(), of(2).fingerprints());
+    /// // Other orders, the same analysis.
+    /// assert_ne!(once.stimulus, twice.stimulus);
+    /// assert_eq!(once.analysis, twice.analysis);
+    /// ```
     pub fn fingerprints(&self) -> Fingerprints {
         Fingerprints {
             stimulus: digest(&self.stimulus),

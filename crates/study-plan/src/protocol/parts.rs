@@ -330,6 +330,13 @@ impl Method {
     }
 
     /// Share of correct answers by guessing, where it follows from the method.
+    ///
+    /// ```
+    /// # use study_plan::protocol::{Interval, Method};
+    /// assert_eq!(Method::TwoIntervals.guess_rate(), Some(0.5));
+    /// let trial = [Interval::Standard, Interval::Comparison];
+    /// assert_eq!(Method::TwoIntervals.correct(&trial), Some("second"));
+    /// ```
     pub fn guess_rate(self) -> Option<f64> {
         match self {
             Self::TwoIntervals | Self::Abx => Some(0.5),

@@ -267,6 +267,12 @@ impl Words {
     }
 
     /// How long must be waited, in words.
+    ///
+    /// ```
+    /// # use study_plan::protocol::phrases::Words;
+    /// # use std::collections::BTreeMap;
+    /// assert!(Words::new(None, &BTreeMap::new()).wait(125.0).contains("2:05"));
+    /// ```
     pub fn wait(&self, seconds: f64) -> String {
         match seconds.ceil() {
             whole if whole <= 1.0 => self.get(Phrase::WaitSecond).to_owned(),
@@ -283,6 +289,11 @@ impl Words {
 /// Whether the fixed sentences exist in a language. Regions do not matter: `de-CH` is
 /// `de`; `zh` and its regions without a script are not, since they may be read in
 /// traditional characters.
+///
+/// ```
+/// # use study_plan::protocol::phrases::is_shipped;
+/// assert!(is_shipped("de-CH") && !is_shipped("tlh"));
+/// ```
 pub fn is_shipped(lang: &str) -> bool {
     primary(lang) == "en" || shipped(lang).is_some()
 }

@@ -116,6 +116,11 @@ const NASA_TLX: [Item; 6] = [
 
 impl Inventory {
     /// Its items, in their order.
+    ///
+    /// ```
+    /// # use study_plan::protocol::Inventory;
+    /// assert_eq!((Inventory::Sus.items().len(), Inventory::NasaTlx.items().len()), (10, 6));
+    /// ```
     pub fn items(self) -> &'static [Item] {
         match self {
             Self::Sus => &SUS,

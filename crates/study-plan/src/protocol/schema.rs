@@ -9,6 +9,13 @@ use serde_json::{Map, Value, json};
 use std::ops::Bound;
 
 /// The JSON Schema, draft 2020-12.
+///
+/// ```
+/// # use study_plan::protocol::schema::json_schema;
+/// let schema = json_schema();
+/// assert_eq!(schema["$schema"], "https://json-schema.org/draft/2020-12/schema");
+/// assert!(schema["properties"]["design"]["properties"]["repetitions"].is_object());
+/// ```
 pub fn json_schema() -> Value {
     let mut schema = object(ROOT);
     let mut questions = None;

@@ -75,6 +75,12 @@ pub fn williams_lines(n: usize) -> usize {
 /// line n + i is line i backwards. Over all lines, each symbol follows each
 /// other equally often.
 ///
+/// ```
+/// # use study_plan::schedule::orders::williams_line;
+/// assert_eq!(williams_line(4, 0), [0, 1, 3, 2]);
+/// assert_eq!(williams_line(4, 1), [1, 2, 0, 3]);
+/// ```
+///
 /// # Panics
 /// If `n` is 0.
 pub fn williams_line(n: usize, line: u64) -> Vec<usize> {
@@ -97,6 +103,11 @@ pub fn williams_line(n: usize, line: u64) -> Vec<usize> {
 }
 
 /// A line of the cyclic Latin square of `n` symbols, modulo n: i, i+1, … (mod n).
+///
+/// ```
+/// # use study_plan::schedule::orders::latin_line;
+/// assert_eq!(latin_line(4, 1), [1, 2, 3, 0]);
+/// ```
 ///
 /// # Panics
 /// If `n` is 0.

@@ -68,6 +68,13 @@ pub enum ReplyError {
 impl Sent {
     /// Reads what a screen sends.
     ///
+    /// ```
+    /// # use study_session::page::reply::Sent;
+    /// // A stop needs no page and no key.
+    /// assert!(matches!(Sent::read(br#"{"does":"stop"}"#), Ok(Sent::Stop)));
+    /// assert!(Sent::read(b"{}").is_err());
+    /// ```
+    ///
     /// # Errors
     /// [`ReplyError`]; never if it asks to stop, whatever else it says.
     pub fn read(json: &[u8]) -> Result<Self, ReplyError> {

@@ -64,6 +64,16 @@ impl Fit {
 }
 
 /// The curve with given γ and λ and the highest likelihood. Levels may repeat.
+///
+/// ```
+/// # use study_stats::psychometric::{Core, Level, NoThreshold, maximum_likelihood};
+/// let level = |level, positive| Level { level, positive, trials: 20.0 };
+/// // As many answers above one half as below it: the threshold is the middle.
+/// let levels = [level(1.0, 2.0), level(2.0, 10.0), level(3.0, 18.0)];
+/// let fit = maximum_likelihood(Core::Logistic, &levels, 0.0, 0.0)?;
+/// assert!((fit.curve.threshold - 2.0).abs() < 1e-6);
+/// # Ok::<(), NoThreshold>(())
+/// ```
 pub fn maximum_likelihood(
     core: Core,
     levels: &[Level],

@@ -100,6 +100,14 @@ impl<R: Real> Profile<'_, R> {
     }
 
     /// The value by linear interpolation, N.
+    ///
+    /// ```
+    /// # use study_wire::mechanism::Profile;
+    /// let detent = Profile { first_mm: 0.0, step_mm: 2.0, n: &[0.0, 3.0, -1.0] };
+    /// assert_eq!(detent.linear_n(1.0), 1.5);
+    /// // Constant beyond the ends.
+    /// assert_eq!(detent.linear_n(9.0), -1.0);
+    /// ```
     pub fn linear_n(&self, x_mm: R) -> R {
         let (left, t, _) = self.linear(x_mm);
         let [from, to] = [self.n[left], self.n[left + 1]].map(R::of);

@@ -6,6 +6,12 @@
 use crate::real::Real;
 
 /// mm to nm: ±2147 mm.
+///
+/// ```
+/// # use study_wire::message::fixed::nm;
+/// assert_eq!(nm(17.5), 17_500_000);
+/// assert_eq!(nm(1e9), i32::MAX);
+/// ```
 pub fn nm<R: Real>(x_mm: R) -> i32 {
     scaled(x_mm, 1e6)
 }

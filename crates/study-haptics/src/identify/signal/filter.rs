@@ -55,6 +55,16 @@ impl LowPass {
     }
 
     /// The filtered signal, without delay. A signal of one sample is returned unchanged.
+    ///
+    /// ```
+    /// # use study_haptics::identify::signal::{LowPass, SignalError};
+    /// let low_pass = LowPass::new(30.0, 1000.0)?;
+    /// // The mean passes, what alternates does not.
+    /// let fast: Vec<f64> = (0..200).map(|i| if i % 2 == 0 { 3.0 } else { 1.0 }).collect();
+    /// let slow = low_pass.zero_phase(&fast);
+    /// assert!(slow[50..150].iter().all(|x| (x - 2.0).abs() < 0.01));
+    /// # Ok::<(), SignalError>(())
+    /// ```
     pub fn zero_phase(&self, signal: &[f64]) -> Vec<f64> {
         let n = signal.len();
         if n < 2 {

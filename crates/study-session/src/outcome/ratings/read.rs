@@ -20,6 +20,16 @@ impl Ratings {
     /// one is kept, 0 too. A byte order mark is skipped. `question` names the column
     /// with the ratings; default: `rating`, and in a study's table the first question.
     ///
+    /// ```
+    /// # use study_session::outcome::ratings::{Ratings, RatingsError};
+    /// let table = "subject,model,rating\nP1,a,3\nP1,b,\nP2,a,5\n";
+    /// let ratings = Ratings::read_csv("t.csv", table.as_bytes(), None)?;
+    /// assert_eq!((ratings.len(), ratings.models.len()), (3, 2));
+    /// let wrong = Ratings::read_csv("t.csv", &b"subject,model,rating\nP1,a,high\n"[..], None);
+    /// assert!(wrong.unwrap_err().to_string().contains("line 2"));
+    /// # Ok::<(), RatingsError>(())
+    /// ```
+    ///
     /// # Errors
     /// [`RatingsError`] of the first line with an error.
     pub fn read_csv(
