@@ -6,10 +6,8 @@ use study_haptics::plant::{Hand, HandParameters};
 use study_wire::predict::{BranchView, Motion, TableView};
 use study_wire::servo::{Law, Rendering, Servo, ServoSettings, ServoState};
 
-/// Largest difference that is allowed for a table, N.
+/// Largest difference that is allowed, N.
 const MOST_N: f64 = 1e-3;
-/// The same for a mechanism, whose state adds up the roundings.
-const MECHANISM_N: f64 = 0.008;
 
 /// A table in single precision.
 struct Single {
@@ -57,7 +55,8 @@ fn difference_n(realization: &Realization, seed: u64, servo_hz: f64) -> f64 {
     };
     let (table, rule) = (realization.table(), realization.direction);
     let copy = Single::of(&table);
-    let range_mm = realization.trained.x_mm;
+    // The damping of the wall sets in at once at an edge, which both have at the same place.
+    let range_mm = (realization.trained.x_mm).map(|x_mm| f64::from(x_mm as f32));
     let mechanism = realization.mechanism.as_ref().map(|own| own.view());
     let double = Rendering {
         law: match &mechanism {
@@ -130,18 +129,25 @@ fn difference_n(realization: &Realization, seed: u64, servo_hz: f64) -> f64 {
 /// A floor or nearest look-up jumps at a node. There both precisions may be one period
 /// apart, which the shipped tables, with the same single-precision positions, never are.
 #[test]
-fn single_precision_renders_every_shipped_table_within_1_mn_and_mechanism_within_8() {
+fn single_precision_renders_every_shipped_realization_within_1_mn() {
     let mut worst = (0.0, String::new());
-    for (name, realization) in super::shipped::shipped() {
-        for (seed, servo_hz) in [(1, 4000.0), (2, 1000.0), (3, 10_000.0)] {
+    let keyboard = super::shipped::of_protocol("keyboard");
+    for (name, realization) in super::shipped::shipped().into_iter().chain(keyboard) {
+        let rates_hz = [4000.0, 1000.0, 10_000.0, 10_000.0];
+        // A mechanism's follower multiplies roundings where it snaps, in some motions 1,000-fold.
+        let motions = if realization.mechanism.is_some() {
+            24
+        } else {
+            3
+        };
+        for (seed, servo_hz) in (1..=motions).zip(rates_hz.into_iter().cycle()) {
             let error_n = difference_n(&realization, seed, servo_hz);
-            let most_n = match realization.mechanism {
-                Some(_) => MECHANISM_N,
-                None => MOST_N,
-            };
-            assert!(error_n < most_n, "{name} at {servo_hz} Hz: {error_n} N");
+            assert!(
+                error_n < MOST_N,
+                "{name} at {servo_hz} Hz, motion {seed}: {error_n} N"
+            );
             if error_n > worst.0 {
-                worst = (error_n, format!("{name} at {servo_hz} Hz"));
+                worst = (error_n, format!("{name} at {servo_hz} Hz, motion {seed}"));
             }
         }
     }

@@ -17,8 +17,15 @@ const UNCERTIFIED_N: f64 = 9.0;
 pub(crate) fn shipped() -> BTreeMap<String, Realization> {
     // the same file in two protocols counts once
     ["turn-signal", "turn-signal-extended", "turn-signal-passive"]
-        .iter()
-        .flat_map(|protocol| fs::read_dir(format!("protocols/{protocol}/models")).unwrap())
+        .into_iter()
+        .flat_map(of_protocol)
+        .collect()
+}
+
+/// Those of a protocol, by identifier.
+pub(crate) fn of_protocol(protocol: &str) -> BTreeMap<String, Realization> {
+    fs::read_dir(format!("protocols/{protocol}/models"))
+        .unwrap()
         .map(|entry| {
             let path = entry.unwrap().path();
             let text = fs::read_to_string(&path).unwrap();

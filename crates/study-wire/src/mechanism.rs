@@ -20,6 +20,7 @@
 
 mod profile;
 mod state;
+mod sum;
 
 use crate::certificate::{Certificate, Margin};
 use crate::real::Real;

@@ -2,8 +2,8 @@
 //! precision only.
 //!
 //! A table on the wire, its certificate and all settings are `f64` with either. With `f32`
-//! the servo converts them once and renders every shipped table within 1 mN of `f64`, and the
-//! shipped mechanism within 5 mN (`tests/device/precision.rs`).
+//! the servo converts them once and renders every shipped realization within 1 mN of `f64`
+//! (`tests/device/precision.rs`).
 
 use core::fmt::Debug;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub};

@@ -57,7 +57,11 @@ impl<R: Real> Profile<'_, R> {
     /// The weights of a Catmull–Rom spline: once continuously differentiable, so that it is
     /// the gradient of a potential, and each value reaches two intervals to either side.
     pub fn spline(&self, x_mm: R) -> Around<R> {
-        let (left, t) = match self.interval(x_mm) {
+        self.around(self.interval(x_mm))
+    }
+
+    fn around(&self, interval: Result<(usize, R), usize>) -> Around<R> {
+        let (left, t) = match interval {
             Ok(place) => place,
             Err(end) => {
                 return Around {
@@ -89,9 +93,24 @@ impl<R: Real> Profile<'_, R> {
         }
     }
 
+    /// The value of the spline at x − behind, N. The share of the interval is taken from its
+    /// own end, so that neither the position nor its place among the values rounds it.
+    pub fn spline_behind_n(&self, x_mm: R, behind_mm: R) -> R {
+        let mut around = self.interval(x_mm - behind_mm);
+        if let Ok((left, share)) = &mut around {
+            // `left` is at most 65,535
+            let end_mm = self.first_mm + R::of(*left as f64) * self.step_mm;
+            *share = ((x_mm - end_mm) - behind_mm) / self.step_mm;
+        }
+        self.value_n(&self.around(around))
+    }
+
     /// The value of the spline, N.
     pub fn spline_n(&self, x_mm: R) -> R {
-        let around = self.spline(x_mm);
+        self.value_n(&self.spline(x_mm))
+    }
+
+    fn value_n(&self, around: &Around<R>) -> R {
         let mut sum = R::ZERO;
         for (i, weight) in around.at.iter().zip(around.weight) {
             sum += weight * R::of(self.n[*i]);

@@ -1,19 +1,22 @@
 //! The state of a mechanism and its step.
 
+use super::sum::Sum;
 use super::{MechanismView, Scalars};
 use crate::predict::Motion;
 use crate::real::Real;
 
 /// The state of a mechanism. The follower's position is stored as its distance from the
-/// handle, which single precision resolves as well in the slowest motion.
+/// handle, which single precision resolves as well in the slowest motion; this distance and
+/// the speed change by small amounts, whose roundings are kept: a contact after a flight of
+/// the follower multiplies them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct State<R = f64> {
     /// The last position of the handle, mm.
     x_mm: R,
     /// How far the follower is behind the handle, x − y, mm.
-    apart_mm: R,
+    apart_mm: Sum<R>,
     /// Speed of the follower, mm/s.
-    pub w_mm_s: R,
+    pub(super) w_mm_s: Sum<R>,
     /// Deflection of the follower's bristle, in presliding lengths.
     pub z: R,
     /// Deflection of the handle's bristle, in presliding lengths.
@@ -27,8 +30,8 @@ impl<R: Real> State<R> {
     pub fn at_rest(x_mm: R) -> Self {
         Self {
             x_mm,
-            apart_mm: R::ZERO,
-            w_mm_s: R::ZERO,
+            apart_mm: Sum::of(R::ZERO),
+            w_mm_s: Sum::of(R::ZERO),
             z: R::ZERO,
             z_handle: R::ZERO,
             bristle_n: R::ZERO,
@@ -42,35 +45,43 @@ impl<R: Real> State<R> {
 
     /// Position of the follower, mm.
     pub fn y_mm(&self) -> R {
-        self.x_mm - self.apart_mm
+        self.x_mm - self.apart_mm.value
+    }
+
+    /// Speed of the follower, mm/s.
+    pub fn w_mm_s(&self) -> R {
+        self.w_mm_s.value
     }
 
     /// The next `dt_s` seconds, at the end of which the handle is at `motion`. Returns the
     /// force that the hand has to apply without m·a, N.
     pub fn step(&mut self, mechanism: &MechanismView<'_, R>, motion: Motion<R>, dt_s: R) -> R {
         let p = &mechanism.scalars;
-        let ratio = self.w_mm_s / p.stribeck_mm_s;
+        let w_mm_s = self.w_mm_s.value;
+        let ratio = w_mm_s / p.stribeck_mm_s;
         let g = R::ONE + p.stribeck * (-ratio * ratio).exp();
         let loading = dt_s / p.slip_mm;
-        let kept = R::ONE / (R::ONE + loading * self.w_mm_s.abs() / g);
-        let y_mm = self.y_mm();
-        let friction_n = mechanism.friction.linear_n(y_mm);
+        let kept = R::ONE / (R::ONE + loading * w_mm_s.abs() / g);
+        let friction_n = mechanism.friction.linear_n(self.y_mm());
+        let detent_n = (mechanism.detent).spline_behind_n(self.x_mm, self.apart_mm.value);
         // kg·mm/s² are mN
         let inertia = R::of(1e-3) * p.follower_kg / dt_s;
         let least = R::HALF * mechanism.steepest_n_per_mm * dt_s;
-        let damping = p.follower_n_s_per_mm.max(least);
-        // without contact: drag · w' = push
-        let drag = inertia + damping + friction_n * loading * kept;
-        let push =
-            inertia * self.w_mm_s - mechanism.detent.spline_n(y_mm) - friction_n * self.z * kept;
+        let damping = p.follower_n_s_per_mm.max(least) + friction_n * loading * kept;
         let moved_mm = motion.x_mm - self.x_mm;
-        let apart_mm = self.apart_mm + moved_mm;
-        let (w_mm_s, contact_n) = contact(p, apart_mm, motion.v_mm_s, drag, push, dt_s);
+        let apart = self.apart_mm.plus(moved_mm);
+        let (faster_mm_s, contact_n) = Follower {
+            apart,
+            w_mm_s: self.w_mm_s,
+            drag: inertia + damping,
+            push: -detent_n - friction_n * self.z * kept - damping * w_mm_s,
+        }
+        .contact(p, motion.v_mm_s, dt_s);
 
+        self.w_mm_s = self.w_mm_s.plus(faster_mm_s);
         self.bristle_n = friction_n;
-        self.z = (self.z + loading * w_mm_s) * kept;
-        self.w_mm_s = w_mm_s;
-        self.apart_mm = apart_mm - dt_s * w_mm_s;
+        self.z = (self.z + loading * self.w_mm_s.value) * kept;
+        self.apart_mm = apart.plus(-dt_s * self.w_mm_s.value);
         let moved = moved_mm / p.handle_slip_mm;
         self.z_handle = (self.z_handle + moved) / (R::ONE + moved.abs());
         self.x_mm = motion.x_mm;
@@ -91,11 +102,11 @@ impl State {
             let force_n =
                 mechanism.detent.spline_n(y_mm) + sign * mechanism.friction.linear_n(y_mm);
             let behind = 0.5 * p.gap_mm + libm::fabs(force_n) / p.contact_n_per_mm;
-            state.apart_mm = if force_n < 0.0 { -behind } else { behind };
+            state.apart_mm = Sum::of(if force_n < 0.0 { -behind } else { behind });
         }
         state.bristle_n = mechanism.friction.linear_n(state.y_mm());
         Self {
-            w_mm_s: motion.v_mm_s,
+            w_mm_s: Sum::of(motion.v_mm_s),
             z: sign,
             z_handle: sign,
             ..state
@@ -105,38 +116,57 @@ impl State {
     /// The energy that is stored beside that of the detents and of F_0, N·mm (mJ).
     pub fn stored_n_mm(&self, mechanism: &MechanismView<'_>) -> f64 {
         let p = &mechanism.scalars;
-        let deep = (libm::fabs(self.apart_mm) - 0.5 * p.gap_mm).max(0.0);
-        0.5e-3 * p.follower_kg * self.w_mm_s * self.w_mm_s
+        let deep = (libm::fabs(self.apart_mm.value) - 0.5 * p.gap_mm).max(0.0);
+        let w_mm_s = self.w_mm_s.value;
+        0.5e-3 * p.follower_kg * w_mm_s * w_mm_s
             + 0.5 * p.contact_n_per_mm * deep * deep
             + 0.5 * self.bristle_n * p.slip_mm * self.z * self.z
             + 0.5 * p.handle_n * p.handle_slip_mm * self.z_handle * self.z_handle
     }
 }
 
-/// The speed of the follower at the end of a step, mm/s, and the force of the contact, N.
-///
-/// The force falls with the speed of the follower, so exactly one of four cases holds: no
-/// contact, contact, contact whose damper would pull, and contact that begins or ends at the
-/// edge of the gap.
-fn contact<R: Real>(p: &Scalars<R>, apart_mm: R, v_mm_s: R, drag: R, push: R, dt_s: R) -> (R, R) {
-    let free = push / drag;
-    let half = R::HALF * p.gap_mm;
-    let after = apart_mm - dt_s * free;
-    if after.abs() <= half {
-        return (free, R::ZERO);
-    }
-    let side = if after > R::ZERO { R::ONE } else { -R::ONE };
-    let edge_mm = apart_mm - side * half;
-    let (k, c) = (p.contact_n_per_mm, p.contact_n_s_per_mm);
-    let held = (push + k * edge_mm + c * v_mm_s) / (drag + k * dt_s + c);
-    let deep = edge_mm - dt_s * held;
-    let force = k * deep + c * (v_mm_s - held);
-    if side * force <= R::ZERO {
-        (free, R::ZERO)
-    } else if side * deep < R::ZERO {
-        let at_edge = edge_mm / dt_s;
-        (at_edge, drag * at_edge - push)
-    } else {
-        (held, force)
+/// The follower before the contact of a step.
+struct Follower<R> {
+    /// How far it would be behind the handle without moving, mm.
+    apart: Sum<R>,
+    /// Its speed before the step, mm/s.
+    w_mm_s: Sum<R>,
+    /// N·s/mm, and the force at its speed, N: without contact it becomes faster by
+    /// push / drag.
+    drag: R,
+    push: R,
+}
+
+impl<R: Real> Follower<R> {
+    /// By how much it is faster at the end of the step, mm/s, and the force of the contact, N.
+    ///
+    /// The force falls with the speed of the follower, so exactly one of four cases holds: no
+    /// contact, contact, contact whose damper would pull, and contact that begins or ends at
+    /// the edge of the gap.
+    fn contact(&self, p: &Scalars<R>, v_mm_s: R, dt_s: R) -> (R, R) {
+        let (drag, push) = (self.drag, self.push);
+        let free = push / drag;
+        let half = R::HALF * p.gap_mm;
+        let moved_mm = dt_s * self.w_mm_s.value;
+        let after = self.apart.value - moved_mm - dt_s * free;
+        if after.abs() <= half {
+            return (free, R::ZERO);
+        }
+        let side = if after > R::ZERO { R::ONE } else { -R::ONE };
+        // at the old speed
+        let edge_mm = (self.apart.value - side * half) + self.apart.rest - moved_mm;
+        let closing_mm_s = (v_mm_s - self.w_mm_s.value) - self.w_mm_s.rest;
+        let (k, c) = (p.contact_n_per_mm, p.contact_n_s_per_mm);
+        let held = (push + k * edge_mm + c * closing_mm_s) / (drag + k * dt_s + c);
+        let deep = edge_mm - dt_s * held;
+        let force = k * deep + c * (closing_mm_s - held);
+        if side * force <= R::ZERO {
+            (free, R::ZERO)
+        } else if side * deep < R::ZERO {
+            let at_edge = edge_mm / dt_s;
+            (at_edge, drag * at_edge - push)
+        } else {
+            (held, force)
+        }
     }
 }

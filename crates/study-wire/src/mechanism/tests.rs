@@ -1,5 +1,6 @@
 //! Forces with known answers, and the energy balance under adversarial motions.
 
+use super::sum::Sum;
 use super::*;
 use crate::predict::Motion;
 use core::f64::consts::TAU;
@@ -326,7 +327,7 @@ fn no_motion_draws_more_energy_than_is_stored() {
                 );
                 dissipated += supplied - (after - before);
                 drawn = drawn.min(supplied);
-                fastest = fastest.max(state.w_mm_s.abs());
+                fastest = fastest.max(state.w_mm_s().abs());
                 before = after;
             }
         }
@@ -348,7 +349,7 @@ fn the_least_damping_of_the_follower_is_needed() {
     let rise = |of: &MechanismView<'_>| {
         let potential = Potential::new(of.detent);
         let mut state = State::at_rest(5.25);
-        state.w_mm_s = 50.0;
+        state.w_mm_s = Sum::of(50.0);
         let energy = |state: &State| state.stored_n_mm(of) + potential.at(state.y_mm());
         let mut worst = f64::NEG_INFINITY;
         let mut before = energy(&state);

@@ -52,7 +52,7 @@ impl Sensitive {
         Self {
             x_mm: state.x_mm(),
             y_mm: state.y_mm(),
-            w_mm_s: state.w_mm_s,
+            w_mm_s: state.w_mm_s(),
             z: state.z,
             z_handle: state.z_handle,
             by_y: none(),
