@@ -240,8 +240,8 @@ fn all_patterns(all: Vec<Declared>) -> Vec<String> {
 }
 
 /// The part of the schema that describes the statistics.
-fn described() -> Value {
-    let schemas = statistics(Results::declared())
+fn described(declared: Vec<Declared>) -> Value {
+    let schemas = statistics(declared)
         .into_iter()
         .flat_map(|(id, doc, list)| {
             let of = if list { "list" } else { "statistic" };
@@ -313,15 +313,19 @@ fn the_documents_have_the_declared_statistics() {
 }
 
 #[test]
-fn the_schema_has_the_declared_statistics() {
-    let mut schema = study_report::json::schema();
-    schema["properties"]["values"] = described();
-    schema["$defs"] = json!({
-        "statistic": { "type": ["number", "null"] },
-        "list": { "type": ["array", "null"], "items": { "type": "number" } },
-    });
-    let path = Path::new(ROOT).join("docs/study-analysis-1.schema.json");
-    compare(&path, &(printed(&schema, 0) + "\n"));
+fn the_schemas_have_the_declared_statistics() {
+    let mut ratings = study_report::json::schema();
+    ratings["properties"]["values"] = described(Results::declared());
+    let mut parts = study_report::json::parts_schema();
+    parts["properties"]["parts"]["items"]["properties"]["values"] = described(of_parts());
+    for (name, mut schema) in [("analysis", ratings), ("parts", parts)] {
+        schema["$defs"] = json!({
+            "statistic": { "type": ["number", "null"] },
+            "list": { "type": ["array", "null"], "items": { "type": "number" } },
+        });
+        let path = Path::new(ROOT).join(format!("docs/study-{name}-1.schema.json"));
+        compare(&path, &(printed(&schema, 0) + "\n"));
+    }
 }
 
 #[test]

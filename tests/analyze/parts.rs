@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+use crate::schema::described;
 use assert_cmd::Command;
 use serde_json::Value;
 use std::fs;
@@ -23,6 +24,15 @@ pub(crate) fn study(arguments: &[&str], folder: &Path) -> (i32, String, String) 
     (code, text(output.stdout), text(output.stderr))
 }
 
+/// The analysis of the study in `out`, which is as its schema describes it.
+pub(crate) fn analyzed(folder: &Path) -> Value {
+    let (code, out, err) = study(&["analyze", "out", "--json"], folder);
+    assert_eq!(code, 0, "{err}");
+    let document = serde_json::from_str(&out).unwrap();
+    assert_eq!(described(&document), Ok(()));
+    document
+}
+
 /// Rehearses the protocol of `study new --kind KIND`; the analysis of its only part, and
 /// the study's folder.
 fn rehearsed(folder: &Path, kind: &str) -> Value {
@@ -33,9 +43,7 @@ fn rehearsed(folder: &Path, kind: &str) -> Value {
         let (code, _, err) = study(&arguments, folder);
         assert_eq!(code, 0, "{err}");
     }
-    let (code, out, err) = study(&["analyze", "out", "--json"], folder);
-    assert_eq!(code, 0, "{err}");
-    let document: Value = serde_json::from_str(&out).unwrap();
+    let document = analyzed(folder);
     assert_eq!(document["format"], "study-parts/1");
     let part = document["parts"][0].clone();
     assert_eq!(part["simulated"], true);
@@ -175,8 +183,7 @@ fn pairs_of_a_study_give_the_abilities_of_their_table() {
     ];
     let (code, _, err) = study(&exclude, folder.path());
     assert_eq!(code, 0, "{err}");
-    let (_, out, _) = study(&["analyze", "out", "--json"], folder.path());
-    let document: Value = serde_json::from_str(&out).unwrap();
+    let document = analyzed(folder.path());
     assert_eq!(document["parts"][0]["trials"], answers.len() / 2);
 }
 
@@ -262,8 +269,7 @@ fn exclusion_rules_apply_to_parts() {
     let rehearse = ["rehearse", "pairs", "--participants", "3", "--out", "out"];
     let (code, _, err) = study(&rehearse, folder.path());
     assert_eq!(code, 0, "{err}");
-    let (_, out, err) = study(&["analyze", "out", "--json"], folder.path());
-    let document: Value = serde_json::from_str(&out).unwrap_or_else(|_| panic!("{err}"));
+    let document = analyzed(folder.path());
     let part = &document["parts"][0];
     // A trial goes by the interval with the fewest strokes.
     let columns = ["participant", "trial", "attempt", "strokes"];
@@ -351,9 +357,7 @@ fn ratings_beside_a_reference_are_screened_and_rated_as_their_table() {
     assert!(second.iter().any(|i| i[1] == "target"));
     assert_eq!(second.len(), 30);
     // The ratings are numbers: the report of ratings, and the part with its screening.
-    let (code, out, err) = study(&["analyze", "out", "--json"], folder.path());
-    assert_eq!(code, 0, "{err}");
-    let document: Value = serde_json::from_str(&out).unwrap();
+    let document = analyzed(folder.path());
     assert_eq!(document["format"], "study-analysis/1");
     assert_eq!(
         document["parts"][0]["values"],
@@ -384,7 +388,7 @@ fn yes_no_and_abx_are_rehearsed_and_analyzed() {
         fs::write(&file, fewer.replace("repetitions = 40", "repetitions = 12")).unwrap();
         study(&["rehearse", "p", "--participants", "1", "--out", "out"]);
         study(&["verify", "out"]);
-        let document: Value = serde_json::from_str(&study(&["analyze", "out", "--json"])).unwrap();
+        let document = analyzed(folder.path());
         let values = &document["parts"][0]["values"];
         assert!(values[statistic].is_number(), "{values}");
     }

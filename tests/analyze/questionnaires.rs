@@ -3,7 +3,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use crate::parts::{cells, study};
+use crate::parts::{analyzed, cells, study};
 use serde_json::Value;
 use std::fs;
 
@@ -16,12 +16,6 @@ kind = "sus"
 id = "load"
 kind = "nasa-tlx"
 "#;
-
-fn document(folder: &std::path::Path) -> Value {
-    let (code, out, err) = study(&["analyze", "out", "--json"], folder);
-    assert_eq!(code, 0, "{err}");
-    serde_json::from_str(&out).unwrap()
-}
 
 #[test]
 fn questionnaires_are_answered_scored_and_reported() {
@@ -36,7 +30,7 @@ fn questionnaires_are_answered_scored_and_reported() {
     assert_eq!(code, 0, "{err}");
     let (code, out, err) = study(&["verify", "out"], folder.path());
     assert_eq!(code, 0, "{out}{err}");
-    let document = document(folder.path());
+    let document = analyzed(folder.path());
     let [sus, load] = [0, 1].map(|i| &document["parts"][i]);
     assert_eq!(
         (&sus["task"], &load["task"]),
@@ -87,7 +81,7 @@ fn magnitudes_of_realizations_are_estimated_and_compared() {
     let arguments = ["rehearse", "m", "--participants", "3", "--out", "out"];
     let (code, _, err) = study(&arguments, folder.path());
     assert_eq!(code, 0, "{err}");
-    let document = document(folder.path());
+    let document = analyzed(folder.path());
     assert_eq!(document["format"], "study-parts/1");
     let part = &document["parts"][0];
     assert_eq!(
@@ -139,7 +133,7 @@ fn the_share_of_an_answer_is_analyzed() {
     let arguments = ["rehearse", "s", "--participants", "5", "--out", "out"];
     let (code, _, err) = study(&arguments, folder.path());
     assert_eq!(code, 0, "{err}");
-    let document = document(folder.path());
+    let document = analyzed(folder.path());
     let given = cells(
         &folder.path().join("out/s/ratings.csv"),
         &["model", "realism"],

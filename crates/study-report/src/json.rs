@@ -4,8 +4,9 @@ mod object;
 
 use super::{Site, SiteDevice, Source};
 use object::{
-    Answer, Answered, Decisive, Device, Document, End, Estimated, Format, IfAny, Member as _, Note,
-    Numbers, Part, Place, Preregistered, Realization, RoleWord, Rule, Statistics, Study, Way,
+    Answer, Answered, Decisive, Device, Document, End, Estimated, Format, IfAny, Member, Note,
+    Numbers, Part, PartsDocument, PartsFormat, Place, Preregistered, Realization, RoleWord, Rule,
+    Statistics, Study, Way,
 };
 use serde_json::{Map, Value as Json, json};
 use study_analysis::analyze::findings::Estimate;
@@ -19,6 +20,8 @@ use study_analysis::preregister::Comparison;
 
 /// Name and version of the format.
 pub const FORMAT: &str = "study-analysis/1";
+/// That of [`parts`].
+const PARTS_FORMAT: &str = "study-parts/1";
 
 fn estimate(e: &Estimate) -> Estimated {
     Estimated {
@@ -106,37 +109,41 @@ fn exclusions(all: &[Applied]) -> Vec<Rule> {
     all.iter().map(one).collect()
 }
 
-fn part(part: &PartAnalysis) -> Json {
+fn part(part: &PartAnalysis) -> Part {
     let (values, undefined) = statistics(&part.values());
-    json!({
-        "part": part.part,
-        "task": part.task,
-        "trials": part.trials,
-        "simulated": part.simulated,
-        "pilot": part.pilot,
-        "values": values,
-        "undefined": undefined,
-        "participants": part.participants,
-        "alpha": part.alpha,
-        "findings": part.findings.iter().map(|f| finding(f, f.question.id())).collect::<Vec<_>>().json(),
-        "warnings": notes(&part.warnings).json(),
-        "exclusions": exclusions(&part.exclusions).json(),
-    })
+    Part {
+        part: part.part.to_string(),
+        task: part.task.to_owned(),
+        trials: part.trials,
+        simulated: part.simulated,
+        pilot: part.pilot,
+        values: Statistics(values),
+        undefined,
+        participants: part.participants,
+        alpha: part.alpha,
+        findings: (part.findings.iter())
+            .map(|f| finding(f, f.question.id()))
+            .collect(),
+        warnings: notes(&part.warnings),
+        exclusions: exclusions(&part.exclusions),
+    }
 }
 
 /// The statistics of the parts of a study that are not ratings, `study-parts/1`.
 pub fn parts(source: &Source, parts: &[PartAnalysis]) -> String {
-    let mut document = json!({
-        "format": "study-parts/1",
-        "tool_version": env!("CARGO_PKG_VERSION"),
-        "path": source.path,
-        "study": source.study.as_deref().unwrap_or_default(),
-        "parts": parts.iter().map(part).collect::<Vec<_>>(),
-    });
-    if let Some(comparison) = &source.preregistration {
-        document["preregistration"] = json!(preregistered(comparison).json());
-    }
-    format!("{document:#}\n")
+    let document = PartsDocument {
+        format: PartsFormat(PARTS_FORMAT),
+        tool_version: env!("CARGO_PKG_VERSION").to_owned(),
+        path: source.path.clone(),
+        study: source.study.clone().unwrap_or_default(),
+        parts: parts.iter().map(part).collect(),
+        preregistration: IfAny(source.preregistration.as_ref().map(preregistered)),
+    };
+    printed(document)
+}
+
+fn printed(document: impl Member) -> String {
+    format!("{:#}\n", document.json().unwrap_or_default())
 }
 
 fn preregistered(c: &Comparison) -> Preregistered {
@@ -168,12 +175,25 @@ fn place(site: &Site) -> Place {
 
 /// The JSON Schema of [`document`]; it says of statistics only that they are an object.
 pub fn schema() -> Json {
-    let mut schema = Document::schema();
+    described::<Document>(
+        FORMAT,
+        "An analysis of ratings, as `study analyze --json` prints it. docs/statistics.md defines the statistics.",
+    )
+}
+
+/// The same of [`parts`].
+pub fn parts_schema() -> Json {
+    described::<PartsDocument>(
+        PARTS_FORMAT,
+        "An analysis of parts that are not ratings, as `study analyze --json` prints it. docs/statistics-psychophysics.md defines the statistics.",
+    )
+}
+
+fn described<T: Member>(format: &str, description: &str) -> Json {
+    let mut schema = T::schema();
     schema["$schema"] = json!("https://json-schema.org/draft/2020-12/schema");
-    schema["title"] = json!(FORMAT);
-    schema["description"] = json!(
-        "An analysis of ratings, as `study analyze --json` prints it. docs/statistics.md defines the statistics."
-    );
+    schema["title"] = json!(format);
+    schema["description"] = json!(description);
     schema
 }
 
@@ -187,7 +207,7 @@ pub fn document(source: &Source, a: &Analysis) -> String {
         duplicate_of: m.duplicate_of.clone(),
         vaf: m.vaf,
     };
-    let parts: Vec<Part> = a.parts.iter().map(part).map(Part).collect();
+    let parts: Vec<Part> = a.parts.iter().map(part).collect();
     let sites: Vec<Place> = source.sites.iter().map(place).collect();
     let document = Document {
         format: Format(FORMAT),
@@ -234,5 +254,5 @@ pub fn document(source: &Source, a: &Analysis) -> String {
         sites: IfAny(Some(sites).filter(|all| !all.is_empty())),
         preregistration: IfAny(source.preregistration.as_ref().map(preregistered)),
     };
-    format!("{:#}\n", document.json().unwrap_or_default())
+    printed(document)
 }

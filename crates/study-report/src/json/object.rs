@@ -152,6 +152,8 @@ macro_rules! objects {
 words! {
     /// The format of the document.
     Format = ["study-analysis/1"],
+    /// That of the document of parts.
+    PartsFormat = ["study-parts/1"],
     /// The answer of a finding.
     Answer = ["yes", "not shown", "undefined"],
     /// The direction of an effect.
@@ -168,19 +170,6 @@ pub(super) struct Statistics(pub(super) Map<String, Json>);
 impl Member for Statistics {
     fn json(self) -> Option<Json> {
         Some(Json::Object(self.0))
-    }
-
-    fn schema() -> Json {
-        json!({ "type": "object" })
-    }
-}
-
-/// Documents of the parts.
-pub(super) struct Part(pub(super) Json);
-
-impl Member for Part {
-    fn json(self) -> Option<Json> {
-        Some(self.0)
     }
 
     fn schema() -> Json {
@@ -221,6 +210,44 @@ objects! {
         sites: IfAny<Vec<Place>>,
         /// how the study compares with its preregistration; only if it has one
         preregistration: IfAny<Preregistered>,
+    }
+
+    /// The document of the parts that are not ratings.
+    PartsDocument {
+        format: PartsFormat,
+        /// version of the program
+        tool_version: String,
+        /// as it was given
+        path: String,
+        /// its id
+        study: String,
+        parts: Vec<Part>,
+        /// how the study compares with its preregistration; only if it has one
+        preregistration: IfAny<Preregistered>,
+    }
+
+    /// A part.
+    Part {
+        part: String,
+        /// the kind of its trials, or the questionnaire
+        task: String,
+        /// number of trials with an answer that counts, or of questionnaires with a score
+        trials: usize,
+        /// whether answers of simulated participants are among them
+        simulated: bool,
+        /// whether answers of pilots are among them
+        pilot: bool,
+        /// statistics by identifier; null if undefined
+        values: Statistics,
+        /// why a statistic is undefined, by identifier
+        undefined: Map<String, Json>,
+        /// number of participants with such a trial
+        participants: usize,
+        /// level of significance of every test
+        alpha: f64,
+        findings: Vec<Answered>,
+        warnings: Vec<Note>,
+        exclusions: Vec<Rule>,
     }
 
     /// Where the ratings come from.
