@@ -151,11 +151,13 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let address = &args.device.address;
     let plain = args.plain || wants_plain(|name| std::env::var(name).ok());
     let mut simulated = false;
+    let mut front_name = None;
     let own: Option<Box<dyn Own>> = match (args.screen, &args.front) {
         (Some(at), _) => Some(Box::new(page::open(at, &loaded.protocol, plain, console)?)),
         (None, Some(command)) => {
             let front = page::start(command, &loaded.protocol)?;
             simulated = front.hello().is_some_and(|hello| hello.simulated);
+            front_name = front.hello().map(|hello| hello.front.clone());
             Some(Box::new(front))
         }
         (None, None) => None,
@@ -231,6 +233,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let config = Config {
         participant: args.participant.clone().unwrap_or_default(),
         operator: args.operator.clone().unwrap_or_default(),
+        front: front_name,
         roster: Some(Arc::new(roster(
             &known,
             seats,

@@ -67,6 +67,7 @@ pub fn run_one(
     let config = Config {
         participant: participant.to_owned(),
         operator: "simulated".to_owned(),
+        front: None,
         auto_identify: true,
         ..Config::default()
     };

@@ -67,6 +67,7 @@ fn row(who: &str, model: &str, repetition: u32, rating: i64) -> RatingRow {
         fidelity: None,
         host_late_ms: None,
         input_channel: None,
+        front_name: None,
         group: None,
         session_id: None,
     }

@@ -126,6 +126,9 @@ fn the_example_takes_part_in_a_whole_session() {
     session.end(&[""]);
     let journal = journal(folder.path());
     assert_eq!(journal[0]["claim"]["seat"], json!({"simulated": 1}));
+    assert_eq!(journal[1]["front"], "example 1");
+    let ratings = folder.path().join("results/turn-signal/ratings.csv");
+    assert!(fs::read_to_string(ratings).unwrap().contains(",example 1"));
     let rated = journal
         .iter()
         .filter(|e| e["event"] == "answered" && e["question"] == "realism");

@@ -156,6 +156,7 @@ pub fn started(id: &str, session: u32, seat: Seat) -> Event {
         device_kind: DeviceKind::Simulated,
         device_id: "sim-1".to_owned(),
         device_check: None,
+        front: None,
         tool_version: "0.1.0".to_owned(),
         protocol_version: 1,
         fingerprints: fingerprints(),

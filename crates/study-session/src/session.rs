@@ -61,6 +61,8 @@ pub struct Config {
     pub participant: String,
     /// Operator code shown on the first screen; may be empty.
     pub operator: String,
+    /// Name and version of the participant's front, if it is a program of somebody else.
+    pub front: Option<String>,
     /// Who is known already, for a line on the first screen.
     pub roster: Option<Arc<Roster>>,
     /// Use the presets without showing the first screen.
@@ -76,6 +78,7 @@ pub struct Session {
     /// As typed on the first screen.
     participant: String,
     operator: String,
+    front: Option<String>,
     roster: Option<Arc<Roster>>,
     /// Seat and device; `None` until the session's folder is claimed.
     claim: Option<ClaimFacts>,
@@ -135,6 +138,7 @@ impl Session {
             orders,
             participant: config.participant.clone(),
             operator: config.operator.clone(),
+            front: config.front,
             roster: config.roster,
             claim: None,
             history: History::default(),

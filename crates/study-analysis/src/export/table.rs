@@ -385,7 +385,7 @@ impl<'a> Tables<'a> {
                 _ if column.repeats == Repeats::Covariate => field = covariate_field(name),
                 "vaf" | "rendered_vaf" | "delivered_vaf" => field.max = Some(1.0),
                 "level" | "level_proposed" => field = level_field(field, protocol),
-                "operator" | "device_id" | "remarks" | "reason" => field.free = true,
+                "operator" | "device_id" | "front_name" | "remarks" | "reason" => field.free = true,
                 name if is_realization(name) => field.levels.clone_from(&levels),
                 _ => {}
             }

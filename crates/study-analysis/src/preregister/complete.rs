@@ -366,6 +366,7 @@ impl Made<'_> {
             fidelity: None,
             host_late_ms: None,
             input_channel: None,
+            front_name: None,
             group: who.group.map(|g| g.id.clone()),
             session_id: who.session_id.cloned(),
         });

@@ -327,6 +327,8 @@ table! {
             "how late this computer's thread for the device was at most during the playback",
         ).unit("ms").empty("not measured").optional(),
         InputChannel: INPUT_CHANNEL.empty("not answered, or not by a person"),
+        FrontName: text("front_name", "program of `--front` that asked the participant, as it says")
+            .empty("none: the program's own screen").optional(),
         Group: text("group", "group of the participant").empty("the study has no groups")
             .optional().with_parts(),
         SessionId: text("session_id", "planned session, of `[[sessions]]`")

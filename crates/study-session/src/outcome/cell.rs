@@ -299,6 +299,7 @@ row! {
         Replays: replays,
         HostLateMs: host_late_ms,
         InputChannel: input_channel,
+        FrontName: front_name,
         Group: group,
         SessionId: session_id,
         ..fidelity {

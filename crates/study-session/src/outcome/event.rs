@@ -223,6 +223,9 @@ pub struct Start {
     /// Result of the device's last commissioning test, if known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub device_check: Option<String>,
+    /// Name and version of the front on which the participant answers, as it says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub front: Option<String>,
     /// Version of this program.
     pub tool_version: String,
     /// Frozen version of the protocol.
@@ -257,6 +260,9 @@ pub enum Event {
         tool_version: String,
         /// Device from now on.
         device_id: String,
+        /// Front from now on.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        front: Option<String>,
         /// Wall-clock time since the last activity, s.
         gap_s: f64,
         /// The operator's choice; `None` if the gap was short enough to continue

@@ -164,6 +164,7 @@ impl History {
                 operator,
                 tool_version,
                 device_id,
+                front,
                 choice,
                 queue,
                 ..
@@ -172,6 +173,7 @@ impl History {
                     operator: operator.clone(),
                     tool_version: tool_version.clone(),
                     device_id: device_id.clone(),
+                    front: front.clone(),
                 };
                 self.reopened(*choice, queue, at);
             }
@@ -316,6 +318,7 @@ impl History {
                 operator: start.operator.clone(),
                 tool_version: start.tool_version.clone(),
                 device_id: start.device_id.clone(),
+                front: start.front.clone(),
             };
             self.start = Some((at, Box::new(start.clone())));
         }

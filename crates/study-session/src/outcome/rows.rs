@@ -77,6 +77,7 @@ pub struct RatingRow {
     pub fidelity: Option<Fidelity>,
     pub host_late_ms: Option<f64>,
     pub input_channel: Option<Channel>,
+    pub front_name: Option<String>,
     pub group: Option<PartId>,
     pub session_id: Option<PartId>,
 }

@@ -191,6 +191,7 @@ mod tests {
             fidelity: d.maybe(Draws::fidelity),
             host_late_ms: d.maybe(Draws::number),
             input_channel: d.maybe(|d| d.of(&[Channel::Terminal, Channel::Plain, Channel::Page])),
+            front_name: d.maybe(Draws::text),
             group: d.maybe(Draws::part),
             session_id: d.maybe(Draws::part),
         }

@@ -132,6 +132,7 @@ impl History {
             fidelity: worst.cloned(),
             host_late_ms: played.and_then(|p| Some(p.host_late_ms?[1])),
             input_channel: primary.and_then(|g| g.channel),
+            front_name: sitting.front.clone(),
             answers: answers(given.into_iter()),
             group: start.assigned.group.clone(),
             session_id: start.assigned.session_id.clone(),

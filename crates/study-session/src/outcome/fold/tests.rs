@@ -35,6 +35,7 @@ fn journal(events: Vec<Event>) -> Vec<Entry> {
         device_kind: DeviceKind::Simulated,
         device_id: "sim".to_owned(),
         device_check: None,
+        front: Some("a 1".to_owned()),
         tool_version: "0".to_owned(),
         protocol_version: 1,
         fingerprints: Fingerprints {
@@ -116,6 +117,7 @@ fn reopened(choice: Option<Choice>, queue: &[u32]) -> Event {
         operator: "second".to_owned(),
         tool_version: "1".to_owned(),
         device_id: "sim-2".to_owned(),
+        front: None,
         gap_s: 90_000.0,
         choice,
         queue: queue.to_vec(),
@@ -174,10 +176,8 @@ fn a_restarted_block_is_felt_again_and_its_first_answers_do_not_count() {
     let row = rows(events).remove(0);
     assert_eq!((row.status, row.attempt), (Status::Ok, Some(2)));
     assert_eq!(row.answers.values().next().unwrap().number(), Some(2.0));
-    assert_eq!(
-        (row.operator.as_str(), row.device_id.as_str()),
-        ("second", "sim-2")
-    );
+    let now = (row.operator.as_str(), row.device_id.as_str());
+    assert_eq!((now, row.front_name), (("second", "sim-2"), None));
 }
 
 #[test]
@@ -190,6 +190,7 @@ fn a_resume_that_goes_on_keeps_what_was_answered() {
     ]);
     let row = rows(events).remove(0);
     assert_eq!((row.status, row.operator.as_str()), (Status::Ok, "first"));
+    assert_eq!(row.front_name.as_deref(), Some("a 1"));
 }
 
 #[test]

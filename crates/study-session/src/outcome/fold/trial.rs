@@ -36,7 +36,7 @@ impl TrialHistory {
     }
 }
 
-/// Operator, program and device from one start of the program to its end.
+/// Operator, program, device and front from one start of the program to its end.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Sitting {
     /// Operator's initials or code.
@@ -45,6 +45,8 @@ pub struct Sitting {
     pub tool_version: String,
     /// Device.
     pub device_id: String,
+    /// Front of the participant, if it is a program of somebody else.
+    pub front: Option<String>,
 }
 
 /// One attempt at a trial.
