@@ -54,6 +54,7 @@ analyze: protocol procedure outcome stats
 power: protocol procedure outcome analyze stats
 export: protocol outcome analyze
 preregister: protocol outcome analyze
+check: load model power protocol safe_play stats wire
 load: family identify model preregister protocol recording safe_play schedule store wire
 study: analyze load outcome preregister protocol store
 model: wire
@@ -71,7 +72,7 @@ tui: runner page session outcome protocol
 plain: runner page session outcome protocol tui
 screen: runner page session protocol
 front: runner page session protocol
-cli: analyze device export front identify load model outcome plain plant power procedure protocol rater recording rehearsal rendering report runner safe_play schedule screen session stats store study trajectory tui wire
+cli: analyze check device export front identify load model outcome plain plant power procedure protocol rater recording rehearsal rendering report runner safe_play schedule screen session stats store study trajectory tui wire
 main: cli
 certificate: predict
 predict: real

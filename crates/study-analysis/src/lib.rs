@@ -5,6 +5,7 @@
 //! compares it later; [`export`] writes the rows as data sets for other programs.
 
 pub mod analyze;
+pub mod check;
 pub mod export;
 pub mod load;
 pub mod power;
