@@ -5,6 +5,7 @@
 use crate::schema::described;
 use assert_cmd::Command;
 use serde_json::Value;
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
@@ -290,6 +291,15 @@ fn exclusion_rules_apply_to_parts() {
     assert_eq!(part["exclusions"][1]["rows"], 0);
     let problem = part["exclusions"][1]["problem"].as_str().unwrap();
     assert!(problem.contains("not points of a scale"), "{problem}");
+    let who: BTreeSet<&String> = answers.iter().filter(below).map(|a| &a[0]).collect();
+    assert_eq!(part["exclusions"][0]["participants"], who.len());
+    let (_, page, _) = study(&["analyze", "out"], folder.path());
+    let page = page.split_whitespace().collect::<Vec<_>>().join(" ");
+    let said = format!(
+        "The rule strokes-below 7 excludes {excluded} trials of {} participants.",
+        who.len()
+    );
+    assert!(who.len() > 1 && page.contains(&said), "{said}: {page}");
     let before = |id: &&String| id.starts_with("before_exclusion/pairs/ability/");
     assert_eq!(
         part["values"]

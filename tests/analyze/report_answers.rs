@@ -3,7 +3,7 @@
 
 use crate::report_support::{FIVE, analysis_of, golden, html, part, ratings, source, words};
 use std::fmt::Write as _;
-use study_analysis::analyze::{Analysis, Rules, analyze};
+use study_analysis::analyze::{Analysis, Question, Rules, Verdict, analyze};
 use study_report::Source;
 use study_report::html::{Details, document};
 use study_report::text::{Page, page};
@@ -128,6 +128,27 @@ fn linear_and_quadratic_terms_are_tested_at_half_the_level_and_jointly() {
         assert!(text.contains("each at the level .025"), "{text}");
         assert!(text.contains(&format!("F(2, 2) = {f:.2}, p")), "{text}");
     }
+    // A p between half the level and the level shows nothing.
+    let p = ["p", "quadratic/p"].map(|id| {
+        a.values
+            .number(&format!("covariate/log10_memory/{id}"))
+            .unwrap()
+    });
+    let smaller = p[0].min(p[1]);
+    let ratings = Ratings::read_csv("r.csv", csv.as_bytes(), None).unwrap();
+    for (alpha, verdict) in [
+        (1.9 * smaller, Verdict::NotShown),
+        (2.1 * smaller, Verdict::Yes),
+    ] {
+        let rules = Rules {
+            alpha,
+            ..Rules::default()
+        };
+        let a = analyze(&ratings, &rules);
+        let found = a.finding(&Question::Memory).unwrap();
+        assert_eq!(found.verdict, verdict, "{p:?} {alpha}");
+        assert_eq!(found.test.as_ref().unwrap().level, alpha / 2.0);
+    }
 }
 
 #[test]
@@ -225,6 +246,18 @@ fn the_realization_that_alone_drives_r_is_named() {
     }
     let other = analysis_of(&ratings(5, &FIVE, |s, m, _| (m + s % 2) as f64));
     assert!(!terminal(&other).contains("is driven by this"));
+}
+
+#[test]
+fn realizations_that_differ_without_a_trend_are_warned_of() {
+    let warned = |means: [f64; 5]| {
+        let rated = |s: usize, m: usize, k: usize| means[m] + 0.1 * ((s + m * k) % 3) as f64;
+        let a = analysis_of(&ratings(6, &FIVE, rated));
+        assert_eq!(a.finding(&Question::Differ).unwrap().verdict, Verdict::Yes);
+        terminal(&a).contains("look at the means, not only at the slope")
+    };
+    assert!(warned([2.0, 6.0, 3.0, 6.0, 2.0]));
+    assert!(!warned([2.0, 3.0, 4.0, 5.0, 6.0]));
 }
 
 #[test]

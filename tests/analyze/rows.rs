@@ -1,6 +1,7 @@
 //! Which rows of a study are analyzed, and what is reported about the others.
 #![allow(clippy::unwrap_used)]
 
+use crate::report_support::html;
 use chrono::DateTime;
 use std::collections::BTreeMap;
 use study_analysis::analyze::{Analysis, Exclusion, Include, Rules, analyze};
@@ -171,6 +172,69 @@ fn an_analysis_of_simulated_participants_alone_says_so_in_a_banner() {
         text.contains("*** NO PARTICIPANTS: only 2 simulated"),
         "{text}"
     );
+}
+
+/// Each reason for a rating that is missing is counted by itself.
+#[test]
+fn failed_and_declined_trials_are_told_apart() {
+    let mut rows = two();
+    for (row, status) in (rows.iter_mut()).zip([Status::Failed, Status::Declined, Status::Failed]) {
+        row.answers.clear();
+        row.status = status;
+    }
+    let a = analyze(&ratings(&rows, &[]), &Rules::default());
+    assert_eq!((a.counts.failed, a.counts.declined), (2, 1));
+    let text = printed(&a);
+    assert!(
+        text.contains("2 trials failed · 1 rating declined"),
+        "{text}"
+    );
+    let files = csv::tables(&source(), &a);
+    let used = files.iter().find(|f| f.name == "ratings_used.csv").unwrap();
+    assert!(
+        used.content.contains("P01,A,1,1,,0.7,false,no rating\r\n"),
+        "{}",
+        used.content
+    );
+}
+
+#[test]
+fn the_banner_of_the_report_says_who_is_included() {
+    let banners = |pilots: usize, simulated: usize, planned| {
+        let mut rows = two();
+        rows.extend(["P03", "P04"].map(|who| row(who, "A", 1, 5)));
+        let who = ["P01", "P02", "P03", "P04"];
+        for row in &mut rows {
+            let at = who
+                .iter()
+                .position(|w| *w == row.participant.as_str())
+                .unwrap();
+            row.pilot = at < pilots;
+            row.simulated = !row.pilot && at < pilots + simulated;
+        }
+        let rules = Rules {
+            planned: Some(planned),
+            include: Include {
+                pilot: true,
+                simulated: true,
+            },
+            ..Rules::default()
+        };
+        let page = html(&analyze(&ratings(&rows, &[]), &rules));
+        let banners = page
+            .split("<div class=\"banner\" role=\"note\"><b>")
+            .skip(1);
+        banners
+            .map(|b| b.split('<').next().unwrap().to_owned())
+            .collect::<Vec<_>>()
+    };
+    const MIXED: &str = "INCLUDES PILOT OR SIMULATED DATA";
+    assert_eq!(banners(0, 0, 4), [""; 0]);
+    assert_eq!(banners(0, 0, 9), ["INTERIM ANALYSIS"]);
+    assert_eq!(banners(1, 0, 3), [MIXED]);
+    assert_eq!(banners(0, 1, 9), [MIXED, "INTERIM ANALYSIS"]);
+    assert_eq!(banners(4, 0, 4), ["NO PARTICIPANTS"]);
+    assert_eq!(banners(0, 4, 4), ["SIMULATED DATA – NO PARTICIPANTS"]);
 }
 
 #[test]

@@ -228,21 +228,21 @@ fn two_sessions_by_keys_with_a_failed_playback_a_correction_a_quit_and_a_resume(
     assert!(!participants[0]["age"].is_empty());
 }
 
-/// A track of two sessions is a track of its own in each: `TRACK@SESSION`.
+/// A track of two sessions is a track of its own in each, `TRACK@SESSION`; compared are the
+/// tracks, whatever the order in which they are declared.
 #[test]
-fn a_track_of_two_sessions_has_a_threshold_in_each() {
+fn tracks_of_two_sessions_have_a_threshold_in_each_and_one_contrast() {
     let folder = tempfile::tempdir().unwrap();
     let (code, _, err) = study(&["new", "t", "--kind", "staircase"], folder.path());
     assert_eq!(code, 0, "{err}");
     let path = folder.path().join("t/protocol.toml");
     let text = std::fs::read_to_string(&path).unwrap();
+    let sessions = "[[sessions]]\nid = \"one\"\n[[sessions]]\nid = \"two\"\n[analysis]";
     let text = text
-        .replace("tracks = [\"high\", \"low\"]", "tracks = [\"high\"]")
-        .replace("max_trials = 60", "max_trials = 20");
-    let (before, after) = text.split_once("[[tracks]]\nid = \"low\"").unwrap();
-    let (_, analysis) = after.split_once("[analysis]").unwrap();
-    let sessions = "[[sessions]]\nid = \"one\"\n[[sessions]]\nid = \"two\"\n";
-    std::fs::write(&path, format!("{before}{sessions}[analysis]{analysis}")).unwrap();
+        .replace("\"low\"", "\"even\"")
+        .replace("max_trials = 60", "max_trials = 20")
+        .replace("[analysis]", sessions);
+    std::fs::write(&path, text).unwrap();
     let arguments = ["rehearse", "t", "--participants", "3", "--out", "out"];
     let (code, _, err) = study(&arguments, folder.path());
     assert_eq!(code, 0, "{err}");
@@ -253,21 +253,38 @@ fn a_track_of_two_sessions_has_a_threshold_in_each() {
     let document: serde_json::Value = serde_json::from_str(&out).unwrap();
     let values = document["parts"][0]["values"].as_object().unwrap();
     let trials = rows(&folder.path().join("out/t/ratings.csv"));
-    let mut thresholds = Vec::new();
-    for participant in ["SIM001", "SIM002", "SIM003"] {
-        for session in ["one", "two"] {
-            let of = |r: &&BTreeMap<String, String>| {
-                r["participant"] == participant && r["session_id"] == session
-            };
-            let trials = trials.iter().filter(of).count() as f64;
-            let id = format!("psy/{participant}/high@{session}");
-            assert_eq!(values[&format!("{id}/n_trials")], trials, "{id}");
-            thresholds.push(values[&format!("{id}/posterior/threshold/mean")].as_f64());
+    let logarithms = ["even", "high"].map(|track| {
+        let mut own = Vec::new();
+        for participant in ["SIM001", "SIM002", "SIM003"] {
+            for session in ["one", "two"] {
+                let of = |r: &&BTreeMap<String, String>| {
+                    r["participant"] == participant
+                        && r["session_id"] == session
+                        && r["track"] == track
+                };
+                let trials = trials.iter().filter(of).count() as f64;
+                let id = format!("psy/{participant}/{track}@{session}");
+                assert_eq!(values[&format!("{id}/n_trials")], trials, "{id}");
+                let threshold = values[&format!("{id}/posterior/threshold/mean")].as_f64();
+                own.push(threshold.unwrap().ln());
+            }
         }
-    }
-    assert!(thresholds.iter().all(Option::is_some));
+        own
+    });
     // Two sessions of a participant are two tracks.
-    assert!(thresholds.chunks(2).any(|own| own[0] != own[1]));
+    assert!(logarithms[0].chunks(2).any(|own| own[0] != own[1]));
+    // Everybody has both tracks in both sessions: the contrast is that of the means.
+    let [even, high] = logarithms.map(|own| own.iter().sum::<f64>() / own.len() as f64);
+    let ratio = values["psy_mixed/even|high/ratio"].as_f64().unwrap();
+    assert!((ratio.ln() - (even - high)).abs() < 1e-6 && even != high);
+    assert_eq!(values["psy_mixed/n_participants"], 3.0);
+    let findings = document["parts"][0]["findings"].as_array().unwrap();
+    let compared = findings.iter().find(|f| f["question"] == "thresholds");
+    assert_eq!(compared.unwrap()["n_realizations"], 2);
+    let pairs = values
+        .keys()
+        .filter(|id| id.starts_with("psy_mixed/") && id.ends_with("/p_holm"));
+    assert_eq!(pairs.count(), 1);
     let sessions = values
         .get("sessions/p")
         .or(document["parts"][0]["undefined"].get("sessions/p"));

@@ -10,6 +10,10 @@ use std::io::{Read as _, Write};
 use std::path::Path;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
+use study::plain::dialogue::Dialogue;
+use study_plan::protocol::Answer;
+use study_session::outcome::Author;
+use study_session::session::Input;
 
 /// `study` with its lines.
 pub(crate) struct Lines {
@@ -390,4 +394,49 @@ fn of_pasted_lines_only_the_first_answers() {
         .collect();
     // the second by the player
     assert_eq!(ratings, [6, 4]);
+}
+
+/// By whom a remark and a correction are, what an Enter keeps, and how a correction is left.
+#[test]
+fn typed_lines_have_an_author_and_a_way_back() {
+    use crate::views::{TRIAL, comment, form, realism, view};
+    let mut view = view(form(vec![realism(), comment()]));
+    let mut dialogue = Dialogue::new(false, false);
+    dialogue.follow(&view);
+    for (command, by) in [
+        ("/says", Author::Participant),
+        ("/remark", Author::Experimenter),
+    ] {
+        let text = "it hums".to_owned();
+        let typed = dialogue.line(&format!("{command} it hums"), &view);
+        assert_eq!(typed.0, [Input::Remark { by, text }]);
+    }
+    let typed = |dialogue: &mut Dialogue, lines: &[&str]| {
+        let mut last = (Vec::new(), Vec::new());
+        for line in lines {
+            last = dialogue.line(line, &view);
+        }
+        last
+    };
+    // At every step Enter alone leaves a correction.
+    for steps in [
+        &["/correct", ""][..],
+        &["/correct", "1", ""],
+        &["/correct", "1", "7", ""],
+    ] {
+        let left = typed(&mut dialogue, steps);
+        assert_eq!(left, (Vec::new(), vec!["Nothing is corrected.".to_owned()]));
+    }
+    let (inputs, _) = typed(&mut dialogue, &["/correct", "1", "7", "mistyped"]);
+    assert!(
+        matches!(&inputs[..], [Input::Correct { by: Author::Experimenter, answer: Answer::Rating(7), reason, .. }] if reason == "mistyped"),
+        "{inputs:?}"
+    );
+    // Which answer Enter keeps after a step back.
+    view.correctable[0].form = TRIAL;
+    let said = Dialogue::new(false, false).follow(&view).lines.join(" ");
+    assert!(
+        said.contains('3') && said.contains("Enter alone keeps"),
+        "{said}"
+    );
 }

@@ -622,6 +622,18 @@ fn a_pause_stops_the_playback_first() {
     }
 }
 
+/// Between Enter and the confirmation of the device.
+#[test]
+fn a_pause_while_the_device_stops_is_kept() {
+    let mut rig = in_phase("Stopping");
+    rig.send(Input::Pause);
+    let playback = rig.playback;
+    rig.send(Input::DeviceStopped(playback));
+    assert_eq!(screen(&rig), "Paused");
+    rig.send(Input::Advance);
+    assert_eq!(screen(&rig), "Form");
+}
+
 #[test]
 fn a_pause_is_no_part_of_the_response_time() {
     let mut rig = Rig::new(plain());

@@ -574,6 +574,16 @@ mod tests {
                 "{method:?} {intervals:?}"
             );
         }
+        for (method, guess) in [
+            (Method::TwoIntervals, Some(1.0 / 2.0)),
+            (Method::Abx, Some(1.0 / 2.0)),
+            (Method::ThreeIntervals, Some(1.0 / 3.0)),
+            (Method::OddOneOut, Some(1.0 / 3.0)),
+            (Method::SameDifferent, None),
+            (Method::YesNo, None),
+        ] {
+            assert_eq!(method.guess_rate(), guess, "{method:?}");
+        }
         assert!(Method::SameDifferent.is_catch(&[C, C]) && Method::YesNo.is_catch(&[S]));
         assert!(!Method::YesNo.is_catch(&[C]) && !Method::TwoIntervals.is_catch(&[S, C]));
     }

@@ -1,10 +1,10 @@
 use super::*;
 use crate::outcome::FormId;
 use crate::session::Input;
-use crate::session::view::{DeviceState, MessageKind, StatusLine};
+use crate::session::view::{Correctable, DeviceState, MessageKind, StatusLine};
 use std::sync::Arc;
 use study_plan::protocol::kinds::{QuestionKind, Rating};
-use study_plan::protocol::{DeviceKind, Entry, Exposure, Question, example};
+use study_plan::protocol::{Answer, DeviceKind, Entry, Exposure, Given, Question, example};
 
 fn view(screen: Screen) -> View {
     View {
@@ -232,4 +232,79 @@ fn a_stop_is_always_taken() {
     for wrong in ["{}", "[]", "stop", r#"{"does":"go"}"#, "\"stop\""] {
         assert!(Sent::read(wrong.as_bytes()).is_err(), "{wrong}");
     }
+}
+
+/// A page says what was answered before a step back, on which side its scales begin, and of a
+/// pause only what is known of the device.
+#[test]
+fn a_page_says_what_its_view_says() {
+    let mut form = asks(false, rating(7));
+    form.correctable = vec![Correctable {
+        form: FormId::Intake,
+        title: "intake".to_owned(),
+        question: example::protocol(2, 1).questions[0].clone(),
+        answer: Answer::Rating(5),
+    }];
+    let asked = &participant(&form).unwrap().questions[0];
+    assert_eq!(asked.given, Some(Given::Typed("5".to_owned())));
+    for (lang, scales) in [("en", "ltr"), ("ar", "rtl")] {
+        form.words = Arc::new(Words::new(Some(lang), &Default::default()));
+        assert_eq!(participant(&form).unwrap().scales, scales);
+    }
+    for (device, force, no_force) in [
+        (DeviceKind::Simulated, true, true),
+        (DeviceKind::Simulated, false, false),
+        (DeviceKind::Manual, true, false),
+    ] {
+        let mut paused = view(Screen::Paused { since_s: 61.0 });
+        (paused.device, paused.force) = (device, force);
+        let clock = page(&paused).clock.unwrap();
+        assert_eq!(clock.contains("no force"), no_force, "{device:?}: {clock}");
+    }
+}
+
+/// A reply counts once, on its own page, with everything that was given.
+#[test]
+fn a_reply_counts_once_and_on_its_own_page() {
+    use reply::{Exchange, Outcome, Sent};
+    let send = |exchange: &mut Exchange, page: &str, key: &str, rest: &str| {
+        let json = format!(r#"{{"page":"{page}","key":"{key}","shown_ms":300,{rest}}}"#);
+        assert!(exchange.arrive(Sent::read(json.as_bytes()).unwrap()));
+    };
+    let mut exchange = Exchange::new("run".to_owned());
+    // The text below a prompt comes when the wait is over: that is no other page.
+    for wait_s in [2.0, 0.0] {
+        let prompt = "Feel the reference.".to_owned();
+        exchange.show(&view(Screen::Reference { prompt, wait_s }));
+        assert_eq!(exchange.page().unwrap().id, "run.1");
+    }
+    let message = view(Screen::Message {
+        kind: MessageKind::Welcome,
+        text: "Hello.".to_owned(),
+    });
+    exchange.show(&message);
+    send(&mut exchange, "run.2", "1", r#""does":"advance""#);
+    assert_eq!(exchange.input(&message), Some(Input::Advance));
+    exchange.show(&message);
+    assert_eq!(exchange.outcome("1"), Some(&Outcome::Saved));
+    send(&mut exchange, "run.2", "1", r#""does":"advance""#);
+    assert_eq!(exchange.input(&message), None);
+
+    let mut form = asks(false, rating(7));
+    exchange.show(&form);
+    let Screen::Form { page, .. } = &mut form.screen else {
+        panic!("a form");
+    };
+    *page = 2;
+    exchange.show(&form);
+    let decline = r#""does":"decline","reason":"too loud""#;
+    send(&mut exchange, "run.3", "2", decline);
+    assert_eq!(exchange.input(&form), None);
+    assert_eq!(exchange.outcome("2"), Some(&Outcome::Stale));
+    send(&mut exchange, "run.4", "3", decline);
+    let Some(Input::Answer(answers)) = exchange.input(&form) else {
+        panic!("an answer");
+    };
+    let reason = "too loud".to_owned();
+    assert_eq!(answers[0].1, Answer::Declined { reason });
 }

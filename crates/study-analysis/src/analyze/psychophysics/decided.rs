@@ -96,7 +96,7 @@ pub(crate) fn told_apart(
         for participant in participants {
             let name = rules.id.as_str();
             let own = found.sdt.get(&CellName::of(participant, name));
-            if let Some((d, above_chance)) = sensitivity(*asked, rules, own) {
+            if let Some((d, above_chance)) = sensitivity(*asked, rules.method, own) {
                 told.push(Told {
                     condition: name.to_owned(),
                     d,

@@ -12,7 +12,7 @@ use crate::analyze::record::Number as _;
 use std::collections::{BTreeMap, BTreeSet};
 use study_base::text::PartId;
 use study_plan::protocol::Protocol;
-use study_plan::protocol::parts::{Part, TrackRules, Vary};
+use study_plan::protocol::parts::{Method, Part, TrackRules, Vary};
 use study_session::outcome::RatingRow;
 use study_stats::describe::mean;
 use study_stats::psychometric::{Core, Level, Spacing, Support, pooled};
@@ -56,7 +56,7 @@ pub(super) fn of_tracks(
             let cell = CellName::of(participant, condition);
             let threshold = found.psy.get(&cell);
             let threshold = threshold.and_then(|f| f.posterior.threshold.mean.number());
-            let told_apart = sensitivity(asked, rules, found.sdt.get(&cell));
+            let told_apart = sensitivity(asked, rules.method, found.sdt.get(&cell));
             if let Some(value) = threshold.or(told_apart.map(|t| t.0)) {
                 measured.push(Measured {
                     participant: (*participant).to_owned(),
@@ -175,7 +175,7 @@ fn condition(track: &PartId, session: Option<&PartId>) -> String {
 /// d′ and what is 0 by chance.
 pub(super) fn sensitivity(
     asked: Asked,
-    rules: &TrackRules,
+    method: Method,
     found: Option<&Sensitivity>,
 ) -> Option<(f64, f64)> {
     let found = found?;
@@ -184,7 +184,7 @@ pub(super) fn sensitivity(
         Asked::ThreeIntervals | Asked::OddOneOut => {
             // Without a d′, if all answers are correct.
             let correct = found.share_correct.number()?;
-            Some((found.d.number()?, correct - rules.method.guess_rate()?))
+            Some((found.d.number()?, correct - method.guess_rate()?))
         }
         Asked::Abx | Asked::SameDifferent => {
             let unbiased = found.share_unbiased.number()?;
@@ -250,5 +250,36 @@ pub(crate) fn settings(protocol: &Protocol, track: &TrackRules) -> TrialSettings
         support: family.and_then(|f| Support::of(places(f.ladder.levels())?)),
         repeats: 0,
         seed: protocol.study.seed,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analyze::record::Stat;
+
+    /// Half of the answers right is chance among two, and above it among three.
+    #[test]
+    fn chance_depends_on_the_number_of_answers() {
+        let half = Sensitivity {
+            d: Some(Stat::of(0.7)),
+            d_differencing: Some(Stat::of(0.7)),
+            share_correct: Some(Stat::of(0.5)),
+            share_unbiased: Some(Stat::of(0.5)),
+            ..Sensitivity::undefined("")
+        };
+        for (asked, method, above) in [
+            (Asked::ThreeIntervals, Method::ThreeIntervals, 1.0 / 6.0),
+            (Asked::OddOneOut, Method::OddOneOut, 1.0 / 6.0),
+            (Asked::Abx, Method::Abx, 0.0),
+            (Asked::SameDifferent, Method::SameDifferent, 0.0),
+            (Asked::TwoIntervals, Method::TwoIntervals, 0.7),
+        ] {
+            let (d, found) = sensitivity(asked, method, Some(&half)).unwrap();
+            assert!(
+                (found - above).abs() < 1e-12 && d == 0.7,
+                "{method:?}: {found}"
+            );
+        }
     }
 }
