@@ -26,6 +26,11 @@ use study_wire::servo::{Law, Rendering, Servo, ServoSettings};
 const SPEEDS: [f64; 5] = [0.3, 0.5, 0.65, 0.8, 1.0];
 /// Speed of a slow stroke as a share of the trained one.
 const SLOW: f64 = 0.15;
+/// The longest slow stroke over the range, s: a force curve is trained at a thousandth of the
+/// speed of a hand.
+const SLOWEST_S: f64 = 4.0;
+/// The speed of a hand, mm/s, which a realization that was trained more slowly meets as well.
+const HAND_MM_S: f64 = 200.0;
 /// Rest after a fast stroke, s.
 const REST_S: f64 = 0.25;
 /// A force at rest above that of slow motion by this share of it is none of the realization.
@@ -306,6 +311,15 @@ struct Slow {
     by_place: [Vec<f64>; 2],
 }
 
+impl Slow {
+    /// Largest force around a bin in either direction, N.
+    fn near_n(&self, bin: usize) -> f64 {
+        let around = bin.saturating_sub(2)..(bin + 3).min(BINS);
+        let all = self.by_place.iter().flat_map(|way| &way[around.clone()]);
+        all.fold(0.0, |most, n| most.max(n.abs()))
+    }
+}
+
 /// Bins of position over the range.
 const BINS: usize = 200;
 /// As many of the highest and lowest forces are not those of slow motion.
@@ -321,11 +335,20 @@ impl<'a> Search<'a> {
         (((x_mm - low) / (high - low) * BINS as f64) as usize).min(BINS - 1)
     }
 
+    fn slow_mm_s(&self) -> f64 {
+        let [low, high] = self.what.range_mm;
+        (SLOW * self.what.trained_mm_s).max((high - low) / SLOWEST_S)
+    }
+
+    fn fast_mm_s(&self) -> f64 {
+        (FASTER_THAN_TRAINED * self.what.trained_mm_s).max(HAND_MM_S)
+    }
+
     /// From the middle up, down and up again in slow motion.
     fn slow(&self) -> Slow {
         let [low, high] = self.what.range_mm;
         let mut play = self.play(0.5 * (low + high));
-        let mm_s = SLOW * self.what.trained_mm_s;
+        let mm_s = self.slow_mm_s();
         play.stroke(high, mm_s, |_, _| ());
         let mut by_place = [vec![0.0; BINS], vec![0.0; BINS]];
         for (to_mm, way) in [(low, 1), (high, 0)] {
@@ -362,7 +385,7 @@ impl<'a> Search<'a> {
     fn strokes(&mut self, slow: &Slow) {
         let [low, high] = self.what.range_mm;
         let at = |share: f64| low + share * (high - low);
-        let top = FASTER_THAN_TRAINED * self.what.trained_mm_s;
+        let top = self.fast_mm_s();
         let (mut force, mut latched) = (None, None);
         for (from, to) in [(0.6, 0.0), (0.4, 1.0), (1.0, 0.35), (0.0, 0.65)] {
             let begun = self.play(at(from));
@@ -372,11 +395,13 @@ impl<'a> Search<'a> {
                 play.stroke(to_mm, by_mm_s, |_, _| ());
                 play.rest(REST_S);
                 let found_n = play.force_n;
-                let excess = (found_n.abs() - slow.most_n) / slow.most_n;
+                // where the stop of a key begins, slow motion has more than elsewhere
+                let slow_n = slow.most_n.max(slow.near_n(self.bin(to_mm)));
+                let excess = (found_n.abs() - slow_n) / slow_n;
                 if excess > EXCESS && force.is_none_or(|(most, _)| excess > most) {
                     let danger = Danger::Force {
                         found_n,
-                        slow_n: slow.most_n,
+                        slow_n,
                         at_mm: to_mm,
                         by_mm_s,
                     };
@@ -387,7 +412,7 @@ impl<'a> Search<'a> {
                 let way = usize::from(back < to_mm);
                 let begin = self.memory_mm(slow);
                 let (mut apart_n, mut since_mm, mut stays_mm) = (0.0_f64, to_mm, 0.0_f64);
-                play.stroke(back, SLOW * self.what.trained_mm_s, |x_mm, force_n| {
+                play.stroke(back, self.slow_mm_s(), |x_mm, force_n| {
                     let bin = self.bin(x_mm);
                     let around = bin.saturating_sub(2)..(bin + 3).min(BINS);
                     let near = &slow.by_place[way][around];
@@ -466,7 +491,7 @@ impl<'a> Search<'a> {
     fn cycles(&mut self, slow: &Slow) {
         let [low, high] = self.what.range_mm;
         let hz = self.device.servo.servo_hz;
-        let top = FASTER_THAN_TRAINED * self.what.trained_mm_s;
+        let top = self.fast_mm_s();
         let most_mj = MOST_CYCLE * slow.range_n * (high - low);
         let mut worst: Option<(f64, Danger)> = None;
         for (middle, size) in [(0.5, 0.5), (0.25, 0.25), (0.75, 0.25), (0.5, 0.1)] {

@@ -257,15 +257,16 @@ pub(super) fn table(results: &Results<'_>) -> String {
         );
     }
     for (_, training) in results.training {
+        let fastest = p.length(training.top_speed_mm_s());
+        let decimals = if fastest < 10.0 { 2 } else { 0 };
         let _ = writeln!(
             out,
-            "{}: {} samples, {:.1} s, x {:.2} to {:.2} {x}, |v| up to {:.0} {x}/s",
+            "{}: {} samples, {:.1} s, x {:.2} to {:.2} {x}, |v| up to {fastest:.decimals$} {x}/s",
             Untrusted(&training.name),
             training.len(),
             training.duration_s(),
             p.length(training.range_mm()[0]),
             p.length(training.range_mm()[1]),
-            p.length(training.top_speed_mm_s()),
             x = p.x(),
         );
     }
@@ -401,14 +402,20 @@ fn best_in_detail(results: &Results<'_>) -> String {
     let provenance = &cell.realization.provenance;
     let filter = provenance.filter.as_deref().unwrap_or("unknown");
     let mechanism = (cell.fitted.as_deref()).map_or(String::new(), mechanism_in_detail);
+    let (noticeable, accuracy) = match rows.len() {
+        1 => (String::new(), String::new()),
+        _ => (
+            format!("; JND: just noticeable difference, {JUST_NOTICEABLE_N} N"),
+            align(&rows),
+        ),
+    };
     format!(
-        "\nthe {} cell in detail; JND: just noticeable difference, {JUST_NOTICEABLE_N} N\nsignals: {filter}\n{}{ceilings}{mechanism}certificate {}\n    {}\n    m < 0 at {:.0} % of the nodes, b < 0 at {:.0} %\n{}",
+        "\nthe {} cell in detail{noticeable}\nsignals: {filter}\n{accuracy}{ceilings}{mechanism}certificate {}\n    {}\n    m < 0 at {:.0} % of the nodes, b < 0 at {:.0} %\n{}",
         if results.cells.len() == 1 {
             "only"
         } else {
             "best"
         },
-        align(&rows),
         cell.certificate,
         super::required_damping(&cell.certificate),
         100.0 * cell.certificate.negative_mass,

@@ -115,6 +115,30 @@ fn a_hundred_healthy_realizations_raise_no_alarm() {
     }
 }
 
+/// A key, from a force curve of 0.3 mm/s, whose stop begins in the last percent of the travel:
+/// the force there is that of the slow curve, and a hand is 700 times as fast.
+#[test]
+fn the_stop_of_a_key_is_no_alarm() {
+    let mut draw = Stream::new(5, &["key"]);
+    let mut what = table(&mechanism(&mut draw), Direction::Play { delta_mm: 0.1 });
+    let at = |i: usize| 0.05 * i as f64;
+    let branch = |sign: f64| Branch {
+        m_kg: vec![0.0; 81],
+        b_n_s_per_mm: vec![0.0; 81],
+        k_n_per_mm: vec![0.0; 81],
+        f0_n: (0..81)
+            .map(|i| 0.5 + 0.05 * sign + if i == 80 { 0.8 } else { 0.0 })
+            .collect(),
+    };
+    what.x_mm = (0..81).map(at).collect();
+    what.trained = Trained {
+        x_mm: [0.0, 4.0],
+        v_mm_s: 0.3,
+    };
+    (what.positive, what.negative) = (branch(1.0), branch(-1.0));
+    assert_eq!(search(&what, &Device::default()), []);
+}
+
 /// Friction by the sign of the speed passes the certificate; a chatter draws energy from it at
 /// any step of the encoder.
 #[test]
