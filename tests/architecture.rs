@@ -58,6 +58,7 @@ check: load model power protocol safe_play stats wire
 load: family identify model preregister protocol recording safe_play schedule store wire
 study: analyze load outcome preregister protocol store
 model: wire
+archive: identify model recording
 family: model wire
 safe_play: model wire
 trajectory: wire

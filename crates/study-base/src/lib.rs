@@ -7,6 +7,7 @@
 //! * [`diagnostic`]: faults of a file with line, caret and suggestion, and a TOML
 //!   reader that reports every fault rather than the first.
 //! * [`hex`]: bytes and SHA-256 digests as text.
+//! * [`license`]: terms of use as archives write them.
 //! * [`rng`]: random streams that are named, independent and the same on every
 //!   machine.
 //!
@@ -19,6 +20,7 @@ pub mod apa;
 pub mod child;
 pub mod diagnostic;
 pub mod hex;
+pub mod license;
 pub mod limits;
 mod named;
 pub mod rng;

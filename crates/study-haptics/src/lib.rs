@@ -16,7 +16,8 @@
 //! * [`recording`]: position, velocity, acceleration and force over time, as CSV;
 //! * [`identify`]: filters, estimators and validation;
 //! * [`model`]: the realization and its model file;
-//! * [`safe_play`]: what an adversary makes of it on a device.
+//! * [`safe_play`]: what an adversary makes of it on a device;
+//! * [`archive`]: a realization with everything that it rests on, in one file.
 //!
 //! # Units
 //!
@@ -35,6 +36,7 @@
 #![doc = include_str!("../examples/identify.rs")]
 //! ```
 
+pub mod archive;
 pub mod family;
 pub mod identify;
 pub mod model;

@@ -27,13 +27,7 @@ pub(super) fn orcid(id: &str) -> String {
 
 /// The license as an SPDX identifier, if it can be one.
 pub(super) fn spdx(study: &Study) -> Option<&str> {
-    let allowed = |c: char| c.is_ascii_alphanumeric() || "-._".contains(c);
-    (study.license.as_deref()).filter(|id| !id.is_empty() && id.chars().all(allowed))
-}
-
-/// The page of a license that has an identifier.
-pub(super) fn spdx_address(id: &str) -> String {
-    format!("https://spdx.org/licenses/{id}.html")
+    study.license.as_deref().and_then(study_base::license::spdx)
 }
 
 /// The DOI without a prefix, such as `10.1000/182`.

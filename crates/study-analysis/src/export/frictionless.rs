@@ -190,7 +190,9 @@ fn package(job: &Job<'_>, resources: Vec<Json>) -> Json {
         .license
         .as_ref()
         .map(|text| match author::spdx(study) {
-            Some(id) => json!([{"name": id, "path": author::spdx_address(id), "title": id}]),
+            Some(id) => {
+                json!([{"name": id, "path": study_base::license::spdx_address(id), "title": id}])
+            }
             None => json!([{"name": "custom", "title": text}]),
         });
     let contributors: Vec<Json> = study.authors.iter().map(contributor).collect();

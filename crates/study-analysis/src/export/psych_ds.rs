@@ -137,7 +137,7 @@ fn dataset_description(job: &Job<'_>, variables: Vec<Json>) -> Json {
     });
     let address = author::doi(study).map(|doi| json!(format!("https://doi.org/{doi}")));
     let license = match author::spdx(study) {
-        Some(id) => Some(json!(author::spdx_address(id))),
+        Some(id) => Some(json!(study_base::license::spdx_address(id))),
         None => study.license.as_ref().map(|l| json!(l)),
     };
     for (key, value) in [

@@ -10,6 +10,7 @@
 
 mod write;
 
+pub(crate) use write::quoted;
 pub use write::write;
 
 use super::{

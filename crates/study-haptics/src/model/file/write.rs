@@ -157,7 +157,7 @@ impl Text {
 }
 
 /// A basic TOML string, with invisible and control characters escaped.
-fn quoted(text: &str) -> String {
+pub(crate) fn quoted(text: &str) -> String {
     let mut out = String::with_capacity(text.len() + 2);
     out.push('"');
     for c in text.chars() {
