@@ -25,6 +25,7 @@ mod run;
 mod schedule;
 mod schema;
 mod status;
+mod stimulus;
 mod study_folder;
 mod trajectory;
 mod verify;
@@ -78,6 +79,8 @@ enum Command {
     Import(import::Args),
     /// Identify realizations from a recording: model files and their VAF
     Identify(Box<identify::Args>),
+    /// Archive of stimuli: pack a realization with its recordings, verify, compare, catalogue
+    Stimulus(stimulus::Args),
     /// Write a commented protocol as a starting point
     New(new::Args),
     /// Print the JSON Schema of the protocol file, for editors
@@ -120,6 +123,7 @@ pub fn run(cli: Cli, console: &mut Console) -> Result<(), Failure> {
         Command::Record(args) => record::run(&args, console),
         Command::Import(args) => import::run(&args, console),
         Command::Identify(args) => identify::run(&args, console),
+        Command::Stimulus(args) => stimulus::run(&args, console),
         Command::New(args) => new::run(&args, console),
         Command::Schema(args) => schema::run(&args, console),
         Command::Device(args) => device::run(&args, console),

@@ -55,7 +55,7 @@ power: protocol procedure outcome analyze stats
 export: protocol outcome analyze
 preregister: protocol outcome analyze
 check: load model power protocol safe_play stats wire
-load: family identify model preregister protocol recording safe_play schedule store wire
+load: archive family identify model preregister protocol recording safe_play schedule store wire
 study: analyze load outcome preregister protocol store
 model: wire
 archive: identify model recording
@@ -68,12 +68,12 @@ device: outcome model plant wire
 rater: protocol model plant wire
 rehearsal: analyze device load protocol rater runner store
 runner: session device store identify outcome protocol rendering model rater safe_play wire
-report: analyze stats identify load model outcome power preregister procedure protocol recording store study
+report: archive analyze stats identify load model outcome power preregister procedure protocol recording store study
 tui: runner page session outcome protocol
 plain: runner page session outcome protocol tui
 screen: runner page session protocol
 front: runner page session protocol
-cli: analyze check device export front identify load model outcome plain plant power procedure protocol rater recording rehearsal rendering report runner safe_play schedule screen session stats store study trajectory tui wire
+cli: analyze archive check device export front identify load model outcome plain plant power procedure protocol rater recording rehearsal rendering report runner safe_play schedule screen session stats store study trajectory tui wire
 main: cli
 certificate: predict
 predict: real

@@ -7,7 +7,7 @@
 use crate::studies::{
     export, files, grouped, hostile, japanese, new, of_groups_and_sessions, real_study, rehearsed,
 };
-use crate::support::{copy_folder, repository};
+use crate::support::{copy_folder, repository, study};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -330,6 +330,92 @@ fn each_validator_refuses_planted_errors() {
         }
         assert!(refused >= 4, "{validator:?}");
         eprintln!("{validator:?}: {refused} planted errors refused");
+    }
+}
+
+/// The required checks of RO-Crate 1.1 that a folder does not pass; `None` if the validator is not
+/// here, or cannot get the vocabulary, for which it needs the network.
+fn ro_crate(folder: &Path, home: &Path) -> Option<Vec<String>> {
+    let out = home.join("ro-crate.json");
+    let _ = fs::remove_file(&out);
+    let options = "-y validate --no-paging -p ro-crate-1.1 -l required -f json -o";
+    let mut command = Command::new("rocrate-validator");
+    command.args(options.split(' ')).arg(&out).arg(folder);
+    started(&mut command)?;
+    let told: Value = serde_json::from_slice(&fs::read(out).ok()?).unwrap();
+    let issues = told["issues"].as_array().unwrap().iter();
+    let codes = issues.map(|issue| issue["check"]["identifier"].as_str().unwrap().to_owned());
+    let codes: Vec<String> = codes.collect();
+    assert_eq!(told["passed"] == true, codes.is_empty(), "{told}");
+    Some(codes)
+}
+
+#[test]
+#[ignore = "needs the validators: .ci/export gets them"]
+fn bundles_are_data_packages_and_ro_crates() {
+    let home = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        let (code, out, told) = study(arguments, home.path());
+        assert_eq!(code, 0, "{told}");
+        out
+    };
+    for (id, curve, license) in [
+        ("akko-blue", "Akko_Blue_V2", "any use, with credit"),
+        ("jwk-bluey", "JWK_Bluey", "CC-BY-4.0"),
+    ] {
+        let curve = repository(&format!("tests/data/switches/{curve}.csv"));
+        let model = repository(&format!("protocols/keyboard/models/{id}.toml"));
+        let credit = "measured by ThereminGoat (theremingoat.com)";
+        let recording = format!("{id}.csv");
+        run(&[
+            "import",
+            "force-curve",
+            &curve,
+            "-o",
+            &recording,
+            "--credit",
+            credit,
+        ]);
+        let stated = [
+            "--instrument",
+            "a \"tester\"",
+            "--published",
+            "2024-05-17",
+            "--license",
+            license,
+        ];
+        let pack = [&["stimulus", "pack", &model, &recording][..], &stated].concat();
+        let address = run(&pack);
+        let address = address.trim().trim_start_matches("sha256:");
+        run(&[
+            "stimulus",
+            "unpack",
+            &format!("bundles/{address}.tar"),
+            "--out",
+            id,
+        ]);
+        let folder = home.path().join(id);
+        if Frictionless.is_here() {
+            assert_eq!(Frictionless.errors(&folder), Some(Vec::new()));
+            let bad = home.path().join(format!("{id}-changed"));
+            copy_folder(&folder, &bad);
+            plant(&bad, "recordings/01.csv", "t_s,x_mm", "t_s,y_mm");
+            assert_ne!(Frictionless.errors(&bad), Some(Vec::new()));
+        }
+        match ro_crate(&folder, home.path()) {
+            Some(errors) => assert!(errors.is_empty(), "{errors:?}"),
+            None => eprintln!("SKIPPED: no validator of RO-Crate, or no network for it"),
+        }
+        let bad = home.path().join(format!("{id}-undated"));
+        copy_folder(&folder, &bad);
+        plant(
+            &bad,
+            "ro-crate-metadata.json",
+            "datePublished",
+            "dateModified",
+        );
+        let found = ro_crate(&bad, home.path());
+        assert!(found.is_none_or(|codes| codes == ["ro-crate-1.1_8.4"]));
     }
 }
 

@@ -14,6 +14,7 @@ mod mechanism;
 mod metamorphic;
 mod record;
 mod shipped;
+mod stimulus;
 #[path = "../support/switches.rs"]
 mod switches;
 mod terms;

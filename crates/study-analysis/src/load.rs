@@ -18,9 +18,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use study_base::diagnostic::{Fault, Findings, Severity};
 use study_base::text::ModelId;
+use study_haptics::archive::{self, Bundle};
 use study_haptics::model::{Realization, Units};
 use study_haptics::safe_play::{self, Danger};
-use study_plan::protocol::file::{self, Named, Parsed};
+use study_plan::protocol::file::{self, Content, Named, Parsed};
 use study_plan::protocol::fingerprint::{self, Fingerprints, Parts, family_file};
 use study_plan::protocol::{DeviceKind, FileOrders, ModelEntry, Order, Protocol, check};
 use study_session::store::disk::read_capped;
@@ -326,6 +327,8 @@ struct OtherFiles<'f> {
 struct Opened {
     file: String,
     bytes: Vec<u8>,
+    /// The model file of a bundle.
+    model: Option<Vec<u8>>,
     realization: Option<Realization>,
     findings: Findings,
 }
@@ -347,21 +350,25 @@ impl<'f> OtherFiles<'f> {
         if self.opened.iter().any(|o| o.file == name.file) {
             return Ok(());
         }
-        let (most, what) = if name.orders {
-            (MAX_ORDERS_BYTES, "orders")
-        } else {
-            (MAX_MODEL_BYTES, "model")
+        let (most, what) = match name.content {
+            Content::Orders => (MAX_ORDERS_BYTES, "orders"),
+            Content::Model => (MAX_MODEL_BYTES, "model"),
+            Content::Bundle(_) => (archive::MAX_BYTES, "bundle"),
         };
         let path = self.folder.join(&name.file);
         let bytes = read_capped(&path, most).map_err(|problem| {
             Fault::error(format!("the {what} file cannot be read: {problem}"))
                 .hint("paths are relative to the protocol")
         })?;
+        let model = match &name.content {
+            Content::Bundle(address) => Some(model_of(&bytes, address.as_deref())?),
+            Content::Model | Content::Orders => None,
+        };
         let shown = path.display().to_string();
         let mut realization = None;
-        let findings = match text_of(&bytes) {
+        let findings = match text_of(model.as_ref().unwrap_or(&bytes)) {
             Err(fault) => Findings::alone(shown, fault),
-            Ok(text) if name.orders => {
+            Ok(text) if name.content == Content::Orders => {
                 let (orders, findings) = file::parse_orders(&shown, text);
                 if !findings.has_errors() {
                     self.orders = Some(orders);
@@ -377,6 +384,7 @@ impl<'f> OtherFiles<'f> {
         self.opened.push(Opened {
             file: name.file.clone(),
             bytes,
+            model,
             realization,
             findings,
         });
@@ -441,7 +449,10 @@ impl<'f> OtherFiles<'f> {
 
     fn bytes_by_model(&self) -> BTreeMap<ModelId, Vec<u8>> {
         (self.models.iter().chain(&self.ends))
-            .map(|(id, index)| (id.clone(), self.opened[*index].bytes.clone()))
+            .map(|(id, index)| {
+                let Opened { model, bytes, .. } = &self.opened[*index];
+                (id.clone(), model.as_ref().unwrap_or(bytes).clone())
+            })
             .collect()
     }
 
@@ -459,6 +470,19 @@ impl<'f> OtherFiles<'f> {
             .chain(self.opened.into_iter().map(|o| o.findings))
             .filter(|f| !f.faults.is_empty())
             .collect()
+    }
+}
+
+/// The model file of a bundle, which is verified.
+fn model_of(bundle: &[u8], address: Option<&str>) -> Result<Vec<u8>, Fault> {
+    let refused = |why: String| Fault::error(format!("the bundle is refused: {why}"));
+    let opened = Bundle::open(bundle).map_err(|e| refused(e.to_string()))?;
+    match address {
+        Some(address) if address != opened.sha256() => Err(refused(format!(
+            "its address is sha256:{}, and not the one in the protocol",
+            opened.sha256()
+        ))),
+        _ => Ok(opened.model().to_owned()),
     }
 }
 

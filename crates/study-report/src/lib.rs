@@ -6,6 +6,7 @@
 
 mod answers;
 mod apa;
+pub mod catalogue;
 pub mod chart;
 pub mod commission;
 pub mod comparison;

@@ -139,7 +139,8 @@ pub(super) fn certificates(
             continue;
         };
         seen.push(entry.file.as_ref());
-        let place = spans.get(&format!("models[{i}].file")).cloned();
+        let place = ["file", "bundle"].map(|key| spans.get(&format!("models[{i}].{key}")));
+        let place = place.into_iter().flatten().next().cloned();
         findings.faults.push(fault.at(place));
     }
 }

@@ -127,8 +127,19 @@ pub struct Named {
     pub place: String,
     /// Relative to the protocol, with `/`.
     pub file: String,
-    /// Whether it contains orders rather than a model.
-    pub orders: bool,
+    /// What it contains.
+    pub content: Content,
+}
+
+/// What a file of a protocol contains.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Content {
+    /// A realization.
+    Model,
+    /// Orders.
+    Orders,
+    /// A bundle with a realization; with the SHA-256 that it has to have, if the protocol says it.
+    Bundle(Option<String>),
 }
 
 /// Reads a protocol file; `path` is only for messages.

@@ -1,9 +1,9 @@
 //! Consistency of the sections of a file: colliding ids, unknown ids, rules that the
 //! device cannot fulfil.
 
-use super::Named;
 use super::models::PartialModel;
 use super::questions::PartialQuestion;
+use super::{Content, Named};
 use crate::protocol::columns::{
     is_participants_column, is_participants_column_of_parts, is_parts_column, is_ratings_column,
 };
@@ -38,16 +38,16 @@ impl Sections<'_> {
     pub(super) fn files(&self) -> Vec<Named> {
         let models = self.models.iter().filter_map(|model| {
             Some(Named {
-                place: format!("{}.file", model.path),
+                place: format!("{}.{}", model.path, model.key()),
                 file: model.file.clone()?,
-                orders: false,
+                content: model.content.clone(),
             })
         });
         let orders = match self.design.map(|design| &design.order) {
             Some(Order::File(file)) => Some(Named {
                 place: "design.order.file".to_owned(),
                 file: file.clone(),
-                orders: true,
+                content: Content::Orders,
             }),
             _ => None,
         };
@@ -146,8 +146,8 @@ impl Sections<'_> {
             {
                 document.fault(
                     Fault::error(format!("a duplicate of `{of}` has to have the same file"))
-                        .at(at(document, &model.path, "file"))
-                        .hint("leave `file` out"),
+                        .at(at(document, &model.path, model.key()))
+                        .hint(format!("leave `{}` out", model.key())),
                 );
             } else if (model.role == Role::Practice) != (original.role == Role::Practice) {
                 document.fault(

@@ -1,5 +1,6 @@
 //! `[[models]]`.
 
+use super::Content;
 use crate::protocol::keys::{Id, Key, Kind, NumberRange, Words as _, keys};
 use crate::protocol::section::Section;
 use crate::protocol::{DeviceKind, ModelEntry, Role};
@@ -15,6 +16,9 @@ pub(super) const MODELS: &[Key] = keys! {
     "id": Kind::Id(Id::Model), r#""lambda-0.9995""#, required;
     /// Its model file. Simulated and serial devices need one.
     "file": Kind::Path, r#""models/lambda-0.9995.toml""#, derived("the file of `duplicate_of`, if any");
+    /// Instead of `file`: a bundle of `study stimulus pack`, as a path or as its address
+    /// `sha256:…`, which is the file `bundles/….tar`.
+    "bundle": Kind::Text, r#""bundles/akko-blue.tar""#;
     /// Its variance accounted for, VAF = 1 − var(F − F̂) / var(F). If the model file has
     /// a VAF, too, the two have to agree in the digits given here.
     "vaf": Kind::Number(AT_MOST_1, ""), "0.96", derived("the VAF in the model file, if any");
@@ -37,8 +41,10 @@ pub(super) struct PartialModel {
     pub(super) path: String,
     pub(super) id: Option<ModelId>,
     pub(super) file: Option<String>,
-    /// Whether there is a `file` key, faulty or not.
+    /// Whether there is a `file` or `bundle` key, faulty or not.
     pub(super) has_file: bool,
+    /// What the file contains.
+    pub(super) content: Content,
     pub(super) vaf: Option<f64>,
     pub(super) role: Role,
     pub(super) duplicate_of: Option<ModelId>,
@@ -47,6 +53,14 @@ pub(super) struct PartialModel {
 }
 
 impl PartialModel {
+    /// The key that names its file.
+    pub(super) fn key(&self) -> &'static str {
+        match self.content {
+            Content::Bundle(_) => "bundle",
+            Content::Model | Content::Orders => "file",
+        }
+    }
+
     /// The entry, if its id could be read.
     pub(super) fn finish(self) -> Option<ModelEntry> {
         Some(ModelEntry {
@@ -62,18 +76,46 @@ impl PartialModel {
 }
 
 pub(super) fn read(mut section: Section<'_, '_>) -> PartialModel {
-    let has_file = section.value("file").is_some();
+    let (file, content) = file(&mut section);
+    let has_file = ["file", "bundle"].map(|key| section.value(key).is_some());
+    let has_file = has_file.contains(&true);
     PartialModel {
         path: section.path().to_owned(),
         id: section.model_id("id"),
-        file: section.path_of("file"),
+        file,
         has_file,
+        content,
         vaf: section.number("vaf"),
         role: section.word("role").unwrap_or(Role::Test),
         duplicate_of: section.model_id("duplicate_of"),
         device: section.word("device"),
         covariates: covariates(&mut section),
     }
+}
+
+/// Its file and what that contains.
+fn file(section: &mut Section<'_, '_>) -> (Option<String>, Content) {
+    let Some(value) = section.value("bundle") else {
+        return (section.path_of("file"), Content::Model);
+    };
+    if let Some(file) = section.value("file") {
+        let fault = Fault::error(format!("`{}` has a `file` and a `bundle`", section.path()));
+        file.fault(fault.hint("the bundle has the model file"));
+    }
+    let text = value.text().unwrap_or_default();
+    let Some(hash) = text.strip_prefix("sha256:") else {
+        return (section.path_of("bundle"), Content::Bundle(None));
+    };
+    let digit = |c: char| c.is_ascii_digit() || ('a'..='f').contains(&c);
+    if hash.len() != 64 || !hash.chars().all(digit) {
+        value.fault(
+            Fault::error(format!("`{}` is no address of a bundle", value.path()))
+                .hint("sha256: and 64 digits 0-9 a-f, as `study stimulus pack` prints them"),
+        );
+        return (None, Content::Bundle(None));
+    }
+    let file = format!("bundles/{hash}.tar");
+    (Some(file), Content::Bundle(Some(hash.to_owned())))
 }
 
 fn covariates(section: &mut Section<'_, '_>) -> BTreeMap<String, f64> {

@@ -1,7 +1,6 @@
 //! From parts, families and tracks as they were read to those of a protocol: ids are
 //! looked up, and defaults that depend on other sections are filled in.
 
-use super::Named;
 use super::agree::{Sections, at, collision, unknown};
 use super::families::PartialFamily;
 use super::grids::Grids;
@@ -9,6 +8,7 @@ use super::looked::Looked;
 use super::parts::{RawPart, RawTask};
 use super::questions::PartialQuestion;
 use super::tracks::{RawRule, RawTrack};
+use super::{Content, Named};
 use crate::procedure::{Constant, Ladder, QuestPlus, Rule, Staircase, Track};
 use crate::protocol::{
     Compared, FamilyRules, Method, Mushra, Pairs, Part, Presentations, QuestionKind, Task,
@@ -53,7 +53,7 @@ impl Raw {
             let named = family.files.iter().map(|(key, file)| Named {
                 place: format!("{}.{key}", family.path),
                 file: file.clone(),
-                orders: false,
+                content: Content::Model,
             });
             named.collect::<Vec<_>>()
         };
