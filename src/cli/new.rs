@@ -97,14 +97,21 @@ pub(super) struct Args {
     /// What a trial is
     #[arg(long, value_enum, default_value_t = TrialKind::Rating, conflicts_with = "from")]
     kind: TrialKind,
+    /// The seed of the orders; otherwise today's date, as 20260131
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=MAX_SEED))]
+    seed: Option<u64>,
 }
+
+/// The largest integer of TOML.
+const MAX_SEED: u64 = i64::MAX as u64;
 
 /// Runs `study new`.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let dir = &args.dir;
     refuse_unless_empty(dir)?;
     let today = chrono::Local::now().date_naive();
-    let seed = today.format("%Y%m%d").to_string().parse().unwrap_or(1);
+    let of_today = || today.format("%Y%m%d").to_string().parse().unwrap_or(1);
+    let seed = args.seed.unwrap_or_else(of_today);
     let files = match &args.from {
         Some(results) => replication(results, &today.to_string(), seed)?,
         None => starter(dir, seed, args.kind)?,

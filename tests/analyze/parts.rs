@@ -38,7 +38,7 @@ pub(crate) fn analyzed(folder: &Path) -> Value {
 /// the study's folder.
 fn rehearsed(folder: &Path, kind: &str) -> Value {
     for arguments in [
-        vec!["new", kind, "--kind", kind],
+        vec!["new", "--seed", "20261123", kind, "--kind", kind],
         vec!["rehearse", kind, "--participants", "2", "--out", "out"],
     ] {
         let (code, _, err) = study(&arguments, folder);
@@ -257,7 +257,10 @@ fn a_track_of_a_study_gives_the_threshold_of_its_table() {
 #[test]
 fn exclusion_rules_apply_to_parts() {
     let folder = tempfile::tempdir().unwrap();
-    let (code, _, err) = study(&["new", "pairs", "--kind", "pairs"], folder.path());
+    let (code, _, err) = study(
+        &["new", "--seed", "20261123", "pairs", "--kind", "pairs"],
+        folder.path(),
+    );
     assert_eq!(code, 0, "{err}");
     let file = folder.path().join("pairs/protocol.toml");
     let protocol = fs::read_to_string(&file).unwrap();
@@ -342,7 +345,7 @@ fn magnitude_estimates_of_a_study_give_the_exponent_of_their_table() {
 fn ratings_beside_a_reference_are_screened_and_rated_as_their_table() {
     let folder = tempfile::tempdir().unwrap();
     for arguments in [
-        vec!["new", "m", "--kind", "mushra"],
+        vec!["new", "--seed", "20261123", "m", "--kind", "mushra"],
         vec!["rehearse", "m", "--participants", "3", "--out", "out"],
         vec!["verify", "out"],
     ] {
@@ -391,7 +394,7 @@ fn yes_no_and_abx_are_rehearsed_and_analyzed() {
             assert_eq!(code, 0, "{out}{err}");
             out
         };
-        study(&["new", "p", "--kind", kind]);
+        study(&["new", "--seed", "20261123", "p", "--kind", kind]);
         let file = folder.path().join("p/protocol.toml");
         let text = fs::read_to_string(&file).unwrap();
         let fewer = text.replace("repetitions = 20", "repetitions = 4");

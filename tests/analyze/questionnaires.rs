@@ -20,7 +20,7 @@ kind = "nasa-tlx"
 #[test]
 fn questionnaires_are_answered_scored_and_reported() {
     let folder = tempfile::tempdir().unwrap();
-    let (code, _, err) = study(&["new", "s"], folder.path());
+    let (code, _, err) = study(&["new", "--seed", "20261123", "s"], folder.path());
     assert_eq!(code, 0, "{err}");
     let path = folder.path().join("s/protocol.toml");
     let protocol = fs::read_to_string(&path).unwrap() + QUESTIONNAIRES;
@@ -70,7 +70,10 @@ fn questionnaires_are_answered_scored_and_reported() {
 #[test]
 fn magnitudes_of_realizations_are_estimated_and_compared() {
     let folder = tempfile::tempdir().unwrap();
-    let (code, _, err) = study(&["new", "m", "--kind", "pairs"], folder.path());
+    let (code, _, err) = study(
+        &["new", "--seed", "20261123", "m", "--kind", "pairs"],
+        folder.path(),
+    );
     assert_eq!(code, 0, "{err}");
     let path = folder.path().join("m/protocol.toml");
     let text = fs::read_to_string(&path).unwrap();
@@ -115,7 +118,7 @@ fn magnitudes_of_realizations_are_estimated_and_compared() {
 #[test]
 fn the_share_of_an_answer_is_analyzed() {
     let folder = tempfile::tempdir().unwrap();
-    let (code, _, err) = study(&["new", "s"], folder.path());
+    let (code, _, err) = study(&["new", "--seed", "20261123", "s"], folder.path());
     assert_eq!(code, 0, "{err}");
     let path = folder.path().join("s/protocol.toml");
     let text = fs::read_to_string(&path).unwrap();

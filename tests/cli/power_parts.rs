@@ -9,7 +9,7 @@ use std::path::Path;
 
 /// A new study of a kind, in `folder`.
 fn new(kind: &str, folder: &Path) -> String {
-    let (code, _, err) = study(&["new", kind, "--kind", kind], folder);
+    let (code, _, err) = study(&["new", "--seed", "20261123", kind, "--kind", kind], folder);
     assert_eq!(code, 0, "{err}");
     kind.to_owned()
 }

@@ -141,7 +141,7 @@ fn a_changed_protocol_is_noticed() {
 
 /// A new study of a kind with two groups and two sessions, in the folder `p`.
 fn of_parts(kind: &str, folder: &Path, participants: u32) {
-    let (code, _, said) = study(&["new", "p", "--kind", kind], folder);
+    let (code, _, said) = study(&["new", "--seed", "20261123", "p", "--kind", kind], folder);
     assert_eq!(code, 0, "{said}");
     let mut text = read(folder, "p/protocol.toml");
     for (key, value) in [("participants", participants), ("seed", 7)] {

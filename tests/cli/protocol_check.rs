@@ -562,8 +562,13 @@ fn a_language_that_is_not_shipped_lacks_sentences_and_a_study_can_replace_them()
 #[test]
 fn a_study_of_pairs_has_no_power_of_a_correlation() {
     let dir = TempDir::new().unwrap();
-    let (code, _, err) = run(dir.path(), &["new", "pairs", "--kind", "pairs"]);
+    let (code, _, err) = run(
+        dir.path(),
+        &["new", "--seed", "20261123", "pairs", "--kind", "pairs"],
+    );
     assert_eq!(code, 0, "{err}");
+    let text = fs::read_to_string(dir.path().join("pairs/protocol.toml")).unwrap();
+    assert!(text.contains("\nseed = 20261123 "), "{text}");
     let (code, out, err) = run(dir.path(), &["check", "pairs"]);
     assert_eq!(code, 0, "{err}");
     assert!(!out.contains("power:"), "{out}");

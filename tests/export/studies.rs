@@ -237,7 +237,7 @@ pub(crate) fn of_groups_and_sessions(kind: &str, home: &Path) -> PathBuf {
 
 /// A new study of a kind.
 pub(crate) fn new(kind: &str, home: &Path) -> PathBuf {
-    let (code, _, err) = study(&["new", kind, "--kind", kind], home);
+    let (code, _, err) = study(&["new", "--seed", "20261123", kind, "--kind", kind], home);
     assert_eq!(code, 0, "{err}");
     home.join(kind)
 }

@@ -22,7 +22,11 @@ fn golden(name: &str) -> Json {
 
 /// A protocol in `folder` with these tracks on a ladder of friction.
 fn protocol(folder: &Path, ladder: &str, tracks: &[(&str, String)]) {
-    study(folder, &["new", "p", "--kind", "staircase"]).success();
+    study(
+        folder,
+        &["new", "--seed", "20261123", "p", "--kind", "staircase"],
+    )
+    .success();
     let names: Vec<String> = tracks.iter().map(|(id, _)| format!("{id:?}")).collect();
     let tracks: Vec<String> = (tracks.iter())
         .map(|(id, procedure)| {
@@ -328,7 +332,11 @@ fn constant_stimuli_come_in_the_order_of_the_row() {
 #[test]
 fn the_orders_of_parts_are_shown_with_their_balance() {
     let folder = tempfile::tempdir().unwrap();
-    study(folder.path(), &["new", "pairs", "--kind", "pairs"]).success();
+    study(
+        folder.path(),
+        &["new", "--seed", "20261123", "pairs", "--kind", "pairs"],
+    )
+    .success();
     let file = folder.path().join("pairs/protocol.toml");
     let text = fs::read_to_string(&file).unwrap();
     let parts = "[[questions]]\nid = \"realism\"\nkind = \"rating\"\nprompt = \"?\"\nfrom = 1\nto = 7\n\n\
@@ -379,7 +387,11 @@ fn the_orders_of_parts_are_shown_with_their_balance() {
         "{text}"
     );
 
-    study(folder.path(), &["new", "up", "--kind", "staircase"]).success();
+    study(
+        folder.path(),
+        &["new", "--seed", "20261123", "up", "--kind", "staircase"],
+    )
+    .success();
     let arguments = ["schedule", "up", "--rows", "1-2"];
     let output = study(folder.path(), &arguments)
         .success()

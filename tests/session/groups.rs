@@ -233,7 +233,10 @@ fn two_sessions_by_keys_with_a_failed_playback_a_correction_a_quit_and_a_resume(
 #[test]
 fn tracks_of_two_sessions_have_a_threshold_in_each_and_one_contrast() {
     let folder = tempfile::tempdir().unwrap();
-    let (code, _, err) = study(&["new", "t", "--kind", "staircase"], folder.path());
+    let (code, _, err) = study(
+        &["new", "--seed", "20261123", "t", "--kind", "staircase"],
+        folder.path(),
+    );
     assert_eq!(code, 0, "{err}");
     let path = folder.path().join("t/protocol.toml");
     let text = std::fs::read_to_string(&path).unwrap();
