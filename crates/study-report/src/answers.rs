@@ -9,7 +9,7 @@ mod vaf;
 
 pub(super) use conditional::conditional;
 
-use super::{apa, sentences};
+use super::{apa, sentences, wording};
 use study_analysis::analyze::results::Number;
 use study_analysis::analyze::{Analysis, Finding, Question};
 use study_base::text::sentence;
@@ -26,7 +26,7 @@ pub(super) struct Answer {
 }
 
 impl Answer {
-    fn new(question: &str, short: String) -> Self {
+    pub(super) fn new(question: &str, short: String) -> Self {
         Self {
             question: question.to_owned(),
             short,
@@ -35,14 +35,13 @@ impl Answer {
         }
     }
 
-    /// The answer of a finding: its sentence where it is decided, else its reason; then
-    /// its caveats.
-    fn of(question: &str, f: &Finding, decided: impl FnOnce(&str) -> String) -> Self {
-        let verdict = sentences::verdict(&f.verdict);
-        let short = sentences::undefined(f).unwrap_or_else(|| decided(verdict));
-        let mut answer = Self::new(question, short);
+    /// The answer to a question with its caveats, and the finding.
+    fn to<'a>(a: &'a Analysis, question: &Question) -> Option<(Self, &'a Finding)> {
+        let f = a.finding(question)?;
+        let words = wording::of_ratings(a, f);
+        let mut answer = Self::new(&words.ask(), words.answer()?);
         answer.main = f.caveats.iter().map(sentences::caveat).collect();
-        answer
+        Some((answer, f))
     }
 }
 
@@ -69,17 +68,7 @@ pub(super) fn answers(a: &Analysis) -> Vec<Answer> {
 
 /// Whether the realizations differ.
 fn differ(a: &Analysis) -> Option<Answer> {
-    let f = a.finding(&Question::Differ)?;
-    let mut answer = Answer::of("Do the realizations differ?", f, |verdict| {
-        let test = f.test.as_ref();
-        let effect = test.map_or_else(String::new, |t| sentences::anova_effect(a, t));
-        let name = test.map_or("", |t| sentences::test_name(t.kind));
-        let result = sentences::result(f).unwrap_or_default();
-        format!(
-            "{verdict}, {result}{effect} ({name}, {}).",
-            sentences::participants(f.participants)
-        )
-    });
+    let (mut answer, _) = Answer::to(a, &Question::Differ)?;
     let friedman = sentences::friedman(a).map(|s| format!("{s}."));
     answer.main.extend(friedman);
     answer.more.extend(residuals(a));
@@ -101,14 +90,7 @@ fn residuals(a: &Analysis) -> Option<String> {
 
 /// Whether participants differ in how they rate the realizations.
 fn disagreement(a: &Analysis) -> Option<Answer> {
-    let f = a.finding(&Question::Disagreement)?;
-    let question = "Do participants disagree about the realizations?";
-    let mut answer = Answer::of(question, f, |verdict| {
-        let test = f.test.as_ref();
-        let name = test.map_or("", |t| sentences::test_name(t.kind));
-        let result = sentences::result(f).unwrap_or_default();
-        format!("{verdict}, {result} ({name}).")
-    });
+    let (mut answer, f) = Answer::to(a, &Question::Disagreement)?;
     if let Some(share) = f.effect {
         answer.main.push(format!(
             "Participants × realizations are {} of the variance.",
@@ -183,16 +165,7 @@ pub(super) fn variance_shares(a: &Analysis) -> Vec<(&'static str, f64)> {
 
 /// Whether ratings drift over the session.
 fn order(a: &Analysis) -> Option<Answer> {
-    let f = a.finding(&Question::Order)?;
-    let se = a.results.evidence.order.trial.se.number();
-    let decimals = apa::decimals(se.unwrap_or(0.0), 3);
-    let slope = f
-        .estimate
-        .map_or_else(String::new, |e| apa::number(e.value, decimals));
-    let mut answer = Answer::of("Do order and learning matter?", f, |verdict| {
-        let result = sentences::result(f).unwrap_or_default();
-        format!("{verdict}: the change is {slope} points per trial, {result} (t test).")
-    });
+    let (mut answer, _) = Answer::to(a, &Question::Order)?;
     (answer.more)
         .push("The change per trial is adjusted for participants and realizations.".to_owned());
     Some(answer)
@@ -200,14 +173,7 @@ fn order(a: &Analysis) -> Option<Answer> {
 
 /// Whether a rating depends on the one before it.
 fn carry_over(a: &Analysis) -> Option<Answer> {
-    let f = a.finding(&Question::CarryOver)?;
-    let mut answer = Answer::of("Does a rating depend on the one before it?", f, |verdict| {
-        let size = f
-            .estimate
-            .map_or_else(String::new, |e| sentences::estimate(&e, apa::two));
-        let result = sentences::result(f).unwrap_or_default();
-        format!("{verdict}: {size} points per point of the preceding rating, {result} (t test).")
-    });
+    let (mut answer, _) = Answer::to(a, &Question::CarryOver)?;
     answer.more.push(
         "Neighboring ratings are compared with all orders of the trials of a block, over \
          participants."

@@ -23,7 +23,6 @@ use super::answers::{answers, conditional};
 use super::figures::Drawn;
 use super::{Site, Source};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
-pub(super) use paragraphs::declared_test;
 use study_analysis::analyze::Analysis;
 use study_analysis::analyze::psychophysics::PartAnalysis;
 use study_base::text::{Untrusted, counted};

@@ -27,5 +27,6 @@ mod table;
 mod tables;
 pub mod text;
 pub mod wide;
+mod wording;
 
 pub use study_analysis::study::{Site, SiteDevice, Source};

@@ -1,7 +1,8 @@
 //! What was found of a part that is no rating, in sentences: for the terminal page, the
 //! report and a paper. Names in them are untrusted.
 
-use super::{apa, sentences};
+use super::answers::Answer;
+use super::{apa, sentences, wording};
 use study_analysis::analyze::psychophysics::{LevelData, PartAnalysis, PartFinding, PartQuestion};
 use study_analysis::analyze::results::{Interval, Number as _, Stat};
 use study_analysis::analyze::{Pair, Verdict};
@@ -10,14 +11,6 @@ use study_stats::psychometric::{Core, Spacing};
 
 /// The most pairs that a sentence lists.
 const MAX_LISTED: usize = 12;
-
-/// The answer to a question.
-pub(super) struct Answered {
-    pub(super) question: String,
-    /// The verdict, in one sentence.
-    pub(super) short: String,
-    pub(super) more: Vec<String>,
-}
 
 /// The banner of a part whose answers are not those of real participants.
 pub(super) fn banner(part: &PartAnalysis) -> Option<&'static str> {
@@ -30,136 +23,35 @@ pub(super) fn banner(part: &PartAnalysis) -> Option<&'static str> {
 }
 
 /// The answers to all questions.
-pub(super) fn answered(part: &PartAnalysis) -> Vec<Answered> {
-    part.findings.iter().map(|f| answer(part, f)).collect()
+pub(super) fn answered(part: &PartAnalysis) -> Vec<Answer> {
+    part.findings
+        .iter()
+        .filter_map(|f| answer(part, f))
+        .collect()
 }
 
-fn answer(part: &PartAnalysis, f: &PartFinding) -> Answered {
-    let verdict = sentences::verdict(&f.verdict);
-    let question = asked(&f.question);
-    let decided = || format!("{verdict}: {}.", result(part, f));
-    let mut more: Vec<String> = f.caveats.iter().map(sentences::caveat).collect();
+fn answer(part: &PartAnalysis, f: &PartFinding) -> Option<Answer> {
+    let words = wording::of_part(part, f);
+    let mut answer = Answer::new(&words.ask(), words.answer()?);
+    answer.main = f.caveats.iter().map(sentences::caveat).collect();
     if f.question == PartQuestion::Sessions {
-        more.extend(retest(part));
+        answer.main.extend(retest(part));
     }
     if matches!(
         f.question,
         PartQuestion::Preferred | PartQuestion::Thresholds | PartQuestion::Magnitudes
     ) {
-        more.extend(different(part));
+        answer.main.extend(different(part));
     }
-    Answered {
-        question,
-        short: sentences::undefined(f).unwrap_or_else(decided),
-        more,
-    }
-}
-
-/// The question of a finding.
-fn asked(question: &PartQuestion) -> String {
-    match question {
-        PartQuestion::Preferred => "Is a realization preferred to another?".to_owned(),
-        PartQuestion::PreferenceVaf => "Does VAF predict which is preferred?".to_owned(),
-        PartQuestion::IntervalOrder => "Does the order of the intervals matter?".to_owned(),
-        PartQuestion::ToldApart(condition) => {
-            format!("{condition}: are standard and comparison told apart?")
-        }
-        PartQuestion::Thresholds => "Do thresholds differ between the conditions?".to_owned(),
-        PartQuestion::Magnitudes => "Do the estimates differ between realizations?".to_owned(),
-        PartQuestion::MagnitudeVaf => "Does VAF predict the estimates?".to_owned(),
-        PartQuestion::Groups => "Do the groups differ?".to_owned(),
-        PartQuestion::GroupsConditions => {
-            "Does what distinguishes the conditions depend on the group?".to_owned()
-        }
-        PartQuestion::Sessions => "Do the sessions differ?".to_owned(),
-    }
-}
-
-/// A question and the test that decides it, for a preregistration.
-pub(super) fn declared(part: &PartAnalysis, f: &PartFinding) -> String {
-    let question = format!("Part `{}`: {}", part.part, asked(&f.question));
-    match &f.test {
-        Some(test) => format!(
-            "{question} Decided by: {}; level {}.",
-            sentences::corrected(test),
-            sentences::level(test.level)
-        ),
-        None => format!("{question} No test: {}.", f.reason().unwrap_or_default()),
-    }
-}
-
-/// What the deciding test says: `r = .93, 95 % CI [.71, .98], p = .008 (permutation test,
-/// exact, 5 realizations)`.
-fn result(part: &PartAnalysis, f: &PartFinding) -> String {
-    let tested = sentences::result(f).unwrap_or_default();
-    let test = f
-        .test
-        .as_ref()
-        .map_or_else(String::new, sentences::corrected);
-    let people = sentences::participants(f.participants);
-    let estimate = |format: fn(f64) -> String| {
-        let e = f.estimate.as_ref();
-        e.map_or_else(String::new, |e| sentences::estimate(e, format))
-    };
-    match &f.question {
-        PartQuestion::Preferred => {
-            let clearest = clearest(part).map_or(tested.clone(), |p| {
-                let (first, second) = (&p.first, &p.second);
-                // the statistic of the pair has the sign of the difference that is printed
-                let of_pair = p.test.as_ref();
-                let tested = of_pair.map_or(tested, |t| sentences::tested(t, f.participants));
-                format!(
-                    "{first} over {second} by {}, {tested}",
-                    sentences::estimate(&p.difference, apa::two)
-                )
-            });
-            format!("{clearest} ({test}, {people})")
-        }
-        PartQuestion::PreferenceVaf | PartQuestion::MagnitudeVaf => {
-            let n = counted(f.realizations, "realization", "realizations");
-            format!("r = {}, {tested} ({test}, {n})", estimate(apa::r))
-        }
-        PartQuestion::IntervalOrder => {
-            let first = "for what is presented first";
-            format!("{} {first}, {tested} ({test})", estimate(apa::two))
-        }
-        PartQuestion::ToldApart(_) => {
-            format!(
-                "mean d′ {}, {tested} ({test}, {people})",
-                estimate(apa::two)
-            )
-        }
-        PartQuestion::Thresholds | PartQuestion::Magnitudes => {
-            format!("{tested} ({test}, {people})")
-        }
-        PartQuestion::Groups | PartQuestion::GroupsConditions | PartQuestion::Sessions => {
-            let size = f.estimate.as_ref().map_or_else(String::new, |e| {
-                format!("{} {}, ", e.name, sentences::estimate(e, apa::two))
-            });
-            format!("{size}{tested} ({test}, {people})")
-        }
-    }
-}
-
-/// The pair with the smallest p, the higher one first.
-fn clearest(part: &PartAnalysis) -> Option<Pair> {
-    let p = |pair: &&Pair| pair.test.as_ref().map_or(f64::INFINITY, |t| t.p);
-    let pair = part.pairs.iter().min_by(|a, b| p(a).total_cmp(&p(b)))?;
-    Some(upwards(pair))
-}
-
-/// A pair seen from the one with the higher value. Ratios stay as they are.
-fn upwards(pair: &Pair) -> Pair {
-    match pair.difference.value < 0.0 {
-        true => pair.seen_from(&pair.second),
-        false => pair.clone(),
-    }
+    Some(answer)
 }
 
 /// The pairs that differ.
 fn different(part: &PartAnalysis) -> Option<String> {
     let differ = part.pairs.iter().filter(|p| p.verdict == Verdict::Yes);
-    let differ: Vec<String> = differ.map(|pair| of_pair(&upwards(pair))).collect();
+    let differ: Vec<String> = differ
+        .map(|pair| of_pair(&wording::upwards(pair)))
+        .collect();
     let shown = differ.len().min(MAX_LISTED);
     let more = match differ.len() - shown {
         0 => String::new(),
@@ -212,71 +104,8 @@ pub(super) fn results(part: &PartAnalysis) -> String {
     let mut text: Vec<String> = thresholds(part);
     text.extend(scores(part));
     text.extend(exponent(part));
-    for f in &part.findings {
-        let Some(test) = &f.test else { continue };
-        let what = result(part, f);
-        let significant = test.is_significant();
-        text.push(match (&f.question, significant) {
-            (PartQuestion::Preferred, true) => {
-                format!("Preferences differed between realizations: {what}.")
-            }
-            (PartQuestion::Preferred, false) => {
-                format!("No difference of preference between realizations was shown: {what}.")
-            }
-            (PartQuestion::PreferenceVaf, true) => {
-                format!("Preference was correlated with VAF, {what}.")
-            }
-            (PartQuestion::PreferenceVaf, false) => {
-                format!("No correlation of preference with VAF was shown, {what}.")
-            }
-            (PartQuestion::IntervalOrder, true) => {
-                format!("The order of the intervals mattered, {what}.")
-            }
-            (PartQuestion::IntervalOrder, false) => {
-                format!("No effect of the order of the intervals was shown, {what}.")
-            }
-            (PartQuestion::ToldApart(c), _) if f.is_yes() => {
-                format!("{c}: standard and comparison were told apart, {what}.")
-            }
-            (PartQuestion::ToldApart(c), _) => {
-                format!(
-                    "{c}: it was not shown that standard and comparison are told apart, {what}."
-                )
-            }
-            (PartQuestion::Magnitudes, true) => {
-                format!("Estimates differed between realizations, {what}.")
-            }
-            (PartQuestion::Magnitudes, false) => {
-                format!("No difference of estimates between realizations was shown, {what}.")
-            }
-            (PartQuestion::MagnitudeVaf, true) => {
-                format!("Estimates (logarithms) were correlated with VAF, {what}.")
-            }
-            (PartQuestion::MagnitudeVaf, false) => {
-                format!("No correlation of estimates (logarithms) with VAF was shown, {what}.")
-            }
-            (PartQuestion::Groups, true) => format!("The groups differed, {what}."),
-            (PartQuestion::Groups, false) => {
-                format!("No difference between the groups was shown, {what}.")
-            }
-            (PartQuestion::GroupsConditions, true) => {
-                format!("The differences between the conditions depended on the group, {what}.")
-            }
-            (PartQuestion::GroupsConditions, false) => {
-                format!("No interaction of group and condition was shown, {what}.")
-            }
-            (PartQuestion::Sessions, true) => format!("The sessions differed, {what}."),
-            (PartQuestion::Sessions, false) => {
-                format!("No difference between the sessions was shown, {what}.")
-            }
-            (PartQuestion::Thresholds, true) => {
-                format!("Thresholds differed between conditions, {what}.")
-            }
-            (PartQuestion::Thresholds, false) => {
-                format!("No difference of thresholds between conditions was shown, {what}.")
-            }
-        });
-    }
+    let tested = part.findings.iter().filter(|f| f.test.is_some());
+    text.extend(tested.filter_map(|f| wording::of_part(part, f).paper()));
     text.extend(retest(part));
     let pairs = part.findings.iter().any(|f| {
         let of_conditions = [PartQuestion::Thresholds, PartQuestion::Magnitudes];

@@ -1,9 +1,8 @@
 //! The preregistration as a document.
 
-use super::html::declared_test;
 use super::power::{Report, own_design};
 use super::study::track_in_words;
-use super::{apa, part_answers, sentences};
+use super::{apa, sentences, wording};
 use chrono::NaiveDate;
 use serde_json::{Value, json};
 use study_analysis::analyze::psychophysics::PartAnalysis;
@@ -181,13 +180,11 @@ fn markdown(c: &Content<'_>) -> String {
          decides.",
         sentences::level(p.analysis.alpha())
     )];
-    tests.extend(c.analysis.findings.iter().filter_map(|f| {
-        let (what, test) = declared_test(c.analysis, f)?;
-        Some(format!("{what}: {test}."))
-    }));
+    let findings = c.analysis.findings.iter();
+    tests.extend(findings.filter_map(|f| wording::declared(c.analysis, f)));
     for part in c.parts {
         let own = part.findings.iter();
-        tests.extend(own.map(|f| part_answers::declared(part, f)));
+        tests.extend(own.filter_map(|f| wording::declared_of_part(part, f)));
     }
     if tests.len() == 1 {
         tests.push(

@@ -2,7 +2,7 @@
 //! report and its paragraphs. Names in them are untrusted.
 
 use super::apa;
-use study_analysis::analyze::findings::{Direction, Estimate, Statistic};
+use study_analysis::analyze::findings::{Estimate, Statistic};
 use study_analysis::analyze::results::{Coefficients, Interval, Number as _, ReferenceTest};
 use study_analysis::analyze::{
     Analysis, Finding, Pair, PreregisteredRule, Test, TestKind, Verdict, Warning,
@@ -16,11 +16,6 @@ pub(super) fn verdict(verdict: &Verdict) -> &'static str {
         Verdict::NotShown => "Not shown",
         Verdict::Undefined(_) => "Cannot be determined",
     }
-}
-
-/// The sentence of a finding without a test: `Cannot be determined: …`.
-pub(super) fn undefined<Q>(f: &Finding<Q>) -> Option<String> {
-    Some(format!("{}: {}.", verdict(&f.verdict), f.reason()?))
 }
 
 /// The name of a test.
@@ -304,21 +299,4 @@ pub(super) fn level(alpha: f64) -> String {
 /// `12 participants`.
 pub(super) fn participants(n: usize) -> String {
     counted(n, "participant", "participants")
-}
-
-/// The verdict on the memory.
-pub(super) fn memory_verdict(f: &Finding) -> String {
-    match (&f.verdict, f.direction) {
-        (Verdict::Yes, Some(Direction::Up)) => {
-            "Yes: over these realizations, those with a longer memory are rated higher".to_owned()
-        }
-        (Verdict::Yes, Some(Direction::Down)) => {
-            "Yes: over these realizations, those with a shorter memory are rated higher".to_owned()
-        }
-        (Verdict::Yes, _) => {
-            "Yes: over these realizations the rating is a curved function of the memory".to_owned()
-        }
-        (Verdict::NotShown, _) => "Not shown".to_owned(),
-        (Verdict::Undefined(why), _) => format!("{}: {why}", verdict(&f.verdict)),
-    }
 }

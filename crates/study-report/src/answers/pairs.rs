@@ -4,47 +4,13 @@ use super::Answer;
 use crate::{apa, sentences};
 use study_analysis::analyze::results::Number as _;
 use study_analysis::analyze::{Analysis, MAX_PAIRED, Question, Test};
-use study_base::text::counted;
 
 /// Pairs that are listed.
 const MAX_LISTED: usize = 10;
 
 /// Whether the best-rated realization differs from the second best.
 pub(super) fn best_two(a: &Analysis) -> Option<Answer> {
-    let f = a.finding(&Question::Best)?;
-    let ranked = a.ranked();
-    let mean = |name: &str| {
-        let found = ranked.iter().find(|r| r.1 == name);
-        found.map_or_else(String::new, |r| apa::two(r.0))
-    };
-    let (most, what) = (a.better.most(), sentences::mean(a));
-    let both = match &f.names[..] {
-        [first, second] => format!(
-            "{first} ({what} {}) and {second} ({what} {})",
-            mean(first),
-            mean(second)
-        ),
-        _ => String::new(),
-    };
-    let question = "Does the best-rated realization differ from the second best?";
-    let mut answer = Answer::of(question, f, |verdict| {
-        let Some(test) = &f.test else {
-            let (all, mean) = (apa::listing(&f.names), mean(&f.names[0]));
-            return format!("{verdict}: {all} share the {most} {what}, {mean}.");
-        };
-        let alone = match a.design.realizations {
-            2 => "",
-            _ => ", these two only, not corrected",
-        };
-        format!(
-            "{verdict}: {both}, {} ({}{alone}).",
-            sentences::tested(test, f.participants),
-            sentences::corrected(test)
-        )
-    });
-    if let Some(why) = f.reason() {
-        answer.short = format!("Cannot be determined: {both}; {why}.");
-    }
+    let (mut answer, f) = Answer::to(a, &Question::Best)?;
     if let (Some(e), [first, second], true) = (f.estimate, &f.names[..], f.test.is_some()) {
         let dz = f.effect.map_or_else(String::new, |dz| {
             format!(" (Cohen's dz = {})", apa::two(dz.value))
@@ -59,26 +25,8 @@ pub(super) fn best_two(a: &Analysis) -> Option<Answer> {
 
 /// Which pairs differ.
 pub(super) fn which(a: &Analysis) -> Option<Answer> {
-    let f = a.finding(&Question::Pairs)?;
+    let (mut answer, _) = Answer::to(a, &Question::Pairs)?;
     let different = a.different_pairs();
-    let all = match a.design.realizations {
-        k if k <= MAX_PAIRED => counted(a.pairs.len(), "pair", "pairs"),
-        _ => format!(
-            "{} with the {} {}",
-            counted(a.pairs.len(), "pair", "pairs"),
-            a.better.most(),
-            sentences::mean(a)
-        ),
-    };
-    let mut answer = Answer::of("Which pairs of realizations differ?", f, |verdict| {
-        let test = f.test.as_ref();
-        let how = test.map_or_else(String::new, sentences::corrected);
-        let p = test.map_or_else(String::new, sentences::p);
-        match different.len() {
-            0 => format!("{verdict} for any of {all}, smallest {p} ({how})."),
-            n => format!("{verdict}: {n} of {all} ({how})."),
-        }
-    });
     let listed = different.iter().take(MAX_LISTED);
     answer
         .main

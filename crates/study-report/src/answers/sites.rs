@@ -3,7 +3,7 @@
 use super::Answer;
 use crate::{apa, sentences};
 use study_analysis::analyze::results::Number as _;
-use study_analysis::analyze::{Analysis, Finding, Question};
+use study_analysis::analyze::{Analysis, Question};
 
 pub(super) fn sites(a: &Analysis) -> Vec<Answer> {
     [realizations(a), vaf(a), level(a)]
@@ -12,18 +12,8 @@ pub(super) fn sites(a: &Analysis) -> Vec<Answer> {
         .collect()
 }
 
-/// Verdict, result and test.
-fn tested(f: &Finding, verdict: &str) -> String {
-    let name = (f.test.as_ref()).map_or("", |t| sentences::test_name(t.kind));
-    let result = sentences::result(f).unwrap_or_default();
-    let n = sentences::participants(f.participants);
-    format!("{verdict}, {result} ({name}, {n}).")
-}
-
 fn realizations(a: &Analysis) -> Option<Answer> {
-    let f = a.finding(&Question::SiteRealizations)?;
-    let question = "Do the differences between realizations depend on the site?";
-    let mut answer = Answer::of(question, f, |verdict| tested(f, verdict));
+    let (mut answer, f) = Answer::to(a, &Question::SiteRealizations)?;
     if let Some(effect) = f.effect {
         let share = apa::share(effect.value, 2);
         answer.main.push(format!("Partial η² = {share}."));
@@ -48,9 +38,7 @@ fn realizations(a: &Analysis) -> Option<Answer> {
 }
 
 fn vaf(a: &Analysis) -> Option<Answer> {
-    let f = a.finding(&Question::SiteVaf)?;
-    let question = "Does the effect of VAF depend on the site?";
-    let mut answer = Answer::of(question, f, |verdict| tested(f, verdict));
+    let (mut answer, _) = Answer::to(a, &Question::SiteVaf)?;
     for site in &a.sites {
         let of_site =
             (a.results.evidence.sites.as_ref()).and_then(|s| s.vaf.by_site.get(site.as_str()));
@@ -82,10 +70,7 @@ fn vaf(a: &Analysis) -> Option<Answer> {
 }
 
 fn level(a: &Analysis) -> Option<Answer> {
-    let f = a.finding(&Question::SiteLevel)?;
-    let mut answer = Answer::of("Do the sites differ in their mean rating?", f, |verdict| {
-        tested(f, verdict)
-    });
+    let (mut answer, f) = Answer::to(a, &Question::SiteLevel)?;
     let means: Vec<String> = (a.sites.iter())
         .filter_map(|site| {
             let found = (a.results.evidence.sites.as_ref()?)

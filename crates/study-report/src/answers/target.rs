@@ -2,9 +2,9 @@
 //! ratings, references and hidden duplicates.
 
 use super::Answer;
-use crate::{apa, sentences};
+use crate::{apa, sentences, wording};
 use study_analysis::analyze::results::Number as _;
-use study_analysis::analyze::{Analysis, Better, Finding, PreregisteredRule, Question, Verdict};
+use study_analysis::analyze::{Analysis, Better, PreregisteredRule, Question};
 use study_base::text::capital;
 use study_session::outcome::Role;
 
@@ -55,15 +55,16 @@ pub(super) fn target(a: &Analysis) -> Option<Answer> {
     let mut answer = Answer::new(&question, short);
     answer.main = against_references(a);
     answer.more.extend(shares(a, &ranked));
-    for (role, name) in [
-        (Role::HiddenReference, "hidden reference"),
-        (Role::Physical, "physical device"),
-        (Role::LowAnchor, "low anchor"),
-        (Role::MidAnchor, "mid anchor"),
-    ] {
+    let roles = [
+        Role::HiddenReference,
+        Role::Physical,
+        Role::LowAnchor,
+        Role::MidAnchor,
+    ];
+    for role in roles {
         for m in a.realizations.iter().filter(|m| m.role == role) {
             if let Some(mean) = a.described(&m.id).map(|d| &d.mean).number() {
-                let mean = apa::two(mean);
+                let (mean, name) = (apa::two(mean), wording::role(role));
                 (answer.more).push(format!("Mean rating of the {name} {}: {mean}.", m.id));
             }
         }
@@ -138,68 +139,27 @@ fn against_references(a: &Analysis) -> Vec<String> {
             _ => equivalence(a, best, reference),
         };
         let equivalence = equivalence.map_or_else(String::new, |e| format!(" {e}"));
-        let differ = match f.verdict {
-            Verdict::Yes => "they differ, ",
-            Verdict::NotShown | Verdict::Undefined(_) => "a difference is not shown, ",
-        };
-        let difference = difference(f, (best, reference), differ);
+        let difference = wording::of_ratings(a, f).answer().unwrap_or_default();
         found.push(format!("{difference}{equivalence}"));
     }
     found
 }
 
-/// The difference of two realizations, with `verdict` before its test.
-fn difference(f: &Finding, (first, second): (&str, &str), verdict: &str) -> String {
-    let size = f
-        .estimate
-        .map_or_else(String::new, |e| sentences::estimate(&e, apa::two));
-    let result = match (&f.test, f.reason()) {
-        (Some(test), _) => format!(
-            "{verdict}{} ({})",
-            sentences::tested(test, f.participants),
-            sentences::corrected(test)
-        ),
-        (None, why) => format!("not tested: {}", why.unwrap_or_default()),
-    };
-    format!("{first} minus {second} over participants: {size}; {result}.")
-}
-
 fn equivalence(a: &Analysis, best: &str, reference: &str) -> Option<String> {
     let contrast = a.against(reference, best)?;
     let f = a.finding(&Question::Equivalence(reference.to_owned()));
-    let Some((f, test)) = f.and_then(|f| Some((f, f.test.as_ref()?))) else {
+    let Some(f) = f.filter(|f| f.test.is_some()) else {
         return sentences::no_equivalence(a, contrast);
     };
-    let margin = contrast.equivalence.as_ref()?.margin.number()?;
-    let later = match a.changed(PreregisteredRule::Margin) {
-        true => " (changed after the study began)",
-        false => "",
-    };
-    let not = if f.is_yes() { "" } else { "not shown to be " };
-    Some(format!(
-        "Within the margin of ± {margin}{later} they are {not}equivalent ({}, {}).",
-        sentences::test_name(test.kind),
-        sentences::p(test)
-    ))
+    wording::of_ratings(a, f).answer()
 }
 
 /// Whether hidden duplicates are rated like their originals.
 pub(super) fn repeats(a: &Analysis) -> Option<Answer> {
-    let all: Vec<&Finding> = (a.findings.iter())
-        .filter(|f| matches!(f.question, Question::Repeat(_)))
-        .collect();
-    let (first, others) = all.split_first()?;
-    let sentence = |f: &Finding| {
-        let difference = match &f.names[..] {
-            [duplicate, original] => difference(f, (duplicate, original), ""),
-            _ => String::new(),
-        };
-        format!("{}: {difference}", sentences::verdict(&f.verdict))
-    };
-    let mut answer = Answer::new(
-        "Are hidden duplicates rated differently from their originals?",
-        sentence(first),
-    );
-    answer.main.extend(others.iter().map(|f| sentence(f)));
+    let all = (a.findings.iter()).filter(|f| matches!(f.question, Question::Repeat(_)));
+    let mut all = all.map(|f| wording::of_ratings(a, f));
+    let first = all.next()?;
+    let mut answer = Answer::new(&first.ask(), first.answer()?);
+    answer.main.extend(all.filter_map(|words| words.answer()));
     Some(answer)
 }

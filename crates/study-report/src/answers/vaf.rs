@@ -2,7 +2,6 @@
 
 use super::Answer;
 use crate::{apa, sentences};
-use study_analysis::analyze::findings::Direction;
 use study_analysis::analyze::results::Number as _;
 use study_analysis::analyze::{Analysis, Question};
 use study_stats::permutation::DRAWS;
@@ -13,30 +12,12 @@ const MAX_COVARIATES: usize = 8;
 /// Whether VAF predicts the rating.
 pub(super) fn predicts(a: &Analysis) -> Option<Answer> {
     let correlation = a.correlation();
-    let f = a.finding(&Question::Vaf)?;
-    let question = format!("Does VAF predict {}?", sentences::asked(a));
-    let n = f.realizations;
-    let mut answer = Answer::of(&question, f, |verdict| {
-        let verdict = match f.direction {
-            Some(Direction::Up) => format!(
-                "{verdict}: over these {n} realizations, those with a higher VAF are rated higher"
-            ),
-            Some(_) => format!(
-                "{verdict}: over these {n} realizations, those with a higher VAF are rated lower"
-            ),
-            None => format!("{verdict} over these {n} realizations"),
-        };
-        let r = f
-            .estimate
-            .map_or_else(String::new, |e| sentences::estimate(&e, apa::r));
-        let p = sentences::permutation_p(a, correlation.pearson.permutation_p());
-        format!("{verdict}: r = {r}{p} (two-sided).")
-    });
+    let (mut answer, f) = Answer::to(a, &Question::Vaf)?;
     if f.test.is_none() {
         return Some(answer);
     }
     let caveats = std::mem::take(&mut answer.main);
-    answer.main.extend(points(a, n));
+    answer.main.extend(points(a, f.realizations));
     answer.main.extend(sentences::ties(a));
     let detectable = a.results.sensitivity.correlation.number();
     answer.main.extend(detectable.map(|r| {
@@ -101,25 +82,8 @@ pub(super) fn predicts(a: &Analysis) -> Option<Answer> {
 /// Whether the VAF of what was delivered predicts the rating. Without a validation
 /// recording nobody asks; the section on the force has the reason.
 pub(super) fn delivered(a: &Analysis) -> Option<Answer> {
-    let f = a
-        .finding(&Question::Delivered)
-        .filter(|f| f.realizations > 0)?;
-    let question = format!(
-        "Does the VAF of what was delivered predict {}?",
-        sentences::asked(a)
-    );
-    let n = f.realizations;
-    let mut answer = Answer::of(&question, f, |verdict| {
-        let r = f
-            .estimate
-            .map_or_else(String::new, |e| sentences::estimate(&e, apa::r));
-        let result = f
-            .test
-            .as_ref()
-            .map_or_else(String::new, sentences::corrected);
-        let p = sentences::result(f).unwrap_or_default();
-        format!("{verdict}: over these {n} realizations r = {r}, {p} ({result}).")
-    });
+    let (mut answer, _) =
+        Answer::to(a, &Question::Delivered).filter(|(_, f)| f.realizations > 0)?;
     if let Some(r) = a.correlation().pearson.r.number() {
         answer.main.push(format!(
             "With the VAF of the identification the same means correlate at r = {}.",
@@ -217,39 +181,16 @@ fn ordinal(a: &Analysis) -> Option<String> {
 
 /// Whether the forgetting factor or other covariates matter.
 pub(super) fn covariates(a: &Analysis) -> Option<Answer> {
-    let memory = a.results.evidence.covariates.log10_memory.as_ref();
-    let line = memory.map(|m| &m.line);
-    let r_of_memory = line.map(|l| &l.r).number();
     let others = others(a);
-    let short = match a.finding(&Question::Memory) {
-        Some(f) => {
-            let r = r_of_memory.map_or_else(String::new, |r| {
-                let test = line.and_then(|l| l.t.number().zip(l.df.number()).zip(l.p.number()));
-                let test = test.map_or_else(String::new, |((t, df), p)| {
-                    let (df, t) = (apa::number(df, 0), apa::two(t));
-                    let level = f.test.as_ref().map_or(a.alpha, |t| t.level);
-                    format!(", t({df}) = {t}, p {}", apa::p_beside(p, level))
-                });
-                let unit = match memory {
-                    Some(memory) if memory.in_mm.is_set() => "mm",
-                    _ => "samples",
-                };
-                format!(
-                    "; mean rating against log10 of the memory in {unit}: r = {}{test}",
-                    apa::r(r)
-                )
-            });
-            format!("{}{r}.", sentences::memory_verdict(f))
-        }
-        None if others.is_empty() => return None,
-        None => "Correlations of the mean rating with the covariates:".to_owned(),
+    let memory = Answer::to(a, &Question::Memory).map(|(answer, _)| answer);
+    let asked = memory.is_some();
+    let correlations = || {
+        let title = "Correlations of the mean rating with the covariates:";
+        Answer::new("Do the covariates matter?", title.to_owned())
     };
-    let question = if a.has_memory() {
-        "Does the forgetting factor matter?"
-    } else {
-        "Do the covariates matter?"
-    };
-    let mut answer = Answer::new(question, short);
+    let correlations = || (!others.is_empty()).then(correlations);
+    let mut answer = memory.or_else(correlations)?;
+    let line = (a.results.evidence.covariates.log10_memory.as_ref()).map(|m| &m.line);
     answer.main.extend(curvature(a));
     if let Some(r) = line.map(|l| &l.r_with_vaf).number() {
         answer.main.push(format!(
@@ -265,11 +206,11 @@ pub(super) fn covariates(a: &Analysis) -> Option<Answer> {
                 .to_owned(),
         );
     }
-    match a.finding(&Question::Memory) {
-        Some(_) => answer.more.extend(others),
-        None => answer.main.extend(others),
+    match asked {
+        true => answer.more.extend(others),
+        false => answer.main.extend(others),
     }
-    if r_of_memory.is_some() {
+    if line.map(|l| &l.r).number().is_some() {
         answer.more.push(
             "The memory is the length over which the identification averages: the closer the \
              forgetting factor λ is to 1, the longer."

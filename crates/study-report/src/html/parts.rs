@@ -5,7 +5,7 @@ use super::tables::table;
 use super::{Details, figures_section, safe, statistics, typeset};
 use crate::Source;
 use crate::figures::Drawn;
-use crate::part_answers::{Answered, answered, answers, banner, caveats, methods, results};
+use crate::part_answers::{answered, answers, banner, caveats, methods, results};
 use crate::tables::parts::tables;
 use maud::{Markup, html};
 use study_analysis::analyze::psychophysics::PartAnalysis;
@@ -88,10 +88,10 @@ fn section(part: &PartAnalysis, report: &PartReport, first: usize) -> Markup {
                     ul { @for text in &caveats { li { (safe(text)) } } }
                 }
             }
-            @for Answered { question, short, more } in &answered(part) {
-                h3 { (safe(question)) }
-                p.short { (typeset(short)) }
-                @for line in more { p { (typeset(line)) } }
+            @for answer in &answered(part) {
+                h3 { (safe(&answer.question)) }
+                p.short { (typeset(&answer.short)) }
+                @for line in &answer.main { p { (typeset(line)) } }
             }
             (figures_section(&report.figures, first))
             @for own in &tables(&part.results) { (table(own)) }

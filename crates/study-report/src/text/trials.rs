@@ -3,7 +3,7 @@
 use super::Page;
 use super::layout::{Grid, Paint, wrap};
 use crate::apa::name;
-use crate::part_answers::{Answered, answered, answers, banner, caveats};
+use crate::part_answers::{answered, answers, banner, caveats};
 use crate::table::Table;
 use crate::tables::parts::tables;
 use study_analysis::analyze::psychophysics::PartAnalysis;
@@ -34,15 +34,10 @@ pub fn part(title: &str, part: &PartAnalysis, page: Page) -> String {
     }
     out.push('\n');
     out += &all_tables(&part.results, page);
-    for Answered {
-        question,
-        short,
-        more,
-    } in answered(part)
-    {
-        out += &paint.strong(&Untrusted(&question).to_string());
+    for answer in answered(part) {
+        out += &paint.strong(&Untrusted(&answer.question).to_string());
         out.push('\n');
-        for sentence in [short].iter().chain(&more) {
+        for sentence in [answer.short].iter().chain(&answer.main) {
             out += &wrap(&Untrusted(sentence).to_string(), width, "  ", "  ");
         }
         out.push('\n');
