@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
+use tempfile::TempDir;
 
 /// The schema of docs/page.md, which here allows nothing that it does not describe.
 pub(crate) fn schema() -> Value {
@@ -326,23 +327,23 @@ fn of(journal: &[Value], event: &str) -> usize {
     journal.iter().filter(|e| e["event"] == event).count()
 }
 
-/// A study in which a playback lasts until somebody ends it.
-fn patient(folder: &Path) -> PathBuf {
-    let protocol = folder.join("patient");
+/// A session with a front, of a study in which a playback lasts until somebody ends it.
+fn patient() -> (TempDir, Session, Relay) {
+    let folder = tempfile::tempdir().unwrap();
+    let protocol = folder.path().join("patient");
     let once = ("repetitions = 3", "repetitions = 1");
     changed_protocol("turn-signal", &protocol, &[PATIENT, once]);
-    protocol
+    let command = Relay::command(folder.path());
+    let session = Session::start(folder.path(), &protocol, &command);
+    let relay = Relay::open(folder.path());
+    (folder, session, relay)
 }
 
 /// Whatever a front does wrong in the middle of a playback, the device stops, the reason is
 /// said, and the front that is started again goes on where the session is.
 #[test]
 fn a_front_that_is_lost_stops_the_device_and_no_answer_is_lost() {
-    let folder = tempfile::tempdir().unwrap();
-    let protocol = patient(folder.path());
-    let command = Relay::command(folder.path());
-    let mut session = Session::start(folder.path(), &protocol, &command);
-    let mut relay = Relay::open(folder.path());
+    let (folder, mut session, mut relay) = patient();
     relay.play(is_rating);
     relay.reply("answer");
     assert_eq!(relay.settled()["outcome"], "saved");
@@ -413,11 +414,7 @@ fn a_front_that_is_lost_stops_the_device_and_no_answer_is_lost() {
 
 #[test]
 fn a_stop_is_taken_behind_a_flood_and_replies_to_other_pages_change_nothing() {
-    let folder = tempfile::tempdir().unwrap();
-    let protocol = patient(folder.path());
-    let command = Relay::command(folder.path());
-    let mut session = Session::start(folder.path(), &protocol, &command);
-    let mut relay = Relay::open(folder.path());
+    let (folder, mut session, mut relay) = patient();
     relay.play(is_playing);
     // Stale replies, nearly as many as may wait, and a stop behind them.
     for key in 0..7 {
@@ -454,11 +451,7 @@ fn a_stop_is_taken_behind_a_flood_and_replies_to_other_pages_change_nothing() {
 /// A front that is stopped and answers no ping.
 #[test]
 fn a_front_that_hangs_is_lost() {
-    let folder = tempfile::tempdir().unwrap();
-    let protocol = patient(folder.path());
-    let command = Relay::command(folder.path());
-    let mut session = Session::start(folder.path(), &protocol, &command);
-    let mut relay = Relay::open(folder.path());
+    let (_folder, mut session, mut relay) = patient();
     relay.play(is_playing);
     session.wait_for("it has answered no ping for 5 s");
     relay = relay.again();
