@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::tables;
+use std::cell::Cell;
 use std::time::Duration;
 use study_base::limits::{Limit, Limits};
 use study_device::firmware::{Firmware, Options};
@@ -404,4 +405,27 @@ fn the_clock_is_estimated_and_the_telemetry_is_complete() {
     let known_ms = health.clock.at(bench.now).unwrap();
     let off = known_ms.wrapping_sub(device_ms) as i32;
     assert!(off.abs() <= 1, "{off} ms");
+}
+
+/// What the line loses is counted, of the playback and in the health of the line.
+#[test]
+fn lost_samples_are_counted() {
+    let noise = Noise {
+        drop_telemetry: 0.1,
+        ..Noise::default()
+    };
+    let mut bench = Bench::new(noise, 6, 30);
+    bench.play();
+    bench.pass(ms(4000));
+    bench.host.stop(bench.now).unwrap();
+    let lost = Cell::new(0);
+    bench.until("stop", |r| match r {
+        Report::Stopped(playback) => {
+            lost.set(playback.samples_lost);
+            true
+        }
+        _ => false,
+    });
+    assert!((100..1500).contains(&lost.get()), "{lost:?}");
+    assert_eq!(bench.host.health().samples_lost, lost.get());
 }

@@ -35,6 +35,24 @@ fn a_study_of_samples_can_be_rehearsed() {
         out.starts_with("2 simulated participants, 8 rated trials"),
         "{out}"
     );
+    // Nothing is added to it, least of all where a person is expected.
+    let refused = |why: &str| {
+        let (code, _, err) = study(&arguments, folder.path());
+        assert!(code != 0 && err.contains(why), "{err}");
+    };
+    refused("already holds 2 rehearsed sessions");
+    let set = [
+        "participant",
+        "rehearsal",
+        "P01",
+        "--state",
+        "no-show",
+        "--reason",
+        "ill",
+    ];
+    let (code, _, err) = study(&set, folder.path());
+    assert_eq!(code, 0, "{err}");
+    refused("holds sessions of real participants");
     // So are the presentations of a program that plays no tables, unless others have one.
     let process = text.replace(
         "kind = \"manual\"",

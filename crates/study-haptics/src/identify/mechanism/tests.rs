@@ -144,7 +144,9 @@ fn values_that_no_data_reached_are_held() {
     wild.detent.n[7] = 30.0;
     let reach = reach::of(&truth(), &[&parts[0], &parts[1]], None);
     let bridged = reach::bridged(wild, &reach);
-    assert!(bridged.detent.n[7].abs() < 5.0, "{:?}", bridged.detent.n);
+    let n = &bridged.detent.n;
+    assert!(n[7].abs() < 5.0 && n[6] != n[8], "{n:?}");
+    assert!((n[7] - 0.5 * (n[6] + n[8])).abs() < 1e-9, "{n:?}");
 }
 
 /// A standard error above half the value is told, except of a force, which may well be 0.
