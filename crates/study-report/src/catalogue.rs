@@ -5,10 +5,12 @@
 
 use super::apa::plain as size;
 use super::chart::{Axis, Figure, Look, Mark, PALETTE, Panel};
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use super::html::page_head;
+use maud::{DOCTYPE, Markup, html};
 use std::cmp::Ordering;
 use study_base::text::{Untrusted, counted};
 use study_haptics::archive::{Bundle, Feel, at_rest};
+use study_haptics::identify::repetition::WITHIN;
 use study_haptics::model::Units;
 
 const CSS: &str = include_str!("catalogue/style.css");
@@ -152,15 +154,7 @@ fn page(sorting: &Sorting, all: &[&(String, Feel, &Bundle)]) -> String {
     let page = html! {
         (DOCTYPE)
         html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta http-equiv="Content-Security-Policy"
-                    content="default-src 'none'; style-src 'unsafe-inline'; img-src 'self' file:";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta name="generator" content={ "study " (env!("CARGO_PKG_VERSION")) };
-                title { "Haptic stimuli by " (name) }
-                style { (PreEscaped(CSS)) (PreEscaped(hiding())) }
-            }
+            (page_head(&format!("Haptic stimuli by {name}"), "'self' file:", &(CSS.to_owned() + &hiding())))
             body {
                 header {
                     h1 { "Haptic stimuli by " (name) }
@@ -179,10 +173,10 @@ fn page(sorting: &Sorting, all: &[&(String, Feel, &Bundle)]) -> String {
                 }
                 footer {
                     "Written by study " (env!("CARGO_PKG_VERSION")) ". Dots: recordings. Lines: the realization in slow \
-                     motion, with increasing and decreasing position. Of it, without 8 % of the travel at \
+                     motion, with increasing and decreasing position. Of it, without " (100.0 * WITHIN[0]) " % of the travel at \
                      either end: peak force is the greatest one of both directions; tactility is the \
                      largest fall of the force while the position increases, and its share of the force; \
-                     tactile means at least 5 %."
+                     tactile means at least " (100.0 * TACTILE) " %."
                 }
             }
         }

@@ -106,20 +106,27 @@ pub fn parts_document(source: &Source, details: &Details, parts: &[PartAnalysis]
     page(source, &head, &main, "parts.json")
 }
 
+/// The head of a page without scripts that shows pictures from `images` only.
+pub(crate) fn page_head(title: &str, images: &str, style: &str) -> Markup {
+    html! {
+        head {
+            meta charset="utf-8";
+            meta http-equiv="Content-Security-Policy"
+                content={ "default-src 'none'; style-src 'unsafe-inline'; img-src " (images) };
+            meta name="viewport" content="width=device-width, initial-scale=1";
+            meta name="generator" content={ "study " (env!("CARGO_PKG_VERSION")) };
+            title { (title) }
+            style { (PreEscaped(style)) }
+        }
+    }
+}
+
 fn page(source: &Source, head: &Markup, main: &Markup, values: &str) -> String {
     let page = html! {
         (DOCTYPE)
         // The report itself is in English; texts of the study carry their own `lang`.
         html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta http-equiv="Content-Security-Policy"
-                    content="default-src 'none'; style-src 'unsafe-inline'; img-src data:";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta name="generator" content={ "study " (env!("CARGO_PKG_VERSION")) };
-                title { (safe(&source.title)) " – results" }
-                style { (PreEscaped(style::CSS)) }
-            }
+            (page_head(&format!("{} – results", safe(&source.title)), "data:", style::CSS))
             body {
                 (head)
                 main { (main) }
