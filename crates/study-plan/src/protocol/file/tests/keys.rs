@@ -117,20 +117,21 @@ fn cases() -> Vec<Case> {
     for key in root() {
         match key.kind {
             Kind::Table(keys) => tables(vec![key.name], keys, &mut cases),
-            Kind::Tables(keys) => {
+            // A realization has a file or a bundle.
+            Kind::Tables(keys) => cases.extend(["file", "bundle"].map(|other| {
                 let mut document = least();
                 // The original of the duplicate in the examples.
                 let original = "id = \"lambda-0.9991\"\ndevice = \"manual\"".parse::<Table>();
                 let models = array_at(&mut document, key.name);
                 models[0] = original.unwrap().into();
-                models.push(with_examples(keys).into());
-                let (path, keys) = (vec![key.name], keys.iter().collect());
-                cases.push(Case {
+                let keys: Vec<&Key> = keys.iter().filter(|key| key.name != other).collect();
+                models.push(with_examples(keys.iter().copied()).into());
+                Case {
                     document,
-                    path,
+                    path: vec![key.name],
                     keys,
-                });
-            }
+                }
+            })),
             Kind::Variants(variants) => alternatives(&[], key.name, variants, &mut cases),
             _ => {}
         }
