@@ -11,6 +11,7 @@ mod printed;
 pub(super) use args::Args;
 
 use super::console::{PATIENCE, progress};
+use super::progress::Reader;
 use super::{Console, Failure, Kind};
 use args::{MethodName, NamedPath};
 use std::fs::File;
@@ -350,6 +351,8 @@ fn read(
 ) -> Result<Recording, Failure> {
     let path = &named.path;
     let file = File::open(path).map_err(|e| Failure::file(path, &e))?;
+    let length = file.metadata().map_or(0, |about| about.len());
+    let file = Reader::new(file, length);
     let mut recording =
         recording::read_as(&named.name, BufReader::with_capacity(1 << 16, file), names)
             .map_err(|e| unreadable(path, &e))?;
@@ -399,7 +402,7 @@ fn read(
         ));
         recording = even;
     }
-    signal::prepare(&recording, args.signals())
+    signal::prepare(recording, args.signals())
         .map_err(|e| Failure::input(format!("{}: {e}", path.display())))
 }
 

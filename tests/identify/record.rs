@@ -105,7 +105,7 @@ fn the_columns_are_filtered_unless_raw() {
         filter_hz: Some(30.0),
         acceleration: Acceleration::Accelerometer,
     };
-    let again = prepare(&raw, settings).unwrap();
+    let again = prepare(raw, settings).unwrap();
     for i in 200..filtered.len() - 200 {
         assert!((again.x_mm[i] - filtered.x_mm[i]).abs() < 2e-5, "{i}");
         assert!((again.v_mm_s[i] - filtered.v_mm_s[i]).abs() < 1e-2, "{i}");
@@ -154,7 +154,7 @@ fn of(name: &str, target: &Parameters, rate_hz: f64, seed: u64) -> Recording {
         filter_hz: Some(30.0),
         acceleration: Acceleration::Accelerometer,
     };
-    let mut done = prepare(&raw, settings).unwrap();
+    let mut done = prepare(raw, settings).unwrap();
     let [from, to] = trajectory.recorded_s();
     let first = done.t_s.partition_point(|t| *t < from - 1e-9);
     let last = done.t_s.partition_point(|t| *t <= to + 1e-9);

@@ -38,7 +38,7 @@ fn record(name: &str, parts: &str, seed: u64) -> Result<Recording, Box<dyn Error
         filter_hz: Some(30.0),
         acceleration: Acceleration::Accelerometer,
     };
-    Ok(prepare(&recording::read(name, &csv[..])?, settings)?)
+    Ok(prepare(recording::read(name, &csv[..])?, settings)?)
 }
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -46,20 +46,26 @@ impl Samples {
         weights: Weights<'_>,
         belongs: impl Fn(f64) -> bool,
     ) -> Self {
-        let mut all = Self::default();
+        // recording and sample, half as large as two words: a recording has at most 60 million rows
+        let mut order: Vec<(u32, u32)> = Vec::new();
         for (k, r) in recordings.iter().enumerate() {
             let counts = |i: &usize| belongs(r.v_mm_s[*i]) && weight_of(weights, k, *i) > 0.0;
-            for i in (0..r.len()).filter(counts) {
-                all.x_mm.push(r.x_mm[i]);
-                all.v_mm_s.push(r.v_mm_s[i]);
-                all.a_m_s2.push(r.a_m_s2[i]);
-                all.f_n.push(r.f_n[i]);
-            }
+            order.extend((0..r.len()).filter(counts).map(|i| (k as u32, i as u32)));
         }
-        let mut order: Vec<usize> = (0..all.len()).collect();
+        let x_mm = |(k, i): &(u32, u32)| recordings[*k as usize].x_mm[*i as usize];
         // stable: ties keep their order in time
-        order.sort_by(|a, b| all.x_mm[*a].total_cmp(&all.x_mm[*b]));
-        all.reordered(&order)
+        order.sort_by(|a, b| x_mm(a).total_cmp(&x_mm(b)));
+        let picked = |column: fn(&Recording) -> &Vec<f64>| {
+            let places = order.iter();
+            let of = |(k, i): &(u32, u32)| column(recordings[*k as usize])[*i as usize];
+            places.map(of).collect()
+        };
+        Self {
+            x_mm: picked(|r| &r.x_mm),
+            v_mm_s: picked(|r| &r.v_mm_s),
+            a_m_s2: picked(|r| &r.a_m_s2),
+            f_n: picked(|r| &r.f_n),
+        }
     }
 
     fn pick(columns: [&[f64]; 4], order: &[usize]) -> Self {

@@ -138,23 +138,26 @@ pub fn without_jitter(recording: &Recording) -> Option<(Recording, f64)> {
 /// # Errors
 /// [`SignalError`] if the corner frequency does not suit the sampling rate, or the
 /// recording is not evenly sampled.
-pub fn prepare(recording: &Recording, settings: Settings) -> Result<Recording, SignalError> {
-    let mut prepared = recording.clone();
+pub fn prepare(mut recording: Recording, settings: Settings) -> Result<Recording, SignalError> {
     if settings.filter_hz.is_none() && settings.acceleration == Acceleration::Accelerometer {
-        return Ok(prepared);
+        return Ok(recording);
     }
-    let step_s = sampling_interval_s(recording)?;
+    let step_s = sampling_interval_s(&recording)?;
     if let Some(corner_hz) = settings.filter_hz {
         let low_pass = LowPass::new(corner_hz, 1.0 / step_s)?;
-        for column in [&mut prepared.x_mm, &mut prepared.a_m_s2, &mut prepared.f_n] {
+        for column in [
+            &mut recording.x_mm,
+            &mut recording.a_m_s2,
+            &mut recording.f_n,
+        ] {
             *column = low_pass.zero_phase(column);
         }
-        prepared.v_mm_s = difference(&prepared.x_mm, step_s);
+        recording.v_mm_s = difference(&recording.x_mm, step_s);
     }
     if settings.acceleration == Acceleration::Encoder {
-        prepared.a_m_s2 = second_difference(&prepared.x_mm, step_s);
+        recording.a_m_s2 = second_difference(&recording.x_mm, step_s);
     }
-    Ok(prepared)
+    Ok(recording)
 }
 
 /// The velocity by central differences, one-sided at the ends, mm/s.
@@ -216,7 +219,7 @@ mod tests {
             filter_hz: Some(8.0),
             acceleration: Acceleration::Accelerometer,
         };
-        let done = prepare(&raw, settings).unwrap();
+        let done = prepare(raw.clone(), settings).unwrap();
         let low_pass = LowPass::new(8.0, 1000.0).unwrap();
         let close = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9);
         assert!(close(&done.f_n, &low_pass.zero_phase(&raw.f_n)));
@@ -226,7 +229,7 @@ mod tests {
         assert_eq!(done.sha256, raw.sha256);
         // the second difference of x agrees with this accelerometer
         let encoder = prepare(
-            &raw,
+            raw,
             Settings {
                 acceleration: Acceleration::Encoder,
                 ..settings
@@ -267,14 +270,14 @@ mod tests {
             filter_hz: Some(hz),
             acceleration: Acceleration::Accelerometer,
         };
-        let gap = prepare(&recording(300, Some(100)), settings(30.0)).unwrap_err();
+        let gap = prepare(recording(300, Some(100)), settings(30.0)).unwrap_err();
         assert!(
             gap.to_string()
                 .starts_with("r: the sampling interval at 0.099 s is"),
             "{gap}"
         );
         for bad in [0.0, -1.0, 500.0, f64::NAN, f64::INFINITY] {
-            let refused = prepare(&recording(300, None), settings(bad)).unwrap_err();
+            let refused = prepare(recording(300, None), settings(bad)).unwrap_err();
             assert!(matches!(refused, SignalError::Corner { .. }), "{bad}");
         }
     }

@@ -28,7 +28,7 @@ const MIN_CORRELATION: f64 = 0.5;
 pub fn accelerometer_s(recording: &Recording) -> Result<Option<f64>, SignalError> {
     let step_s = sampling_interval_s(recording)?;
     let smooth = prepare(
-        recording,
+        recording.clone(),
         Settings {
             filter_hz: Some(CORNER_HZ),
             acceleration: Acceleration::Accelerometer,
