@@ -3,6 +3,7 @@
 mod args;
 mod comparison;
 mod files;
+mod first;
 mod loops;
 mod output;
 mod plan;
@@ -194,7 +195,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     if args.json {
         console.document(output::json(&results))?;
     } else {
-        console.out(output::table(&results))?;
+        console.out(output::table(&results, console.width))?;
     }
     for (path, _) in &results.files {
         console.say(format!("wrote {}", path.display()));

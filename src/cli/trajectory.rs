@@ -102,7 +102,7 @@ fn write_csv(sink: &mut dyn Write, trajectory: &Trajectory, rate_hz: f64) -> std
 
 /// The text shown: extremes, position and velocity over time, spectrum.
 fn page(trajectory: &Trajectory, width: usize) -> String {
-    let columns = width.clamp(40, 120) - picture::LABEL - 2;
+    let columns = width.clamp(40, 120) - study_report::plot::braille::LABEL - 2;
     let e = check::extremes(trajectory);
     let title = trajectory.title.as_deref().unwrap_or("untitled trajectory");
     let mut out = format!(

@@ -18,6 +18,7 @@ mod style;
 mod tables;
 
 pub use parts::PartReport;
+pub(crate) use style::CSS;
 
 use super::answers::{answers, conditional};
 use super::figures::Drawn;
@@ -126,7 +127,7 @@ fn page(source: &Source, head: &Markup, main: &Markup, values: &str) -> String {
         (DOCTYPE)
         // The report itself is in English; texts of the study carry their own `lang`.
         html lang="en" {
-            (page_head(&format!("{} – results", safe(&source.title)), "data:", style::CSS))
+            (page_head(&format!("{} – results", safe(&source.title)), "data:", CSS))
             body {
                 (head)
                 main { (main) }

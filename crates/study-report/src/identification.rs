@@ -1,19 +1,29 @@
 //! The figures of an identification, numbered as in the paper: 4 VAF over λ (or δ) and dx,
 //! 5 parameters over position, 6 force over time, 7 its spectrum, 8 parameters over
-//! position and λ.
+//! position and λ. Before them come those that are looked at first: force and residual over position,
+//! coverage, and the comparison of methods, which [`terminal`] draws as text.
 //!
 //! Each figure comes with its data as a CSV, in the units of its axes. Nothing is
 //! identified or selected here.
 
+mod coverage;
 mod displacement;
 mod mechanism;
+mod methods;
+mod page;
 mod parameters;
+mod position;
 mod spectrum;
 mod surface;
+pub mod terminal;
 
+pub use coverage::{Coverage, coverage};
 pub use displacement::displacement;
 pub use mechanism::mechanism;
+pub use methods::{Compared, methods};
+pub use page::page;
 pub use parameters::{map, parameters};
+pub use position::{Bin, ByPosition};
 pub use surface::{GridCell, Row, surface};
 
 use super::chart::{Axis, Color, Dash, Figure, Look, Mark, PALETTE, Panel};
@@ -93,10 +103,14 @@ impl Shown {
     }
 }
 
-/// Fig. 6: measured and predicted force over the first seconds.
+/// Fig. 6: measured and predicted force over the first seconds, of a slow press over all of it.
 pub fn force(realization: &Realization, recording: &Recording, shown: Shown) -> Drawing {
     let start = recording.t_s[0];
-    let samples = recording.t_s.partition_point(|t| t - start <= SHOWN_S);
+    let shown_s = match recording.is_force_curve() {
+        true => f64::INFINITY,
+        false => SHOWN_S,
+    };
+    let samples = recording.t_s.partition_point(|t| t - start <= shown_s);
     let stride = samples.div_ceil(MAX_POINTS).max(1);
     let rows: Vec<[f64; 3]> = vaf::predict(realization, recording)
         .enumerate()
@@ -145,8 +159,12 @@ pub fn force(realization: &Realization, recording: &Recording, shown: Shown) -> 
     }
 }
 
-/// Fig. 7: amplitude spectra of measured force, predicted force and residual, 0 to 10 Hz.
-pub fn spectra(realization: &Realization, recording: &Recording, shown: Shown) -> Drawing {
+/// Fig. 7: amplitude spectra of measured force, predicted force and residual, from 0 to 10 Hz or half the
+/// sampling rate. `None` for a slow press, whose time says nothing of the target.
+pub fn spectra(realization: &Realization, recording: &Recording, shown: Shown) -> Option<Drawing> {
+    if recording.is_force_curve() {
+        return None;
+    }
     let predicted: Vec<f64> = vaf::predict(realization, recording).collect();
     let residual: Vec<f64> = recording
         .f_n
@@ -162,7 +180,11 @@ pub fn spectra(realization: &Realization, recording: &Recording, shown: Shown) -
     let top = found.iter().flat_map(|(_, n)| *n).fold(0.0, f64::max);
     let [measured, other] = both();
     let panel = Panel::new(
-        Axis::new("frequency (Hz)", 0.0, spectrum::TOP_HZ),
+        Axis::new(
+            "frequency (Hz)",
+            0.0,
+            found.last().map_or(spectrum::TOP_HZ, |f| f.0),
+        ),
         Axis::new(&shown.of_force("amplitude of the", ""), 0.0, 1.05 * top),
     )
     .named("measured", measured, line(0))
@@ -173,7 +195,7 @@ pub fn spectra(realization: &Realization, recording: &Recording, shown: Shown) -
     for (hz, [f, p, e]) in &found {
         let _ = writeln!(csv, "{hz},{f},{p},{e}");
     }
-    Drawing {
+    Some(Drawing {
         name: "fig7-spectra",
         figure: Figure::new(
             "fig7",
@@ -183,7 +205,7 @@ pub fn spectra(realization: &Realization, recording: &Recording, shown: Shown) -
         )
         .with(panel),
         csv,
-    }
+    })
 }
 
 /// The appearance of two compared series, different in color, lightness and dash.

@@ -1,4 +1,6 @@
-//! Small text charts: histograms in a table cell, dots with error bars.
+//! Small text charts: histograms in a table cell, dots with error bars, curves of braille characters.
+
+pub mod braille;
 
 /// Blocks of 0 to 8 eighths.
 const BARS: [char; 9] = [' ', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];

@@ -2,14 +2,13 @@
 
 use super::super::trajectory::{refuse_to_overwrite, write_file};
 use super::args::{Args, MethodName, distinct};
-use super::{Failure, Kind, Results};
+use super::{Failure, Kind, Results, first, output};
 use clap::ValueEnum as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 use study_base::text::{ModelId, Untrusted};
 use study_haptics::identify::grid::Cell;
 use study_haptics::model::file;
-use study_haptics::recording::Recording;
 use study_report::identification::{self, Drawing, GridCell, Row, Shown};
 use study_report::picture::png::Painter;
 
@@ -89,7 +88,7 @@ pub(super) fn figures(
     dir: &Path,
 ) -> Result<(Vec<OutputFile>, Vec<&'static str>), Failure> {
     let mut missing = Vec::new();
-    let mut drawings: Vec<Drawing> = Vec::new();
+    let mut drawings: Vec<Drawing> = first::drawings(results);
     let shown = results
         .args
         .units()
@@ -132,9 +131,10 @@ pub(super) fn figures(
         let is_table = mechanism.is_none();
         drawings.push(mechanism.unwrap_or_else(|| identification::parameters(realization, shown)));
         drawings.push(identification::force(realization, recording, shown));
-        drawings.push(identification::spectra(realization, recording, shown));
-        let training: Vec<&Recording> = results.training.iter().map(|(_, r)| r).collect();
-        drawings.extend(identification::displacement(realization, &training, shown));
+        match identification::spectra(realization, recording, shown) {
+            Some(drawing) => drawings.push(drawing),
+            None => missing.push("no Fig. 7: the time of a slow press says nothing of the switch"),
+        }
         let dx = realization.provenance.dx_mm;
         let same_dx: Vec<_> = results
             .cells
@@ -150,6 +150,10 @@ pub(super) fn figures(
     }
     let painter = Painter::default();
     let mut files = Vec::new();
+    let title = "Identification";
+    let text = output::table(results, 100);
+    let page = identification::page(title, &text, &drawings);
+    files.push((dir.join("identification.html"), page.into_bytes()));
     for drawing in drawings {
         let path = |ending: &str| dir.join(format!("{}.{ending}", drawing.name));
         let picture = drawing.figure.picture();

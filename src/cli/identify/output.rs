@@ -2,7 +2,7 @@
 
 use super::args::NamedPath;
 use super::printed::{Printed, align, short_name};
-use super::{Results, comparison, loops};
+use super::{Results, comparison, first, loops};
 use serde_json::{Map, Value, json};
 use std::fmt::Write as _;
 use study_base::text::Untrusted;
@@ -244,8 +244,8 @@ fn plain(value: f64) -> String {
     rounded.map_or_else(|_| value.to_string(), |value| value.to_string())
 }
 
-/// The results as text for a terminal.
-pub(super) fn table(results: &Results<'_>) -> String {
+/// The results as text for a terminal of this width.
+pub(super) fn table(results: &Results<'_>, width: usize) -> String {
     let mut out = String::new();
     let p = Printed::of(results);
     if p.units != Units::Linear {
@@ -273,7 +273,7 @@ pub(super) fn table(results: &Results<'_>) -> String {
     if let Some(comparison) = &results.comparison {
         out.push('\n');
         out += &comparison::table(results, comparison);
-        return finished(out, results);
+        return finished(out, results, width);
     }
     if let Some(cell) = results.cells.first() {
         let _ = writeln!(out, "{}", settings(cell));
@@ -299,17 +299,17 @@ pub(super) fn table(results: &Results<'_>) -> String {
     }
     out.push('\n');
     out.push_str(&selection(results));
-    finished(out, results)
+    finished(out, results, width)
 }
 
 /// With the best cell in detail and the warnings.
-fn finished(mut out: String, results: &Results<'_>) -> String {
+fn finished(mut out: String, results: &Results<'_>, width: usize) -> String {
     out.push_str(&best_in_detail(results));
     out.push_str(&loops::text(results));
     for (warning, cells) in warnings(results) {
         let _ = writeln!(out, "warning: {warning} ({cells})");
     }
-    out
+    out + &first::text(results, width)
 }
 
 /// A large grid as rows of lambda and columns of dx; `None` for a small one.

@@ -3,15 +3,10 @@
 //! Curves are drawn with braille characters, two dots per column and four per row. Each
 //! dot column covers the range of all values in its time, so that no peak is lost.
 
-use std::fmt::Write as _;
-use study_report::plot::Axis;
+use study_report::plot::braille::{Canvas, framed};
 
-/// Width of the labels on the left, columns.
-pub(in crate::cli) const LABEL: usize = 9;
 /// Values evaluated for each dot column.
 const VALUES_PER_DOT: usize = 16;
-/// Bits of a braille cell: by column, then row.
-const DOTS: [[u32; 4]; 2] = [[0x01, 0x02, 0x04, 0x40], [0x08, 0x10, 0x20, 0x80]];
 const BLOCKS: [char; 9] = [' ', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 
 /// `value` over `range`, as a heading, `rows` lines and an axis.
@@ -41,22 +36,11 @@ pub(in crate::cli) fn curve(
         .collect();
     let low = spans.iter().map(|s| s[0]).fold(f64::INFINITY, f64::min);
     let high = spans.iter().map(|s| s[1]).fold(f64::NEG_INFINITY, f64::max);
-    let span = if high > low { high - low } else { 1.0 };
-    let lines = 4 * rows;
-    // between 0 and lines − 1, so the cast is exact
-    let line = |v: f64| (((high - v) / span * (lines - 1) as f64).round() as usize).min(lines - 1);
-    let mut cells = vec![vec![0u32; columns]; rows];
-    for (dot, [least, most]) in spans.iter().enumerate() {
-        for at in line(*most)..=line(*least) {
-            cells[at / 4][dot / 2] |= DOTS[dot % 2][at % 4];
-        }
+    let mut canvas = Canvas::new(columns, rows, [low, high]);
+    for (dot, span) in spans.iter().enumerate() {
+        canvas.span(dot, *span);
     }
-    let drawn = cells.iter().map(|row| {
-        row.iter()
-            .map(|bits| char::from_u32(0x2800 + bits).unwrap_or(' '))
-            .collect::<String>()
-    });
-    framed(heading, unit, range, columns, [low, high], drawn.collect())
+    canvas.framed(heading, unit, range)
 }
 
 /// A bar chart with one bar for each value, logarithmic from `least_share` of the largest
@@ -91,43 +75,6 @@ pub(in crate::cli) fn columns(
     });
     let bounds = [most * least_share, most];
     framed(heading, unit, range, values.len(), bounds, drawn.collect())
-}
-
-/// The rows with labels on the left and an axis below.
-fn framed(
-    heading: &str,
-    unit: &str,
-    [from, to]: [f64; 2],
-    columns: usize,
-    [low, high]: [f64; 2],
-    rows: Vec<String>,
-) -> String {
-    let mut out = format!("\n{heading}\n");
-    let last = rows.len() - 1;
-    for (i, row) in rows.iter().enumerate() {
-        let label = match i {
-            0 => number(high),
-            _ if i == last => number(low),
-            _ => String::new(),
-        };
-        // writing to a String cannot fail
-        let _ = writeln!(out, "{label:>LABEL$} │{}", row.trim_end_matches(['⠀', ' ']));
-    }
-    let ticks = Axis::new(from, to, columns).map_or(String::new(), |axis| axis.ticks());
-    let _ = writeln!(out, "{:>LABEL$} │{ticks} {unit}", "");
-    out
-}
-
-/// A number that fits into [`LABEL`] columns.
-fn number(value: f64) -> String {
-    let size = value.abs();
-    if size == 0.0 {
-        "0".to_owned()
-    } else if (0.01..1e5).contains(&size) {
-        format!("{value:.2}")
-    } else {
-        format!("{value:.1e}")
-    }
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! The style sheet. It refers to no other file.
 
 /// Dark on white; figures in two widths, on paper two side by side; wide tables scroll.
-pub(super) const CSS: &str = "
+pub(crate) const CSS: &str = "
 :root { color-scheme: only light; }
 * { box-sizing: border-box; }
 body { margin: 0 auto; padding: 1.5rem 1.25rem 3rem; max-width: 50rem; background: #fff; color: #1a1a1a;

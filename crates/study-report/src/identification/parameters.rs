@@ -1,7 +1,7 @@
 //! Fig. 5 and 8: the parameters of a table over position, and over position and λ.
 
 use super::{Drawing, Shown, both, letter, points, zero_line};
-use crate::chart::{Axis, Color, ColorBar, Figure, Look, Mark, Panel, Scale, Shape, Span};
+use crate::chart::{Axis, Color, ColorBar, Figure, Look, Mark, Note, Panel, Scale, Shape, Span};
 use std::fmt::Write as _;
 use study_haptics::model::{Branch, Realization};
 
@@ -78,6 +78,13 @@ pub fn parameters(realization: &Realization, shown: Shown) -> Drawing {
             };
         }
         zero_line(&mut panel);
+        let mut drawn = lines.iter().flat_map(|[_, y]| y);
+        if drawn.all(|value| *value == 0.0) {
+            // such as a mass that the recordings do not carry: a scale without a value looks like one
+            let middle = 0.5 * (panel.x.low + panel.x.high);
+            panel.y = panel.y.at(vec![(0.0, "0".to_owned())]);
+            panel = panel.note(Note::new((middle, 0.0), "0 everywhere").moved(0.0, -12.0));
+        }
         figure = figure.with(panel);
     }
     let mut csv = shown.column("x_mm");

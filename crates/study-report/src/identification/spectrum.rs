@@ -1,4 +1,4 @@
-//! Amplitude spectra between 0 and 10 Hz.
+//! Amplitude spectra between 0 and 10 Hz, or half the sampling rate.
 //!
 //! A discrete Fourier transform at the few frequencies of interest, by definition: an
 //! FFT would need equidistant samples and compute thousands of other frequencies.
@@ -38,7 +38,8 @@ pub(super) fn amplitudes<const N: usize>(
     let gain = 0.5 * weight;
     // Half the frequency resolution, so that no peak is missed.
     let step = (0.5 / span).max(TOP_HZ / MOST as f64);
-    let count = (TOP_HZ / step) as usize;
+    let half_the_rate = 0.5 * (blocks.len() - 1) as f64 / span;
+    let count = (TOP_HZ.min(half_the_rate) / step) as usize;
     (0..=count)
         .map(|i| {
             let hz = i as f64 * step;
@@ -97,6 +98,21 @@ mod tests {
             assert!(near(quiet) < 0.005, "{quiet} {}", near(quiet));
         }
         assert!(found.last().unwrap().0 <= TOP_HZ);
+    }
+
+    /// Ten samples a second of 1 Hz: what lies above 5 Hz would be its mirror image.
+    #[test]
+    fn a_spectrum_ends_at_half_the_sampling_rate() {
+        let t: Vec<f64> = (0..200).map(|i| f64::from(i) * 0.1).collect();
+        let y: Vec<f64> = t
+            .iter()
+            .map(|t| (std::f64::consts::TAU * t).sin())
+            .collect();
+        let found = amplitudes(&t, [&y]);
+        let last = found.last().unwrap().0;
+        assert!((4.9..=5.0).contains(&last), "{last}");
+        let above = found.iter().filter(|(hz, _)| *hz > 1.5).map(|(_, n)| n[0]);
+        assert!(above.fold(0.0, f64::max) < 0.01);
     }
 
     #[test]

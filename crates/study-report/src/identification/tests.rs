@@ -1,5 +1,7 @@
 //! Figures of small tables.
 
+mod first;
+
 use super::*;
 use crate::chart::Mark;
 use study_haptics::model::{Branch, Provenance, Trained};
@@ -99,7 +101,7 @@ fn force_over_time_shows_some_seconds_and_its_prediction() {
     let t: f64 = last.split(',').next().unwrap().parse().unwrap();
     assert!((3.9..=4.0).contains(&t), "{last}");
     assert!(drawing.csv.lines().count() <= MAX_POINTS + 1);
-    let spectra = spectra(&realization(1.0), &recording, Shown::LINEAR);
+    let spectra = spectra(&realization(1.0), &recording, Shown::LINEAR).unwrap();
     assert!(spectra.csv.lines().count() > 100);
 }
 
