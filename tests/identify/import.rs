@@ -25,7 +25,7 @@ fn imported(file: &Path, out: &Path, more: &[&str]) -> Recording {
 }
 
 /// The three layouts of one measured curve: tidy, table, high resolution.
-pub(crate) fn layouts(tidy: &str, dir: &Path) -> [PathBuf; 3] {
+fn layouts(tidy: &str, dir: &Path) -> [PathBuf; 3] {
     let text = fs::read_to_string(tidy).unwrap();
     let rows: Vec<Vec<&str>> = (text.lines().skip(1))
         .map(|row| row.split(',').collect())
@@ -179,39 +179,4 @@ fn the_keyboard_switches_are_reproduced() {
         switches += 1;
     }
     assert_eq!(switches, 8);
-}
-
-/// The four commands of the README: a raw file of the instrument becomes a session.
-#[test]
-fn from_a_raw_file_to_a_session_in_four_commands() {
-    let dir = tempfile::tempdir().unwrap();
-    let [_, table, _] = layouts(CLICKIEZ, dir.path());
-    let path = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
-    let (keys, curve, results) = (path("my-keys"), path("curve.csv"), path("results"));
-    let copied = std::process::Command::new("cp")
-        .args(["-r", "protocols/keyboard", &keys])
-        .status();
-    assert!(copied.unwrap().success());
-    study(&[
-        "import",
-        "force-curve",
-        table.to_str().unwrap(),
-        "-o",
-        &curve,
-    ])
-    .success();
-    let models = format!("{keys}/models");
-    let one = ["--method", "passive", "--dx", "0.05", "--id", "clickiez"];
-    study(
-        &[
-            &["identify", &curve][..],
-            &one,
-            &["--out", &models, "--force"],
-        ]
-        .concat(),
-    )
-    .success();
-    let with = fs::read_to_string(format!("{models}/clickiez.toml")).unwrap();
-    assert!(with.contains("measured force curve: an unnamed target"));
-    study(&["rehearse", &keys, "--participants", "1", "--out", &results]).success();
 }

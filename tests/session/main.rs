@@ -35,6 +35,7 @@ mod tui_keys;
 mod tui_pictures;
 mod tui_terminal;
 mod turning;
+mod tutorial;
 mod unsaved;
 mod views;
 #[path = "../support/world.rs"]
