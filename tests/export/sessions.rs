@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::studies::{export, files, grouped, new, of_groups_and_sessions, rehearsed};
-use crate::support::{repository, study};
+use crate::support::{keyboard_of_bundles, repository, study};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
@@ -279,4 +279,52 @@ fn an_interrupted_export_is_repeated_whole() {
         "{said}"
     );
     assert!(files(&again) == files(&whole));
+}
+
+/// The same sessions, whether the realizations come from bundles or from model files: every table of every
+/// format is the same. The bundles are frozen with the study, which needs their folder no more, and a bundle
+/// that was changed afterwards is found.
+#[test]
+fn a_study_with_bundles_is_exported_like_one_with_model_files() {
+    let home = tempfile::tempdir().unwrap();
+    let place = |name: &str| home.path().join(name);
+    for name in ["bundles", "files", "protocol"] {
+        fs::create_dir(place(name)).unwrap();
+    }
+    let addresses = keyboard_of_bundles(&place("protocol"));
+    let with_bundles = rehearsed(&place("protocol"), 1, &place("bundles"), &[]);
+    let keyboard = repository("protocols/keyboard");
+    let with_files = rehearsed(Path::new(&keyboard), 1, &place("files"), &[]);
+    fs::remove_dir_all(place("protocol")).unwrap();
+    for to in ["csv", "wide", "bids", "psych-ds", "frictionless", "r"] {
+        let [(one, _), (other, _)] = [(&with_bundles, "bundles"), (&with_files, "files")]
+            .map(|(folder, name)| export(folder, to, &place(name), to, &SIMULATED));
+        let tables = |folder: &Path| -> BTreeMap<String, Vec<u8>> {
+            let is_table = |path: &str| path.ends_with(".csv") || path.ends_with(".tsv");
+            let all = files(folder).into_iter();
+            all.filter(|(path, _)| is_table(path)).collect()
+        };
+        let (one, other) = (tables(&one), tables(&other));
+        assert!(!one.is_empty(), "{to}");
+        assert_eq!(
+            one.keys().collect::<Vec<_>>(),
+            other.keys().collect::<Vec<_>>(),
+            "{to}"
+        );
+        for (path, bytes) in &one {
+            assert!(*bytes == other[path], "{to}: {path} differs");
+        }
+    }
+    let verified = || study(&["verify", with_bundles.to_str().unwrap()], home.path());
+    let (code, _, told) = verified();
+    assert_eq!(code, 0, "{told}");
+    let address = addresses["clickiez"].trim_start_matches("sha256:");
+    let frozen = with_bundles.join(format!("protocol/1/bundles/{address}.tar"));
+    let mut bytes = fs::read(&frozen).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    fs::write(&frozen, bytes).unwrap();
+    let (code, out, told) = verified();
+    assert_ne!(code, 0, "{out}");
+    assert!((out + &told).contains(address), "{told}");
 }

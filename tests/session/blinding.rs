@@ -3,7 +3,7 @@
 //! and experimenter.
 
 use crate::memory::MemoryDisk;
-use crate::support::repository;
+use crate::support::{keyboard_of_bundles, repository};
 use crate::views::{drawn, picture};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -210,6 +210,30 @@ fn without_strokes(protocol: &mut Protocol) {
 fn pages_and_their_durations_do_not_tell_realizations_apart() {
     for entry in [Entry::Participant, Entry::Experimenter] {
         compare(entry, without_strokes, None, |pages| pages);
+    }
+}
+
+/// A realization from a bundle is as blind as one from a model file: nothing that identifies it or its
+/// bundle is on a page, each page is that of the model file, and all realizations have the same ones.
+#[test]
+fn bundles_are_as_blind_as_model_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let addresses = keyboard_of_bundles(folder.path());
+    let own = folder.path().to_str().unwrap();
+    let of = |name: &str, id: &ModelId| pages(name, id, Entry::Experimenter, without_strokes, None);
+    let all = realizations(own);
+    assert_eq!(all.len(), 8);
+    let expected = of("protocols/keyboard", &all[0]);
+    for id in &all {
+        let shown = of(own, id);
+        assert!(shown == expected, "{id}: the pages differ");
+    }
+    let text = expected.concat();
+    for (id, address) in &addresses {
+        let hash = address.trim_start_matches("sha256:");
+        for secret in [id.as_str(), &hash[..8], "CC-BY", "bundle", "gf"] {
+            assert!(!text.contains(secret), "{secret} is on a page");
+        }
     }
 }
 

@@ -8,6 +8,7 @@ pub mod player;
 pub mod simulator;
 
 use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, native_pty_system};
+use std::collections::BTreeMap;
 use std::io::{Read, Write};
 use std::num::NonZero;
 use std::path::Path;
@@ -337,4 +338,41 @@ pub fn changed_protocol(name: &str, to: &Path, changes: &[(&str, &str)]) {
         text = text.replacen(old, new, 1);
     }
     std::fs::write(file, text).unwrap();
+}
+
+/// protocols/keyboard in `folder`, with every realization in a bundle: the address of each by id.
+pub fn keyboard_of_bundles(folder: &Path) -> BTreeMap<String, String> {
+    let script = std::fs::read_to_string(repository("protocols/keyboard/identify.sh")).unwrap();
+    let switches = script.lines().filter_map(|line| {
+        let mut words = line.strip_prefix("switch ")?.split(' ');
+        Some((words.next()?.to_owned(), words.next()?.to_owned()))
+    });
+    let source = repository("protocols/keyboard/protocol.toml");
+    let mut protocol = std::fs::read_to_string(source).unwrap();
+    let mut addresses = BTreeMap::new();
+    let run = |words: &str, last: &[&str]| {
+        let words: Vec<&str> = words.split(' ').chain(last.iter().copied()).collect();
+        let (code, out, told) = study(&words, folder);
+        assert_eq!(code, 0, "{words:?}: {told}");
+        out
+    };
+    for (id, curve) in switches {
+        let curve = repository(&format!("tests/data/switches/{curve}.csv"));
+        let (recording, file) = (format!("{id}.csv"), format!("models/{id}.toml"));
+        let credit = ["--credit", "measured by ThereminGoat (theremingoat.com)"];
+        run(
+            "import force-curve",
+            &[&curve, "-o", &recording, credit[0], credit[1]],
+        );
+        let model = repository(&format!("protocols/keyboard/{file}"));
+        let stated = "stimulus pack --license CC-BY-4.0 --instrument tester --published 2024-05-17";
+        let address = run(stated, &[&model, &recording]).trim().to_owned();
+        let old = format!("file = \"{file}\"");
+        assert!(protocol.contains(&old), "{old}");
+        protocol = protocol.replace(&old, &format!("bundle = \"{address}\""));
+        addresses.insert(id, address);
+    }
+    std::fs::write(folder.join("protocol.toml"), protocol).unwrap();
+    assert_eq!(addresses.len(), 8);
+    addresses
 }
