@@ -34,7 +34,8 @@ record() {
 
 identify() {
     run identify "$recordings/training.csv" --validate "$recordings/validation-1.5hz.csv" \
-        --resample point --lookup linear --start cold --sort ascending --force "$@"
+        --resample point --lookup linear --start cold --sort ascending --without-coverage \
+        --force "$@"
 }
 
 record training 1
@@ -71,7 +72,7 @@ done
 identify_knob() {
     run identify "$recordings/knob-training.csv" --validate "$recordings/knob-validation.csv" \
         --columns 't=time,x=angle:deg,v=rate:deg/s,a=accel:deg/s²,f=torque:N·m' --lever $lever \
-        --force --out "$protocols/knob/models" "$@"
+        --without-coverage --force --out "$protocols/knob/models" "$@"
 }
 
 

@@ -94,6 +94,17 @@ fn certificates(loaded: &Loaded, report: &Report<'_>, verbose: bool) -> String {
         let notes = certified.danger.iter().chain(&certified.beyond);
         dangers.extend(notes.map(|note| format!("note: `{id}`: {note}\n")));
     }
+    let without = report
+        .certificates
+        .iter()
+        .filter(|c| !c.has_coverage)
+        .count();
+    if without > 0 {
+        dangers.push(format!(
+            "note: {without} of {} do not say where their recordings went: identified before study-model/3\n",
+            counted(report.certificates.len(), "model file", "model files"),
+        ));
+    }
     out += &dangers.concat();
     let failing = report.certificates.iter().filter(|c| !c.pass).count();
     if let (1.., Some(permission)) = (failing, &loaded.protocol.device.uncertified) {

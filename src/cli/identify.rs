@@ -27,7 +27,7 @@ use study_haptics::identify::grid::{self, Cell, Plan};
 use study_haptics::identify::mechanism::Progress;
 use study_haptics::identify::signal::{self, Acceleration, Excitation, filter};
 use study_haptics::identify::validation::{self, Ceiling, Validation};
-use study_haptics::identify::{IdentifyError, Method, Training};
+use study_haptics::identify::{IdentifyError, Method, Training, coverage};
 use study_haptics::model::Realization;
 use study_haptics::recording::{self, Names, Recording, RecordingError, RecordingFault};
 use study_haptics::safe_play::{self, Danger};
@@ -129,8 +129,12 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let others = (training.iter().skip(1).map(|(n, r)| (*n, r))).chain(recordings.iter().copied());
     warn_about_filters(first, others, console);
     let filter = filter_description(args, first);
+    let trained_on: Vec<&Recording> = training.iter().map(|(_, recording)| recording).collect();
     for cell in &mut cells {
-        cell.realization.provenance.filter = Some(filter.clone());
+        let covered = coverage::of(&cell.realization, &trained_on);
+        let provenance = &mut cell.realization.provenance;
+        provenance.filter = Some(filter.clone());
+        provenance.coverage = (!args.without_coverage).then_some(covered);
     }
     let detents = validation::detents(first);
     let best = grid::best(&cells, args.validate.len());

@@ -73,15 +73,19 @@ fn the_shipped_protocols_have_no_errors() {
     assert_eq!(code, 0, "{err}");
     let lines: Vec<&str> = out.lines().collect();
     // one line a realization, and the verdict last
-    assert_eq!(lines.len(), 5 + 1 + 1 + 1, "{out}");
+    assert_eq!(lines.len(), 5 + 1 + 1 + 1 + 1, "{out}");
     assert!(lines.contains(&"lambda-0.9995: FAIL"), "{out}");
     assert_eq!(
-        lines[6],
+        lines[5],
+        "note: 5 of 5 model files do not say where their recordings went: identified before study-model/3"
+    );
+    assert_eq!(
+        lines[7],
         "power: 80 % take a correlation of .885 between VAF and the true means, however many the \
          participants; the smallest p of the permutation test is .008; see `study power`"
     );
     assert_eq!(
-        lines[7],
+        lines[8],
         "turn-signal: ok, 5 models, 15 trials, about 16 minutes, 1 warning"
     );
     let verbose = ["check", "protocols/turn-signal", "--verbose"];
@@ -189,6 +193,25 @@ fn a_mechanism_that_is_not_safe_to_play_is_refused_without_permission() {
     let words =
         "note: `passive`: trained up to 0.20 mm/s; a hand of 200 mm/s is 1000 times as fast";
     assert!(out.contains(words), "{out}");
+    // so are stretches that no recording reached, and recordings that never turn back
+    let old = fs::read_to_string(from.join("models/passive.toml")).unwrap();
+    let coverage = "[coverage]\nx_mm = [1.5, 33.5]\nv_mm_s = [140]\nfull_strokes = 4\n\
+         partial_strokes = 0\nheld_mm = [[1.5, 3]]\n[coverage.positive]\ntop_mm_s = 40\n\
+         samples = [[0, 9]]\n[coverage.negative]\ntop_mm_s = 130\nsamples = [[3, 9]]\n\n[positive]";
+    let third = (old.replacen("study-model/1", "study-model/3\"\nkind = \"table", 1)).replacen(
+        "[positive]",
+        coverage,
+        1,
+    );
+    fs::write(dir.path().join("models/passive.toml"), third).unwrap();
+    let out = run(dir.path(), &["check", "."]).1;
+    for words in [
+        "note: `passive`: trained up to 40 mm/s; a hand of 200 mm/s is 5 times as fast",
+        "note: `passive`: held where no recording went: 1.50 to 3.00 mm",
+        "note: `passive`: trained on full strokes only",
+    ] {
+        assert!(out.contains(words), "{out}");
+    }
     fs::write(&path, text.replace("play = true", "play = false")).unwrap();
     for command in [&["check", "."][..], &["run", "."]] {
         let (code, _, err) = run(dir.path(), command);

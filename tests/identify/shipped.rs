@@ -232,6 +232,7 @@ fn a_version_1_file_reads_as_it_always_did() {
             filter: Some("Butterworth 2, 20 Hz, zero phase".into()),
             recordings: [("train \"1\"".to_owned(), "00ff".to_owned())].into(),
             note: Some("made by hand\nfor this test".into()),
+            ..Provenance::default()
         },
         vaf: [
             ("validation-1.5hz".to_owned(), 0.79),
@@ -261,4 +262,39 @@ fn a_version_1_file_reads_as_it_always_did() {
         units: study_haptics::model::Units::Linear,
     };
     assert_eq!(realization, Some(expected));
+}
+
+/// Do not change this test or its file. A file of any version is written again as it was: those
+/// of versions 1 and 2, which have no coverage, keep their version.
+#[test]
+fn files_of_all_versions_are_written_as_they_were() {
+    let golden = fs::read_to_string("tests/golden/model_v3.toml").unwrap();
+    let (realization, findings) = file::parse("model_v3.toml", &golden);
+    assert_eq!(findings.faults, []);
+    let realization = realization.unwrap();
+    assert_eq!(file::write(&realization), golden);
+    let coverage = realization.provenance.coverage.unwrap();
+    assert_eq!(coverage.directions[0].samples[2], [0, 4_000_000_000]);
+    assert_eq!(coverage.directions[1].top_mm_s, 200.0);
+    assert_eq!((coverage.full_strokes, coverage.partial_strokes), (12, 3));
+    assert_eq!(coverage.held_mm, [[-10.0, -8.5], [25.0, 30.0]]);
+    let mass = realization.provenance.terms["m_kg"];
+    assert_eq!(
+        [mass.value, mass.standard_error, mass.upper_bound],
+        [Some(4e-5), Some(1e-6), Some(4.5e-5)]
+    );
+    let bound = realization.provenance.terms["b_n_s_per_mm"];
+    assert_eq!((bound.value, bound.upper_bound), (None, Some(0.000_25)));
+
+    let old = "tests/golden/release_0_1/study/models/lambda-0.9995.toml";
+    let second = "crates/study-haptics/tests/data/edge.toml";
+    let mut seen = BTreeSet::new();
+    for path in [old, second] {
+        let text = fs::read_to_string(path).unwrap();
+        seen.insert(text.lines().next().unwrap().to_owned());
+        let realization = file::parse(path, &text).0.unwrap();
+        assert!(realization.provenance.coverage.is_none());
+        assert_eq!(file::write(&realization), text, "{path}");
+    }
+    assert_eq!(seen.len(), 2, "{seen:?}");
 }

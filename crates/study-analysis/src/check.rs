@@ -19,6 +19,7 @@ use std::path::Path;
 use study_base::diagnostic::{Findings, Severity};
 use study_base::text::ModelId;
 use study_haptics::model::Realization;
+use study_haptics::model::coverage::Coverage;
 use study_haptics::safe_play::{self, Danger};
 use study_plan::protocol::fingerprint::Fingerprints;
 use study_plan::protocol::{DeviceKind, Protocol, check};
@@ -84,9 +85,10 @@ pub struct Certified<'a> {
     /// The certificate itself.
     #[serde(skip)]
     pub certificate: Certificate,
-    /// What a hand may do beyond the recordings of the realization.
-    #[serde(skip)]
-    pub beyond: Option<String>,
+    /// What a hand may do beyond the recordings of the realization, where it is held.
+    pub beyond: Vec<String>,
+    /// Whether its file says where the recordings went.
+    pub has_coverage: bool,
 }
 
 /// A margin of a certificate.
@@ -187,6 +189,7 @@ fn certified(loaded: &Loaded) -> Vec<Certified<'_>> {
                 danger: danger(realization).map(|danger| danger.to_string()),
                 certificate,
                 beyond: beyond(realization),
+                has_coverage: realization.provenance.coverage.is_some(),
             }
         })
         .collect()
@@ -213,15 +216,39 @@ const HAND_MM_S: f64 = 200.0;
 const MUCH_FASTER: f64 = 4.0;
 
 /// What a hand may do beyond the recordings of a realization.
-fn beyond(realization: &Realization) -> Option<String> {
-    let trained = realization.trained.v_mm_s;
+fn beyond(realization: &Realization) -> Vec<String> {
+    let mut found = Vec::new();
+    let coverage = realization.provenance.coverage.as_ref();
+    let trained = coverage.map_or(realization.trained.v_mm_s, Coverage::top_mm_s);
     let factor = HAND_MM_S / trained;
-    (factor > MUCH_FASTER).then(|| {
+    if factor > MUCH_FASTER {
         let digits = if trained < 10.0 { 2 } else { 0 };
-        format!(
+        found.push(format!(
             "trained up to {trained:.digits$} mm/s; a hand of {HAND_MM_S} mm/s is {factor:.0} times as fast"
-        )
-    })
+        ));
+    }
+    let Some(coverage) = coverage else {
+        return found;
+    };
+    let stretches = |held: &[[f64; 2]]| {
+        let each = held
+            .iter()
+            .map(|[from, to]| format!("{from:.2} to {to:.2} mm"));
+        each.collect::<Vec<_>>().join(", ")
+    };
+    if !coverage.held_mm.is_empty() {
+        found.push(format!(
+            "held where no recording went: {}",
+            stretches(&coverage.held_mm)
+        ));
+    }
+    if coverage.partial_strokes == 0 {
+        found.push(
+            "trained on full strokes only: nothing says what it is where a hand turns back"
+                .to_owned(),
+        );
+    }
+    found
 }
 
 fn items(findings: &[Findings], severity: Severity) -> Vec<Item<'_>> {

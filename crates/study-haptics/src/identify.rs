@@ -28,6 +28,7 @@ mod banded;
 pub mod baseline;
 pub mod compare;
 pub mod constrained;
+pub mod coverage;
 pub mod delivery;
 pub mod evidence;
 pub mod ewls;

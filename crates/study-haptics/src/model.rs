@@ -7,11 +7,13 @@
 //! ([`study_wire::predict`]) and the passivity certificate ([`certificate`]) are shared
 //! with the firmware.
 
+pub mod coverage;
 pub mod file;
 mod units;
 
 pub use units::Units;
 
+use coverage::{Coverage, Determined};
 use std::collections::BTreeMap;
 use study_wire::certificate::{self, Certificate};
 use study_wire::mechanism::{self, MechanismView, Scalars};
@@ -19,8 +21,10 @@ use study_wire::predict::{BranchView, Direction, Lookup, TableView};
 
 /// The `format` of a model file.
 pub const FORMAT: &str = "study-model/1";
-/// The `format` of a model file with a mechanism.
+/// The `format` of a model file with a mechanism or of a turning handle.
 pub const FORMAT_2: &str = "study-model/2";
+/// The `format` of a model file that says what its recordings carry.
+pub const FORMAT_3: &str = "study-model/3";
 
 /// A haptic model's parameters and their origin: the contents of a model file.
 #[derive(Debug, Clone, PartialEq)]
@@ -151,6 +155,11 @@ pub struct Provenance {
     pub recordings: BTreeMap<String, String>,
     /// Remarks.
     pub note: Option<String>,
+    /// Where the recordings went. Files of versions 1 and 2 do not have it.
+    pub coverage: Option<Coverage>,
+    /// How well the recordings determine parameters, by the name of the parameter in a file
+    /// with mm and N, such as `m_kg`.
+    pub terms: BTreeMap<String, Determined>,
 }
 
 impl Realization {
@@ -198,6 +207,9 @@ impl Realization {
         if let Some(mechanism) = &mut self.mechanism {
             mechanism.detent.first_mm += by_mm;
             mechanism.friction.first_mm += by_mm;
+        }
+        if let Some(coverage) = &mut self.provenance.coverage {
+            coverage.shift(by_mm);
         }
     }
 

@@ -296,11 +296,14 @@ fn explore(played: &Played<'_>, samples: &[Sample], interval_s: f64, fidelity: &
         inside().fold(f64::NEG_INFINITY, f64::max) - inside().fold(f64::INFINITY, f64::min);
     fidelity.range_share = share(visited, high - low);
     fidelity.top_speed_mm_s = samples.iter().map(|s| s.v_mm_s.abs()).reduce(f64::max);
-    let moving = samples
-        .iter()
-        .filter(|s| s.v_mm_s.abs() > REST_MM_S)
-        .count();
-    fidelity.motion_share = share(moving as f64, samples.len() as f64);
+    let trained_mm_s = played.what.trained_mm_s;
+    let factor = |top_mm_s| share(top_mm_s, trained_mm_s);
+    fidelity.speed_factor = fidelity.top_speed_mm_s.and_then(factor);
+    let moving = || samples.iter().filter(|s| s.v_mm_s.abs() > REST_MM_S);
+    let beyond = |s: &&Sample| s.v_mm_s.abs() > trained_mm_s || !(low..=high).contains(&s.x_mm);
+    let in_motion = moving().count() as f64;
+    fidelity.motion_share = share(in_motion, samples.len() as f64);
+    fidelity.beyond_share = share(moving().filter(beyond).count() as f64, in_motion);
 
     // The speed against the change of the position, over a time in which the resolution
     // of the position does not matter.

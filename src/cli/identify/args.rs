@@ -140,6 +140,10 @@ pub(in crate::cli) struct Args {
     #[arg(long)]
     pub(super) huber: bool,
 
+    /// Write model files without the coverage by the recordings, which release 0.1 reads
+    #[arg(long)]
+    pub(super) without_coverage: bool,
+
     /// Accept a target that supplies energy: without this flag it is refused, because most likely the force has the wrong sign
     #[arg(long)]
     pub(super) active: bool,

@@ -158,7 +158,7 @@ fn kinds(recordings: &[&Recording], strokes: &[Vec<usize>]) -> Vec<usize> {
 
 /// The stroke of each sample, from 0: a stroke ends where the target turns back by [`REVERSAL`] of
 /// the travel.
-fn strokes(recording: &Recording) -> Vec<usize> {
+pub(super) fn strokes(recording: &Recording) -> Vec<usize> {
     let [low, high] = recording.range_mm();
     let reversal_mm = REVERSAL * (high - low);
     let x = &recording.x_mm;

@@ -2,19 +2,22 @@
 //!
 //! A model file is TOML with `format = "study-model/1"`, or `"study-model/2"` with a `kind`: a
 //! `table`, whose other keys are those of version 1, or a `mechanism`, and with `units` of a
-//! straight or a turning handle, which the names of the keys then have. Reading is strict and reports
+//! straight or a turning handle, which the names of the keys then have. `"study-model/3"` has the
+//! keys of version 2 and what the recordings carry: `[coverage]` and `[terms]`. Reading is strict and reports
 //! every fault with its line: unknown keys, numbers that are not finite, positions that
 //! do not ascend, lists of different lengths, reversed ranges. Writing is reproducible:
 //! the same realization gives the same bytes, numbers have the fewest digits that read
 //! back as the same number, and `parse(write(r)) == r` for every valid `r`.
 
+mod carried;
+mod text;
 mod write;
 
-pub(crate) use write::quoted;
+pub(crate) use text::quoted;
 pub use write::write;
 
 use super::{
-    Branch, FORMAT, FORMAT_2, Mechanism, Profile, Provenance, Realization, Trained, Units,
+    Branch, FORMAT, FORMAT_2, FORMAT_3, Mechanism, Profile, Provenance, Realization, Trained, Units,
 };
 use std::collections::BTreeMap;
 use study_base::diagnostic::table::{self, Table, Value};
@@ -37,14 +40,15 @@ pub fn parse(path: &str, text: &str) -> (Option<Realization>, Findings) {
 }
 
 fn read(mut root: Table<'_, '_>) -> Option<Realization> {
-    let second = root.value("format").and_then(|v| v.text()).as_deref() == Some(FORMAT_2);
+    let format = root.value("format").and_then(|v| v.text());
+    let third = format.as_deref() == Some(FORMAT_3);
     let mut own = Units::Linear;
-    if second {
+    if third || format.as_deref() == Some(FORMAT_2) {
         let kinds = [("table", false), ("mechanism", true)];
         let kind = root.required("kind").and_then(|v| v.word(&kinds));
         own = root.value("units").map_or(Some(Units::Linear), units)?;
         if kind? {
-            return read_mechanism(root, own);
+            return read_mechanism(root, own, third);
         }
     } else if !root.has_format(FORMAT, "a model file") {
         return None;
@@ -55,7 +59,7 @@ fn read(mut root: Table<'_, '_>) -> Option<Realization> {
     let trained = root.required("trained").and_then(|v| trained(v, own));
     let x_key = own.key("x_mm");
     let x_mm = root.required(&x_key).and_then(|value| positions(&value));
-    let provenance = root.required("provenance").and_then(|v| provenance(v, own));
+    let provenance = provenance(&mut root, own, third);
     let vaf = root.value("vaf").map_or(Some(BTreeMap::new()), vaf);
     let nodes = x_mm.as_ref().map(Vec::len);
     let mut branch = |name| {
@@ -91,11 +95,11 @@ fn read(mut root: Table<'_, '_>) -> Option<Realization> {
     })
 }
 
-/// A mechanism of version 2.
-fn read_mechanism(mut root: Table<'_, '_>, own: Units) -> Option<Realization> {
+/// A mechanism of version 2 or 3.
+fn read_mechanism(mut root: Table<'_, '_>, own: Units, third: bool) -> Option<Realization> {
     let id = id(&mut root);
     let trained = root.required("trained").and_then(|v| trained(v, own));
-    let provenance = root.required("provenance").and_then(|v| provenance(v, own));
+    let provenance = provenance(&mut root, own, third);
     let vaf = root.value("vaf").map_or(Some(BTreeMap::new()), vaf);
     let mechanism = root
         .required("mechanism")
@@ -244,14 +248,8 @@ fn direction(value: Value<'_, '_>, own: Units) -> Option<Direction> {
 
 fn trained(value: Value<'_, '_>, own: Units) -> Option<Trained> {
     let mut table = value.table()?;
-    let x_mm = table.required(&own.key("x_mm")).and_then(|value| {
-        let numbers = numbers(&value)?;
-        match numbers[..] {
-            [low, high] if low < high => Some([low, high]),
-            [_, _] => value.refuse("has to ascend: lowest, then highest position"),
-            _ => value.refuse(format_args!("has to be two numbers, not {}", numbers.len())),
-        }
-    });
+    let x_mm = table.required(&own.key("x_mm"));
+    let x_mm = x_mm.and_then(|value| carried::ascending(&value));
     let v_mm_s = table
         .required(&own.key("v_mm_s"))
         .and_then(|v| positive(&v));
@@ -283,8 +281,13 @@ fn positions(value: &Value<'_, '_>) -> Option<Vec<f64>> {
     all.map(|()| numbers)
 }
 
-fn provenance(value: Value<'_, '_>, own: Units) -> Option<Provenance> {
-    let mut table = value.table()?;
+/// How it was identified; in version 3 with what the recordings carry.
+fn provenance(root: &mut Table<'_, '_>, own: Units, third: bool) -> Option<Provenance> {
+    let mut optional = |key| third.then(|| root.value(key)).flatten();
+    let (coverage, terms) = (optional("coverage"), optional("terms"));
+    let coverage = coverage.map(|v| carried::coverage(v, own));
+    let terms = terms.map_or(Some(BTreeMap::new()), |v| carried::terms(v, own));
+    let mut table = root.required("provenance")?.table()?;
     let method = table.required("method").and_then(|v| v.text());
     let lambda = table.value("lambda").and_then(|value| {
         let lambda = finite(&value)?;
@@ -320,6 +323,11 @@ fn provenance(value: Value<'_, '_>, own: Units) -> Option<Provenance> {
         filter,
         recordings,
         note,
+        coverage: match coverage {
+            None => None,
+            Some(coverage) => Some(coverage?),
+        },
+        terms: terms?,
     })
 }
 

@@ -106,6 +106,26 @@ struct Scale {
     m: f64,
 }
 
+impl Scale {
+    /// The factor of a parameter with its unit, in mm and N, in its name.
+    fn of(self, key: &str) -> f64 {
+        let Self { x, f, m } = self;
+        let units = [
+            ("n_s_per_mm", f / x),
+            ("n_per_mm", f / x),
+            ("mm_s", x),
+            ("mm", x),
+            ("kg", m),
+            ("n", f),
+        ];
+        let found = units.iter().find(|(unit, _)| {
+            let before = key.strip_suffix(unit);
+            before.is_some_and(|before| before.is_empty() || before.ends_with('_'))
+        });
+        found.map_or(1.0, |(_, factor)| *factor)
+    }
+}
+
 impl Realization {
     /// In mm and N at the end of a lever arm; a linear realization is as it was.
     #[must_use]
@@ -146,6 +166,12 @@ impl Realization {
         }
         if let Some(mechanism) = &mut self.mechanism {
             mechanism.rescale(Scale { x, f, m });
+        }
+        if let Some(coverage) = &mut self.provenance.coverage {
+            coverage.rescale(x);
+        }
+        for (name, known) in &mut self.provenance.terms {
+            known.rescale(Scale { x, f, m }.of(name));
         }
     }
 }

@@ -398,6 +398,10 @@ table! {
         MotionShare: number("motion_share", "share of the time in which the handle moved")
             .empty("no samples"),
         HostLateMs: RatingColumn::HostLateMs.column(),
+        SpeedFactor: number("speed_factor", "largest speed over the largest one of the recordings that the realization was identified from")
+            .empty("no samples"),
+        BeyondShare: number("beyond_share", "share of the time in motion that was faster or further than these recordings")
+            .empty("the handle did not move"),
     }
 }
 

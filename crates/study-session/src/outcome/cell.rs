@@ -357,6 +357,8 @@ row! {
             RangeShare: range_share,
             TopSpeedMmS: top_speed_mm_s,
             MotionShare: motion_share,
+            SpeedFactor: speed_factor,
+            BeyondShare: beyond_share,
         }
     }
 }

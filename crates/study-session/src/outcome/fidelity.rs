@@ -139,6 +139,13 @@ pub struct Fidelity {
     /// Share of the time in which the handle moved.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub motion_share: Option<f64>,
+    /// Largest speed over that of the recordings of the realization.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub speed_factor: Option<f64>,
+    /// Share of the time in motion in which the handle was faster or further than these
+    /// recordings: the realization is held there.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub beyond_share: Option<f64>,
     /// VAF of what was delivered: of the table's force on the validation recording, with the
     /// gain and the delay of this playback.
     #[serde(skip_serializing_if = "Option::is_none")]

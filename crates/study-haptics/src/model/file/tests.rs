@@ -1,4 +1,5 @@
 use super::*;
+use crate::model::coverage::Determined;
 use proptest::prelude::*;
 
 const SMALL: &str = r#"format = "study-model/1"
@@ -217,13 +218,162 @@ fn a_node_is_outside_by_more_than_the_rounding_of_its_multiple() {
 
 #[test]
 fn a_newer_format_is_refused_without_further_faults() {
-    let newer = "study-model/3\"\ncolor = \"red";
+    let newer = "study-model/4\"\ncolor = \"red";
     assert_eq!(
         faults("study-model/1", newer),
         ["1: this is not a study-model/1 file"]
     );
-    let (_, findings) = parse("a.toml", &SMALL.replacen("/1", "/3", 1));
+    let (_, findings) = parse("a.toml", &SMALL.replacen("/1", "/4", 1));
     assert_eq!(findings.faults[0].label.as_deref(), Some("a newer format"));
+}
+
+/// [`SMALL`] as a file of version 3 with what its recordings carry.
+fn third() -> String {
+    let carried = r#"[coverage]
+x_mm = [0, 2]
+v_mm_s = [50, 100]
+full_strokes = 3
+partial_strokes = 0
+held_mm = [[0, 0.5]]
+[coverage.positive]
+top_mm_s = 90.5
+samples = [[0, 7], [1, 2]]
+[coverage.negative]
+top_mm_s = 100
+samples = [[4, 5], [0, 0]]
+[terms.m_kg]
+value = 0.01
+standard_error = 0.02
+upper_bound = 0.06
+[positive]"#;
+    let format = "study-model/3\"\nkind = \"table";
+    (SMALL.replacen("study-model/1", format, 1)).replacen("[positive]", carried, 1)
+}
+
+#[test]
+fn what_the_recordings_carry_is_read_and_written_in_any_units() {
+    let (read, findings) = parse("a.toml", &third());
+    assert_eq!(findings.faults, []);
+    let mut r = read.unwrap();
+    let coverage = r.provenance.coverage.as_ref().unwrap();
+    assert_eq!(coverage.v_mm_s, [50.0, 100.0]);
+    assert_eq!(coverage.directions[0].samples, [[0, 7], [1, 2]]);
+    assert_eq!(coverage.top_mm_s(), 90.5);
+    assert!(coverage.gaps_mm().iter().all(Vec::is_empty));
+    assert_eq!((coverage.full_strokes, coverage.partial_strokes), (3, 0));
+    assert_eq!(coverage.held_mm, [[0.0, 0.5]]);
+    let mass = r.provenance.terms["m_kg"];
+    assert_eq!(
+        (mass.standard_error, mass.upper_bound),
+        (Some(0.02), Some(0.06))
+    );
+    // A bound alone is enough.
+    let bound = Determined {
+        upper_bound: Some(0.25),
+        ..Determined::default()
+    };
+    (r.provenance.terms).insert("b_n_s_per_mm".to_owned(), bound);
+    let turned = r.clone().turned(Units::Radians, 20.0);
+    // 0.06 kg at 20 mm are 2.4e-5 kg·m², 0.5 mm are 0.025 rad.
+    let (found, covered) = (&turned.provenance.terms, &turned.provenance.coverage);
+    assert!((found["m_kg"].upper_bound.unwrap() - 2.4e-5).abs() < 1e-15);
+    assert!((covered.as_ref().unwrap().held_mm[0][1] - 0.025).abs() < 1e-15);
+    assert!(write(&turned).contains("[terms.b_nm_s_per_rad]"));
+    for one in [r, turned] {
+        let text = write(&one);
+        assert!(
+            text.starts_with("format = \"study-model/3\"\nkind = \"table\"\n"),
+            "{text}"
+        );
+        let (back, findings) = parse("a.toml", &text);
+        assert_eq!(findings.faults, []);
+        assert_eq!(back, Some(one));
+    }
+}
+
+#[test]
+fn every_fault_of_what_the_recordings_carry_has_its_line() {
+    for (from, to, expected) in [
+        (
+            "[50, 100]",
+            "[100, 50]",
+            "14: `coverage.v_mm_s` has to be speeds above 0 that ascend",
+        ),
+        (
+            "[50, 100]",
+            "[]",
+            "14: `coverage.v_mm_s` has to be speeds above 0 that ascend",
+        ),
+        (
+            "[[0, 7], [1, 2]]",
+            "[[0, 7]]",
+            "20: `coverage.positive.samples` has 1 rows: one for each class of `v_mm_s`",
+        ),
+        (
+            "[[0, 7], [1, 2]]",
+            "[[0, 7], [1]]",
+            "20: `coverage.positive.samples` has to have the same number of places in each row",
+        ),
+        (
+            "[[4, 5], [0, 0]]",
+            "[[4], [0]]",
+            "21: `coverage.negative` has another number of places than `positive`",
+        ),
+        (
+            "[[4, 5], [0, 0]]",
+            "[[4, -5], [0, 0]]",
+            "23: `coverage.negative.samples[0][1]` has to be from 0 to 4294967295, not -5",
+        ),
+        (
+            "[[0, 0.5]]",
+            "[[0.5, 0]]",
+            "17: `coverage.held_mm[0]` has to ascend: lowest, then highest position",
+        ),
+        (
+            "full_strokes = 3",
+            "full_stroke = 3",
+            "15: unknown key `full_stroke` in [coverage]",
+        ),
+        (
+            "terms.m_kg",
+            "terms.mass",
+            "24: unknown key `mass` in [terms]",
+        ),
+        (
+            "standard_error = 0.02",
+            "standard_error = -1",
+            "26: `terms.m_kg.standard_error` has to be 0 or more, not -1",
+        ),
+    ] {
+        let text = third();
+        assert!(text.contains(from), "{from}");
+        let (realization, findings) = parse("a.toml", &text.replacen(from, to, 1));
+        assert!(realization.is_none(), "{to}");
+        let line = |f: &Fault| {
+            f.span
+                .as_ref()
+                .map_or(0, |s| findings.line_and_column(s.start).0)
+        };
+        let found: Vec<String> = (findings.faults.iter())
+            .map(|f| format!("{}: {}", line(f), f.message))
+            .collect();
+        assert!(
+            found.iter().any(|f| f == expected),
+            "{expected}\n{found:#?}"
+        );
+    }
+    // Older versions have none of it.
+    for version in ["study-model/1\"\n#", "study-model/2\""] {
+        let text = third().replacen("study-model/3\"\n", &format!("{version}\n"), 1);
+        let (_, findings) = parse("a.toml", &text.replacen("#\nkind = \"table\"", "", 1));
+        assert!(findings.has_errors(), "{version}");
+        assert!(
+            findings
+                .faults
+                .iter()
+                .any(|f| f.message.contains("unknown key `coverage`"))
+        );
+    }
 }
 
 #[test]

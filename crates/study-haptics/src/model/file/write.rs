@@ -1,10 +1,8 @@
 //! The text of a model file.
 
-use super::{FORMAT, FORMAT_2, PARAMETERS, SCALAR_KEYS};
+use super::text::{Text, bare};
+use super::{FORMAT, FORMAT_2, FORMAT_3, PARAMETERS, SCALAR_KEYS, carried};
 use crate::model::{Realization, Units};
-use std::fmt::Write as _;
-/// Numbers of a list per line.
-const PER_LINE: usize = 6;
 
 /// The text of a model file.
 pub fn write(realization: &Realization) -> String {
@@ -12,8 +10,9 @@ pub fn write(realization: &Realization) -> String {
     let key = |key: &str| r.units.key(key);
     let mut out = Text::default();
     let turns = r.units != Units::Linear;
-    if turns || r.mechanism.is_some() {
-        out.text("format", FORMAT_2);
+    let third = r.provenance.coverage.is_some() || !r.provenance.terms.is_empty();
+    if third || turns || r.mechanism.is_some() {
+        out.text("format", if third { FORMAT_3 } else { FORMAT_2 });
         out.text(
             "kind",
             match r.mechanism {
@@ -85,6 +84,7 @@ pub fn write(realization: &Realization) -> String {
             out.number(&bare(name), *vaf);
         }
     }
+    carried::write(&mut out, p, r.units);
     match &r.mechanism {
         None => {
             for (name, branch) in [("positive", &r.positive), ("negative", &r.negative)] {
@@ -119,66 +119,5 @@ pub fn write(realization: &Realization) -> String {
             }
         }
     }
-    out.0
-}
-
-#[derive(Default)]
-struct Text(String);
-
-impl Text {
-    fn raw(&mut self, key: &str, value: &str) {
-        // writing to a String cannot fail
-        let _ = writeln!(self.0, "{key} = {value}");
-    }
-
-    fn text(&mut self, key: &str, value: &str) {
-        self.raw(key, &quoted(value));
-    }
-
-    fn number(&mut self, key: &str, value: f64) {
-        // {:?} gives the fewest digits that read back, and a point or an exponent
-        self.raw(key, &format!("{value:?}"));
-    }
-
-    fn list(&mut self, key: &str, values: &[f64]) {
-        let lines: Vec<String> = values
-            .chunks(PER_LINE)
-            .map(|line| {
-                let numbers: Vec<String> = line.iter().map(|v| format!("{v:?}")).collect();
-                format!("  {},\n", numbers.join(", "))
-            })
-            .collect();
-        self.raw(key, &format!("[\n{}]", lines.concat()));
-    }
-
-    fn table(&mut self, name: &str) {
-        let _ = writeln!(self.0, "\n[{name}]");
-    }
-}
-
-/// A basic TOML string, with invisible and control characters escaped.
-pub(crate) fn quoted(text: &str) -> String {
-    let mut out = String::with_capacity(text.len() + 2);
-    out.push('"');
-    for c in text.chars() {
-        match c {
-            '"' => out.push_str("\\\""),
-            '\\' => out.push_str("\\\\"),
-            c if study_base::text::is_unsafe(c) => {
-                let _ = write!(out, "\\U{:08X}", u32::from(c));
-            }
-            c => out.push(c),
-        }
-    }
-    out.push('"');
-    out
-}
-
-/// A key, bare if TOML allows it.
-fn bare(name: &str) -> String {
-    let bare = !name.is_empty()
-        && name
-            .chars()
-            .all(|c| c.is_ascii_alphanumeric() || matches!(c, '_' | '-'));
-    if bare { name.to_owned() } else { quoted(name) }
+    out.into()
 }
