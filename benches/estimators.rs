@@ -14,11 +14,11 @@ mod switches;
 use std::fs::File;
 use std::io::BufReader;
 use study_base::rng::Stream;
-use study_haptics::identify::method::{
-    Delta, Ewls, Hat, Passive, Segments, Sort, Start, State, Terms, TwoSided, Width, Window,
-};
+use study_haptics::identify::method::{Delta, Sort, Start, State, Terms, Window};
 use study_haptics::identify::resample::Resample;
-use study_haptics::identify::{Method, Training, vaf};
+use study_haptics::identify::{
+    Ewls, Hat, Method, Passive, Segments, Spring, Static, Training, TwoSided, Width, vaf,
+};
 use study_haptics::plant::Parameters;
 use study_haptics::recording::{self, Recording};
 use study_wire::predict::{Direction, Lookup};
@@ -104,9 +104,9 @@ fn methods() -> Vec<(&'static str, Method)> {
             "two-sided tricube L .4",
             two_sided(Window::Tricube, 0.4, false),
         ),
-        ("static", Method::Static),
+        ("static", Static.into()),
         ("segments 12", Method::Segments(Segments::default())),
-        ("spring", Method::Spring),
+        ("spring", Spring.into()),
         ("hat sign, free", hat(State::Sign, false)),
         ("hat sign", hat(State::Sign, true)),
         ("hat play, free", hat(play, false)),

@@ -10,9 +10,8 @@
 use std::fmt::Write as _;
 use study_haptics::identify::grid::{self, Plan};
 use study_haptics::identify::lanes::Processor;
-use study_haptics::identify::method::Ewls;
 use study_haptics::identify::resample::Resample;
-use study_haptics::identify::{Training, vaf};
+use study_haptics::identify::{Ewls, Training, vaf};
 use study_haptics::recording::{self, Recording};
 use study_wire::predict::Lookup;
 

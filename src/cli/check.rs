@@ -85,7 +85,7 @@ fn certificates(loaded: &Loaded, report: &Report<'_>, verbose: bool) -> String {
     for certified in &report.certificates {
         let (id, certificate) = (certified.model, &certified.certificate);
         if verbose {
-            let damping = super::identify::required_damping(certificate);
+            let damping = study_report::identification::required_damping(certificate);
             out += &format!("{id}: {certificate}\n    {damping}\n");
         } else {
             let verdict = if certified.pass { "PASS" } else { "FAIL" };

@@ -6,11 +6,11 @@
 use std::fs::File;
 use std::io::BufReader;
 use study_base::rng::Stream;
-use study_haptics::identify::method::{
-    Delta, Ewls, Hat, Passive, Segments, State, Terms, TwoSided, Width, Window,
-};
+use study_haptics::identify::method::{Delta, State, Terms, Window};
 use study_haptics::identify::resample::Resample;
-use study_haptics::identify::{Method, Training, Warning, vaf};
+use study_haptics::identify::{
+    Ewls, Hat, Method, Passive, Segments, Training, TwoSided, Warning, Width, vaf,
+};
 use study_haptics::recording::{self, Recording};
 use study_wire::predict::Lookup;
 

@@ -3,12 +3,12 @@
 #![allow(clippy::unwrap_used, reason = "a test that fails says where")]
 
 use study_base::rng::Stream;
-use study_haptics::identify::method::{
-    Delta, Ewls, Friction, Hat, Passive, Segments, Sort, Start, State, Terms, TwoSided, Width,
-    Window,
-};
+use study_haptics::identify::method::{Delta, Sort, Start, State, Terms, Window};
 use study_haptics::identify::resample::Resample;
-use study_haptics::identify::{Identified, IdentifyError, Method, Training, Warning, vaf};
+use study_haptics::identify::{
+    Ewls, Friction, Hat, Identified, IdentifyError, Method, Passive, Segments, Spring, Static,
+    Training, TwoSided, Warning, Width, vaf,
+};
 use study_haptics::model::{Branch, Realization};
 use study_haptics::recording::Recording;
 use study_wire::predict::{Direction, DirectionState, Lookup, Motion};
@@ -99,9 +99,9 @@ fn every_method() -> Vec<Method> {
             huber: true,
             ..Passive::default()
         }),
-        Method::Static,
+        Static.into(),
         Method::Segments(Segments::default()),
-        Method::Spring,
+        Spring.into(),
     ]
 }
 
@@ -319,7 +319,7 @@ fn a_reversal_of_the_axis_swaps_the_directions_for_symmetric_methods() {
         two_sided(Window::Tricube, Width::Lambda(0.99), true),
         hat(State::Sign),
         Method::Segments(Segments::default()),
-        Method::Spring,
+        Spring.into(),
     ] {
         let worst = differ(method);
         assert!(worst < 1e-6, "{method}: {worst} N");
@@ -414,7 +414,7 @@ fn positions_without_samples_give_a_warning_for_every_table() {
         column.retain(|_| *kept.next().unwrap());
     }
     for method in every_method() {
-        if let Method::Spring
+        if let Method::Spring(_)
         | Method::Friction(_)
         | Method::Ewls(Ewls {
             resample: Resample::Point,
@@ -486,7 +486,7 @@ fn eight_seconds_at_one_position_ruin_no_table() {
     }
     let probe = target("o", 7, 0.0);
     for method in every_method() {
-        if let Method::Spring | Method::Friction(_) = method {
+        if let Method::Spring(_) | Method::Friction(_) = method {
             // they have no detents
             continue;
         }

@@ -5,8 +5,8 @@
 use std::fmt::Write as _;
 use study_base::rng::Stream;
 use study_haptics::identify::evidence::{self, Term};
-use study_haptics::identify::method::{Hat, Passive, Terms};
-use study_haptics::identify::{Method, Training, Warning};
+use study_haptics::identify::method::Terms;
+use study_haptics::identify::{Hat, Method, Passive, Training, Warning};
 use study_haptics::recording::{self, Recording};
 use study_wire::predict::Lookup;
 

@@ -4,9 +4,8 @@
 
 use std::path::Path;
 use study_haptics::identify::evidence::Term;
-use study_haptics::identify::method::Passive;
 use study_haptics::identify::repetition::{Curve, Loops, WITHIN};
-use study_haptics::identify::{Method, Training, Warning, vaf};
+use study_haptics::identify::{Method, Passive, Training, Warning, vaf};
 use study_haptics::recording::force_curve::{self, Source, Stated};
 use study_haptics::recording::{self, Recording};
 use study_wire::predict::Lookup;

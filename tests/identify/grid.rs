@@ -8,9 +8,9 @@ use std::io::BufReader;
 use std::path::Path;
 use study_haptics::identify::grid::{self, Cell, Plan};
 use study_haptics::identify::lanes::Processor;
-use study_haptics::identify::method::{Ewls, Sort, Start};
+use study_haptics::identify::method::{Sort, Start};
 use study_haptics::identify::resample::Resample;
-use study_haptics::identify::{IdentifyError, Method, Training, vaf};
+use study_haptics::identify::{Ewls, IdentifyError, Method, Spring, Static, Training, vaf};
 use study_haptics::model::{Branch, Realization};
 use study_haptics::recording::{self, Recording};
 use study_wire::predict::Lookup;
@@ -280,9 +280,9 @@ fn a_grid_of_several_methods_keeps_their_order_and_counts_its_cells() {
     let paper = |lambda| Method::Ewls(Ewls::paper(lambda, Resample::Bin));
     let plan = Plan {
         methods: vec![
-            Method::Spring,
+            Spring.into(),
             paper(0.99),
-            Method::Static,
+            Static.into(),
             Method::Ewls(Ewls {
                 bounded: true,
                 ..Ewls::paper(0.99, Resample::Bin)

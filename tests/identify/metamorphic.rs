@@ -4,9 +4,8 @@
 
 use std::fmt::Write as _;
 use study_haptics::identify::grid::{self, Plan};
-use study_haptics::identify::method::Ewls;
 use study_haptics::identify::resample::Resample;
-use study_haptics::identify::{IdentifyError, Training, vaf};
+use study_haptics::identify::{Ewls, IdentifyError, Spring, Static, Training, vaf};
 use study_haptics::recording::{self, Recording};
 use study_wire::predict::Lookup;
 
@@ -97,7 +96,7 @@ fn a_constant_error_is_bias_and_not_vaf() {
     let train = recording("t", 20, 0.0, PLUS, MINUS, 1.0);
     let mut other = recording("o", 7, 0.0, PLUS, MINUS, 1.0);
     let training = Training::new(&train).unwrap();
-    let found = training.static_profile(1.0, Lookup::Linear).unwrap();
+    let found = training.identify(Static, 1.0, Lookup::Linear).unwrap();
     let before = vaf::score(&found.realization, &other);
     for f in &mut other.f_n {
         *f -= 2.5;
@@ -114,7 +113,8 @@ fn the_spring_recovers_a_line() {
     let r = recording("r", 5, 0.0, theta, theta, 0.0);
     let spring = Training::new(&r)
         .unwrap()
-        .spring(Lookup::Linear)
+        .identify(Spring, 0.0, Lookup::Linear)
+        .unwrap()
         .realization;
     for branch in [&spring.positive, &spring.negative] {
         for k in &branch.k_n_per_mm {

@@ -4,11 +4,9 @@
 
 use crate::estimators_tables::{identified, motion, target};
 use study_haptics::identify::grid::{self, Plan};
-use study_haptics::identify::method::{
-    Ewls, Friction, Hat, Passive, Start, Terms, TwoSided, Width, Window,
-};
+use study_haptics::identify::method::{Start, Terms, Window};
 use study_haptics::identify::resample::Resample;
-use study_haptics::identify::{Method, Training};
+use study_haptics::identify::{Ewls, Friction, Hat, Method, Passive, Training, TwoSided, Width};
 use study_wire::predict::{Direction, DirectionState, Lookup, Motion};
 
 /// Terms that are left out are 0, and the file says so.

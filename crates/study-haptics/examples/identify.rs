@@ -4,10 +4,9 @@
 #![allow(clippy::print_stdout, reason = "an example prints its results")]
 
 use std::error::Error;
-use study_haptics::identify::method::{Ewls, Method};
 use study_haptics::identify::resample::Resample;
 use study_haptics::identify::signal::{Acceleration, Settings, prepare};
-use study_haptics::identify::{Training, vaf};
+use study_haptics::identify::{Ewls, Method, Training, vaf};
 use study_haptics::plant::{Parameters, Probe};
 use study_haptics::recording::{self, Columns, Recording};
 use study_haptics::trajectory;

@@ -25,42 +25,66 @@
 //! Reference: Colton & Hollerbach, World Haptics 2007, equation 1 and section 4.
 
 mod banded;
-pub mod baseline;
 pub mod compare;
 pub mod constrained;
 pub mod coverage;
 pub mod delivery;
+mod direction_state;
 pub mod evidence;
-pub mod ewls;
 pub mod folds;
-mod friction;
 pub mod grid;
-mod hat;
-mod hat_table;
+pub mod identification;
 pub mod lanes;
-pub mod mechanism;
 pub mod method;
-mod passive;
+pub mod plan;
 mod problem;
 pub mod repetition;
 pub mod resample;
 pub mod samples;
 pub mod signal;
-pub mod two_sided;
 pub mod vaf;
 pub mod validation;
 
-pub use method::Method;
-pub use problem::{Cause, IdentifyError, Warning};
-pub use samples::{Samples, Theta};
+method::estimators! {
+    /// Mass, damping and friction that do not depend on the position.
+    friction: Friction(friction::Friction),
+    /// The hat table with one mass and bounds that make it passive.
+    passive: Passive(passive::Passive),
+    /// Baseline: mean force by position and direction.
+    static_profile: Static(static_profile::Static),
+    /// The paper's method: exponentially weighted least squares along x.
+    ewls: Ewls(ewls::Ewls),
+    /// All nodes at once, by penalized least squares, with a direction state.
+    hat: Hat(hat::Hat),
+    /// A virtual mechanism, by the simulation error of the force.
+    mechanism: Mechanism(mechanism::Options),
+    /// Least squares around each node, with weights that decrease to both sides.
+    two_sided: TwoSided(two_sided::TwoSided),
+    /// Baseline: force by direction, piecewise linear between few nodes.
+    segments: Segments(segments::Segments),
+    /// Baseline: one straight line.
+    spring: Spring(spring::Spring),
+}
 
-use crate::model::{Branch, Mechanism, Provenance, Realization, Trained};
+pub use ewls::{Estimates, Ewls};
+pub use friction::Friction;
+pub use hat::Hat;
+pub use mechanism::Fitted;
+pub use method::Estimator;
+pub use passive::Passive;
+pub use problem::{Cause, Estimate, IdentifyError, Warning};
+pub use samples::{Samples, Theta};
+pub use segments::Segments;
+pub use spring::Spring;
+pub use static_profile::Static;
+pub use two_sided::{TwoSided, Width};
+
+use crate::model::{Branch, Provenance, Realization, Trained};
 use crate::recording::{Recording, range};
+use compare::Trials;
 use evidence::{Evidence, Term};
-use mechanism::{Fitted, Progress};
-use method::{Ewls, Sort, Start, TwoSided, Width};
-use problem::START_UP_SAMPLES;
-use resample::{Resample, Resampled};
+use method::Setting;
+use resample::Resampled;
 use std::sync::OnceLock;
 use study_wire::predict::{Direction, Lookup};
 
@@ -161,9 +185,9 @@ impl<'r> Training<'r> {
     }
 
     /// The method without the terms that the recordings do not carry, if it asks for that, and
-    /// a warning for each.
-    fn carried(&self, mut method: Method) -> (Method, Vec<Warning>) {
-        let mut left_out = Vec::new();
+    /// what they say of each.
+    fn carried(&self, mut method: Method) -> (Method, Vec<Evidence>) {
+        let mut asked = Vec::new();
         if let Some(terms) = method.terms_mut().filter(|terms| terms.only_carried) {
             terms.only_carried = false;
             for evidence in self.evidence().into_iter().flatten() {
@@ -171,77 +195,44 @@ impl<'r> Training<'r> {
                     Term::Mass => &mut terms.m,
                     Term::Damping => &mut terms.b,
                 };
-                if *kept && !evidence.is_carried() {
-                    *kept = false;
-                    left_out.push(Warning::LeftOut(*evidence));
+                if *kept {
+                    *kept = evidence.is_carried();
+                    asked.push(*evidence);
                 }
             }
         }
-        (method, left_out)
+        (method, asked)
     }
 
     /// Identifies a realization. Methods without dx ignore `dx_mm`, see
-    /// [`Method::has_dx`].
+    /// [`Estimator::has_dx`].
     ///
     /// # Errors
     /// [`IdentifyError`] if an option is out of range or the recording does not
     /// suit the method.
     pub fn identify(
         &self,
-        method: Method,
+        method: impl Into<Method>,
         dx_mm: f64,
         lookup: Lookup,
     ) -> Result<Identified, IdentifyError> {
-        method.check()?;
-        let (method, left_out) = self.carried(method);
-        let mut identified = self.identify_as_asked(method, dx_mm, lookup)?;
-        identified.warnings.extend(left_out);
-        Ok(identified)
+        self.identify_at(method.into(), Setting::new(dx_mm, lookup))
     }
 
-    fn identify_as_asked(
-        &self,
-        method: Method,
-        dx_mm: f64,
-        lookup: Lookup,
-    ) -> Result<Identified, IdentifyError> {
-        match method {
-            Method::Ewls(options) => {
-                // check dx before the long computation
-                self.nodes(dx_mm)?;
-                let estimates = self.estimates(options)?;
-                self.ewls(&estimates, dx_mm, options.resample, lookup)
-            }
-            Method::TwoSided(options) => self.two_sided(options, dx_mm, lookup),
-            Method::Hat(options) => self.hat(options, dx_mm, lookup),
-            Method::Passive(options) => self.passive(options, dx_mm, lookup),
-            Method::Mechanism(options) => self.mechanism(options, dx_mm, |_| ()),
-            Method::Friction(options) => self.friction(options, lookup),
-            Method::Static => self.static_profile(dx_mm, lookup),
-            Method::Segments(options) => self.segments(options, lookup),
-            Method::Spring => Ok(self.spring(lookup)),
-        }
-    }
-
-    /// One estimate of θ per sample, in both directions. `options.resample` is not
-    /// used.
+    /// The same; a simulation reports its steps.
     ///
     /// # Errors
-    /// [`IdentifyError`] if λ is not in (0, 1] or an estimate is not finite.
-    pub fn estimates(&self, options: Ewls) -> Result<Estimates, IdentifyError> {
-        Method::Ewls(options).check()?;
-        let estimate = |samples, backward| {
-            let theta = ewls::estimate(samples, &options, backward);
-            let finite = theta.iter().flatten().all(|p| p.is_finite());
-            finite.then_some(theta).ok_or(IdentifyError::Diverged {
-                lambda: options.lambda,
-            })
-        };
-        Ok(Estimates {
-            options,
-            positive: estimate(&self.positive, false)?,
-            negative: estimate(&self.negative, true)?,
-        })
+    /// As [`Self::identify`].
+    pub fn identify_at(
+        &self,
+        method: Method,
+        setting: Setting<'_>,
+    ) -> Result<Identified, IdentifyError> {
+        method.check()?;
+        let (method, terms) = self.carried(method);
+        let mut identified = method.identify(self, setting)?;
+        identified.add_terms(terms);
+        Ok(identified)
     }
 
     /// The positions of a table's nodes, mm.
@@ -268,189 +259,10 @@ impl<'r> Training<'r> {
         Ok(nodes)
     }
 
-    /// A table of the EWLS family from estimates computed before.
-    ///
-    /// # Errors
-    /// [`IdentifyError`] if dx does not suit the recording.
-    pub fn ewls(
-        &self,
-        estimates: &Estimates,
-        dx_mm: f64,
-        resample: Resample,
-        lookup: Lookup,
-    ) -> Result<Identified, IdentifyError> {
-        let nodes = self.nodes(dx_mm)?;
-        let at_nodes = |samples: &Samples, theta: &[Theta]| {
-            resample::at_nodes(resample, &samples.x_mm, theta, &nodes, dx_mm)
-        };
-        let positive = at_nodes(&self.positive, &estimates.positive);
-        let negative = at_nodes(&self.negative, &estimates.negative);
-        let options = Ewls {
-            resample,
-            ..estimates.options
-        };
-        Ok(self.ewls_table(options, dx_mm, nodes, positive, negative, lookup))
-    }
-
-    /// A table of the EWLS family from the parameters at its nodes.
-    fn ewls_table(
-        &self,
-        options: Ewls,
-        dx_mm: f64,
-        nodes: Vec<f64>,
-        positive: Resampled,
-        negative: Resampled,
-        lookup: Lookup,
-    ) -> Identified {
-        let start_up = self.start_up(&options, &nodes);
-        let mut identified = self.table(nodes, positive, negative, Cause::NoSamples, lookup);
-        identified.warnings.extend(start_up);
-        identified.realization.provenance = Provenance {
-            lambda: Some(options.lambda),
-            memory_mm: self.memory_mm(options.lambda),
-            dx_mm: Some(dx_mm),
-            resample: Some(options.resample.as_str().into()),
-            ..self.provenance(Method::Ewls(options))
-        };
-        identified
-    }
-
-    /// Baseline: mean force by position and direction.
-    ///
-    /// # Errors
-    /// [`IdentifyError`] if dx does not suit the recording.
-    pub fn static_profile(&self, dx_mm: f64, lookup: Lookup) -> Result<Identified, IdentifyError> {
-        let nodes = self.nodes(dx_mm)?;
-        let positive = baseline::static_profile(&self.positive, &nodes, dx_mm);
-        let negative = baseline::static_profile(&self.negative, &nodes, dx_mm);
-        let mut identified = self.table(nodes, positive, negative, Cause::NoSamples, lookup);
-        identified.realization.provenance = Provenance {
-            dx_mm: Some(dx_mm),
-            resample: Some(Resample::Bin.as_str().into()),
-            ..self.provenance(Method::Static)
-        };
-        Ok(identified)
-    }
-
-    /// Baseline: one straight line, as a table of two nodes at the ends of the range.
-    pub fn spring(&self, lookup: Lookup) -> Identified {
-        let theta = baseline::spring(&self.recordings);
-        let branch = Resampled {
-            theta: vec![theta; 2],
-            filled: 0,
-        };
-        let nodes = self.range_mm.to_vec();
-        let mut identified = self.table(nodes, branch.clone(), branch, Cause::NoSamples, lookup);
-        identified.realization.provenance = self.provenance(Method::Spring);
-        let [_, _, k_n_per_mm, _] = theta;
-        if k_n_per_mm < 0.0 {
-            let warning = Warning::NegativeSpring { k_n_per_mm };
-            identified.warnings.push(warning);
-        }
-        identified
-    }
-
-    /// Weighted least squares around each node.
-    fn two_sided(
-        &self,
-        options: TwoSided,
-        dx_mm: f64,
-        lookup: Lookup,
-    ) -> Result<Identified, IdentifyError> {
-        let nodes = self.nodes(dx_mm)?;
-        let [l_plus, l_minus] = self.directions().map(|samples| match options.width {
-            Width::Mm(mm) => Ok(mm),
-            Width::Lambda(lambda) => {
-                (samples.memory_mm(lambda)).ok_or(IdentifyError::Lambda(lambda))
-            }
-        });
-        let (l_plus, l_minus) = (l_plus?, l_minus?);
-        let estimate = |samples: &Samples, width_mm| {
-            let of = (options.bounded, options.terms);
-            two_sided::at_nodes(samples, &nodes, options.window, width_mm, of)
-                .ok_or(IdentifyError::Narrow { width_mm })
-        };
-        let positive = estimate(&self.positive, l_plus)?;
-        let negative = estimate(&self.negative, l_minus)?;
-        let mut identified = self.table(nodes, positive, negative, Cause::FewSamples, lookup);
-        let method = Method::TwoSided(options);
-        identified.realization.provenance = Provenance {
-            lambda: method.lambda(),
-            memory_mm: Some(l_plus.min(l_minus)),
-            dx_mm: Some(dx_mm),
-            ..self.provenance(method)
-        };
-        Ok(identified)
-    }
-
-    /// The virtual mechanism. `progress` is called after each step of its fit.
-    ///
-    /// # Errors
-    /// As [`mechanism::identify`].
-    pub fn mechanism(
-        &self,
-        options: method::Mechanism,
-        dx_mm: f64,
-        progress: impl Fn(Progress) + Sync,
-    ) -> Result<Identified, IdentifyError> {
-        self.nodes(dx_mm)?;
-        let settings = mechanism::Settings {
-            dx_mm,
-            recorded_hz: options.recorded_hz,
-        };
-        let fitted = mechanism::identify(self, settings, progress)?;
-        let method = Method::Mechanism(options);
-        Ok(Identified {
-            realization: self.of_mechanism(method, dx_mm, fitted.mechanism.clone()),
-            warnings: fitted.warnings(),
-            fitted: Some(Box::new(fitted)),
-        })
-    }
-
-    fn of_mechanism(&self, method: Method, dx_mm: f64, mechanism: Mechanism) -> Realization {
-        let provenance = Provenance {
-            dx_mm: Some(dx_mm),
-            ..self.provenance(method)
-        };
-        let trained = Trained {
-            x_mm: self.range_mm,
-            v_mm_s: self.top_speed_mm_s,
-        };
-        let vaf = std::collections::BTreeMap::new();
-        Realization::of_mechanism(String::new(), provenance, vaf, trained, mechanism)
-    }
-
-    /// A warning about nodes where the recursion of either direction has seen few
-    /// samples. A warm start has none.
-    fn start_up(&self, options: &Ewls, nodes: &[f64]) -> Option<Warning> {
-        if options.start == Start::Warm {
-            return None;
-        }
-        let end_of_start_up = |x: &[f64]| x[START_UP_SAMPLES.min(x.len() - 1)];
-        let mut low = end_of_start_up(&self.positive.x_mm);
-        let mut high = f64::INFINITY;
-        match options.sort {
-            Sort::Ascending => low = low.max(end_of_start_up(&self.negative.x_mm)),
-            Sort::Travel => {
-                let x = &self.negative.x_mm;
-                high = x[x.len() - 1 - START_UP_SAMPLES.min(x.len() - 1)];
-            }
-        }
-        let early: Vec<f64> = nodes
-            .iter()
-            .copied()
-            .filter(|node| *node < low || *node > high)
-            .collect();
-        early.last().map(|last| Warning::StartUp {
-            nodes: early.len(),
-            to_mm: *last,
-        })
-    }
-
     /// What model files say about the recording, and the method.
-    fn provenance(&self, method: Method) -> Provenance {
+    fn provenance(&self, method: impl Into<Method>) -> Provenance {
         Provenance {
-            method: method.to_string(),
+            method: method.into().to_string(),
             filter: Some(match self.recordings[0].filter() {
                 Some(description) => format!("as recorded: {description}"),
                 None => "as recorded".into(),
@@ -503,20 +315,10 @@ impl<'r> Training<'r> {
                 units: crate::model::Units::Linear,
             },
             warnings,
+            terms: Vec::new(),
             fitted: None,
         }
     }
-}
-
-/// One estimate of θ per sample, in the order of [`Training::directions`].
-#[derive(Debug, Clone)]
-pub struct Estimates {
-    /// The options they were computed with.
-    pub options: Ewls,
-    /// For v > 0.
-    pub positive: Vec<Theta>,
-    /// For v < 0, in ascending order of x.
-    pub negative: Vec<Theta>,
 }
 
 /// An identified realization; its id and VAF are empty.
@@ -526,8 +328,26 @@ pub struct Identified {
     pub realization: Realization,
     /// What is doubtful about it.
     pub warnings: Vec<Warning>,
+    /// What was found of each term, of an estimator that asks whether the recordings carry it.
+    pub terms: Vec<Estimate>,
     /// How a mechanism was fitted.
     pub fitted: Option<Box<Fitted>>,
+}
+
+impl Identified {
+    /// What the recordings say of terms, and a warning for each that is left out.
+    fn add_terms(&mut self, evidence: Vec<Evidence>) {
+        self.terms.extend(evidence.iter().map(Estimate::from));
+        let left_out = evidence.into_iter().filter(|e| !e.is_carried());
+        self.warnings.extend(left_out.map(Warning::LeftOut));
+    }
+}
+
+impl Method {
+    /// The name in arguments and model files.
+    pub fn as_str(self) -> &'static str {
+        self.name()
+    }
 }
 
 fn branch(theta: &[Theta]) -> Branch {

@@ -1,4 +1,6 @@
-//! The figures of an identification, numbered as in the paper: 4 VAF over λ (or δ) and dx,
+//! What an identification prints: its text, its document, and its figures.
+//!
+//! The figures are numbered as in the paper: 4 VAF over λ (or δ) and dx,
 //! 5 parameters over position, 6 force over time, 7 its spectrum, 8 parameters over
 //! position and λ. Before them come those that are looked at first: force and residual over position,
 //! coverage, and the comparison of methods, which [`terminal`] draws as text.
@@ -6,28 +8,38 @@
 //! Each figure comes with its data as a CSV, in the units of its axes. Nothing is
 //! identified or selected here.
 
+mod comparison;
 mod coverage;
 mod displacement;
+mod first;
+mod json;
+mod loops;
 mod mechanism;
 mod methods;
 mod page;
 mod parameters;
 mod position;
+mod printed;
 mod spectrum;
 mod surface;
 pub mod terminal;
+mod text;
 
 pub use coverage::{Coverage, coverage};
 pub use displacement::displacement;
+pub use json::document;
 pub use mechanism::mechanism;
 pub use methods::{Compared, methods};
 pub use page::page;
 pub use parameters::{map, parameters};
 pub use position::{Bin, ByPosition};
 pub use surface::{GridCell, Row, surface};
+pub use text::{required_damping, text};
 
 use super::chart::{Axis, Color, Dash, Figure, Look, Mark, PALETTE, Panel};
 use std::fmt::Write as _;
+use study_base::text::Untrusted;
+use study_haptics::identify::identification::Identification;
 use study_haptics::identify::vaf;
 use study_haptics::model::{Realization, Units};
 use study_haptics::recording::Recording;
@@ -46,6 +58,70 @@ pub struct Drawing {
     pub figure: Figure,
     /// Its data.
     pub csv: String,
+}
+
+/// The figures of an identification, and notes on figures that need more cells.
+pub fn figures(results: &Identification) -> (Vec<Drawing>, Vec<&'static str>) {
+    let mut missing = Vec::new();
+    let mut drawings = first::drawings(results);
+    let shown =
+        (results.turned).map_or(Shown::LINEAR, |(units, lever_mm)| Shown { units, lever_mm });
+    let lambdas = (results.cells.iter()).any(|c| c.realization.provenance.lambda.is_some());
+    let row = if lambdas { Row::Lambda } else { Row::Delta };
+    let places: Vec<GridCell> = results
+        .cells
+        .iter()
+        .filter_map(|cell| {
+            let provenance = &cell.realization.provenance;
+            Some(GridCell {
+                value: match row {
+                    Row::Lambda => provenance.lambda?,
+                    Row::Delta => cell.realization.direction.delta_mm()?,
+                },
+                memory_mm: provenance.memory_mm,
+                dx_mm: provenance.dx_mm?,
+                vaf: cell.scores.first()?.vaf,
+            })
+        })
+        .collect();
+    let whole = places.len() == results.cells.len();
+    let selected_on = results
+        .recordings
+        .first()
+        .map_or("", |source| &source.recording.name);
+    let name = Untrusted(selected_on).to_string();
+    let best = results.best.filter(|_| whole);
+    match surface(row, &places, best, &name, shown) {
+        Some(drawing) => drawings.push(drawing),
+        None => {
+            missing.push("no Fig. 4: it requires two dx and two lambda, or two dx and two delta")
+        }
+    }
+    if let Some(cell) = results.cells.get(results.best.unwrap_or(0)) {
+        let recording = results.reported();
+        let realization = &cell.realization;
+        let mechanism = mechanism(realization, recording, shown);
+        let is_table = mechanism.is_none();
+        drawings.push(mechanism.unwrap_or_else(|| parameters(realization, shown)));
+        drawings.push(force(realization, recording, shown));
+        match spectra(realization, recording, shown) {
+            Some(drawing) => drawings.push(drawing),
+            None => missing.push("no Fig. 7: the time of a slow press says nothing of the switch"),
+        }
+        let dx = realization.provenance.dx_mm;
+        let same_dx: Vec<_> = results
+            .cells
+            .iter()
+            .filter(|other| other.realization.provenance.dx_mm == dx)
+            .filter_map(|other| Some((other.realization.provenance.lambda?, &other.realization)))
+            .collect();
+        match map(&same_dx, shown) {
+            Some(drawing) => drawings.push(drawing),
+            None if is_table => missing.push("no Fig. 8: it requires at least two lambda"),
+            None => {}
+        }
+    }
+    (drawings, missing)
 }
 
 /// The units of the axes and the lever arm of a turning handle, mm.

@@ -1,11 +1,12 @@
 //! The arguments of `study identify`.
 
 use super::Failure;
-use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use std::path::{Path, PathBuf};
 use study_base::text::Untrusted;
-use study_haptics::identify::method::{Sort, Start, Window};
+use study_haptics::identify::ESTIMATORS;
+use study_haptics::identify::identification::Request;
+use study_haptics::identify::method::{Options, Rule, Sort, Start, TermName, Window};
 use study_haptics::identify::resample::Resample;
 use study_haptics::identify::signal::{Acceleration, Settings};
 use study_haptics::model::Units;
@@ -75,6 +76,20 @@ const WINDOWS: [Choice<Window>; 2] = [
     (Window::Exponential, "Sum of a forward and a backward EWLS"),
     (Window::Tricube, "Smooth, with finite support"),
 ];
+const DIRECTIONS: [Choice<Rule>; 3] = [
+    (Rule::Sign, "The sign of v, as in the paper"),
+    (Rule::Play, "Play (backlash)"),
+    (Rule::Dahl, "Dahl friction"),
+];
+const TERMS: [Choice<TermName>; 4] = [
+    (TermName::M, "The mass"),
+    (TermName::B, "The damping"),
+    (TermName::K, "The stiffness"),
+    (
+        TermName::F0,
+        "The force by position; in friction the Coulomb friction with an offset",
+    ),
+];
 const BOUNDS: [Choice<bool>; 2] = [(true, "Require m, b >= 0"), (false, "No bounds")];
 
 /// Parses an option with a fixed set of values that have these names.
@@ -87,6 +102,12 @@ fn choice<T: Copy + Send + Sync + 'static>(
         let found = choices.iter().find(|(value, _)| name(*value) == given);
         found.map(|(value, _)| *value).ok_or(ArgumentError::Choice)
     })
+}
+
+/// The names of the estimators, each with what it is.
+fn estimators() -> PossibleValuesParser {
+    let names = ESTIMATORS.iter().flat_map(|known| known.names);
+    PossibleValuesParser::new(names.map(|(name, what)| PossibleValue::new(*name).help(*what)))
 }
 
 fn switch(on: bool) -> &'static str {
@@ -149,8 +170,8 @@ pub(in crate::cli) struct Args {
     pub(super) active: bool,
 
     /// Estimator [default: all are compared, and one is recommended; with an option of the recursion ewls, with another one of an estimator passive]
-    #[arg(long, value_enum)]
-    pub(super) method: Option<MethodName>,
+    #[arg(long, value_parser = estimators())]
+    pub(super) method: Option<String>,
 
     /// Forgetting factors, above 0 and at most 1: a list, or FROM:TO:STEP [default: 0.999:0.9999:0.0001]; without --method they mean ewls
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = lambdas)]
@@ -185,8 +206,8 @@ pub(in crate::cli) struct Args {
     pub(super) width: Option<f64>,
 
     /// Direction state of a hat or passive table [default: play] or of friction [default: dahl]
-    #[arg(long, value_enum)]
-    pub(super) direction: Option<DirectionRule>,
+    #[arg(long, value_parser = choice(&DIRECTIONS, Rule::as_str))]
+    pub(super) direction: Option<Rule>,
 
     /// Lengths over which a hat or passive table or friction changes direction, in mm: a list, or FROM:TO:STEP [default: the shortest that suits the training recording]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = increments)]
@@ -197,8 +218,8 @@ pub(in crate::cli) struct Args {
     pub(super) ridge: Vec<f64>,
 
     /// Terms that are identified: f0 with any of m, b and, for ewls, constrained and two-sided, k [default: all, without m and b where the recordings do not carry them]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
-    pub(super) terms: Vec<Term>,
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = choice(&TERMS, TermName::as_str))]
+    pub(super) terms: Vec<TermName>,
 
     /// Whether m, b >= 0 for two-sided (default: off) and hat tables (default: on)
     #[arg(long, value_name = "SWITCH", value_parser = choice(&BOUNDS, switch))]
@@ -227,52 +248,6 @@ pub(in crate::cli) struct Args {
     /// Write the figures (SVG, PNG) and their data (CSV) into this folder
     #[arg(long, value_name = "DIR")]
     pub(super) figures: Option<PathBuf>,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum MethodName {
-    /// The paper's method: exponentially weighted least squares along x
-    Ewls,
-    /// The paper's method with m, b >= 0
-    Constrained,
-    /// Weighted least squares around each node
-    TwoSided,
-    /// All nodes at once, with a direction state
-    Hat,
-    /// A hat table with one mass and bounds: passes its certificate by construction
-    Passive,
-    /// A virtual mechanism with backlash, two masses and friction, fitted by simulation
-    Mechanism,
-    /// Mass, damping and friction that do not depend on the position
-    Friction,
-    /// Baseline: mean force by position and direction
-    Static,
-    /// Baseline: piecewise linear force by direction
-    Segments,
-    /// Baseline: one straight line
-    Spring,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum Term {
-    /// The mass
-    M,
-    /// The damping
-    B,
-    /// The stiffness
-    K,
-    /// The force by position; in friction the Coulomb friction with an offset
-    F0,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(super) enum DirectionRule {
-    /// The sign of v, as in the paper
-    Sign,
-    /// Play (backlash)
-    Play,
-    /// Dahl friction
-    Dahl,
 }
 
 /// A recording's path and its name in model files.
@@ -424,47 +399,39 @@ impl Args {
         self.lever.map(|lever_mm| (units, lever_mm))
     }
 
-    /// Whether methods are compared: without a method, and without an option of one.
-    pub(super) fn compares(&self) -> bool {
-        let lists = [&self.lambda, &self.dx, &self.delta];
-        self.method.is_none()
-            && self.method() == MethodName::Passive
-            && lists.iter().all(|list| list.is_empty())
-            && self.ridge.is_empty()
-            && self.terms.is_empty()
-            && self.direction.is_none()
-            && self.bounds.is_none()
-            && self.window.is_none()
-            && self.width.is_none()
-            && self.segments.is_none()
-            && !self.huber
-    }
-
-    /// The estimator. The options of the paper's recursion mean this recursion.
-    pub(super) fn method(&self) -> MethodName {
-        let recursion = !self.lambda.is_empty()
-            || self.resample.is_some()
-            || self.start.is_some()
-            || self.sort.is_some();
-        self.method.unwrap_or(match recursion {
-            true => MethodName::Ewls,
-            false => MethodName::Passive,
-        })
-    }
-
-    /// Whether a filter, a difference or a simulation needs even intervals.
-    pub(super) fn needs_even_samples(&self) -> bool {
-        self.filter.is_some()
-            || self.acceleration == Acceleration::Encoder
-            || self.method() == MethodName::Mechanism
-            || self.compares()
-    }
-
-    /// How signals are prepared.
-    pub(super) fn signals(&self) -> Settings {
-        Settings {
-            filter_hz: self.filter,
-            acceleration: self.acceleration,
+    /// What is asked of the identification.
+    pub(super) fn request(&self) -> Request {
+        Request {
+            options: Options {
+                method: self.method.clone(),
+                lambda: distinct(&self.lambda),
+                dx_mm: distinct(&self.dx),
+                resample: self.resample,
+                start: self.start,
+                sort: self.sort,
+                window: self.window,
+                width_mm: self.width,
+                direction: self.direction,
+                delta_mm: distinct(&self.delta),
+                // clap takes two numbers or none
+                ridge: self.ridge.first_chunk().copied(),
+                huber: self.huber,
+                terms: self.terms.clone(),
+                bounds: self.bounds,
+                segments: self.segments,
+                filter_hz: self.filter,
+                range_of_dx: self.figures.is_some(),
+            },
+            lookup: self.lookup,
+            signals: Settings {
+                filter_hz: self.filter,
+                acceleration: self.acceleration,
+            },
+            thin: self.thin,
+            robust: self.robust,
+            active: self.active,
+            turned: self.units(),
+            without_coverage: self.without_coverage,
         }
     }
 }

@@ -8,17 +8,16 @@
 
 use super::folds::{FOLDS, Folds, LeftOut};
 use super::grid::{self, Cell, Plan};
-use super::mechanism::{self, Progress};
-use super::method::{Delta, Ewls, Friction, Hat, Passive, Start, State, Terms};
-use super::resample::Resample;
-use super::{IdentifyError, Method, Training, evidence, hat_table};
+use super::method::{Candidacy, Claim, Delta, Progress, Setting, State, Terms};
+use super::passive::Passive;
+use super::{ESTIMATORS, IdentifyError, Method, Training, direction_state, evidence};
+use crate::model::Realization;
 use crate::recording::Recording;
+use std::sync::OnceLock;
 use study_wire::predict::Lookup;
 
 /// Increments that are tried, in units of [`Recording::scale_mm`].
 const DX: [f64; 8] = [2.0, 1.0, 0.5, 0.25, 0.1, 0.05, 0.025, 0.01];
-/// Memories of the recursion that are tried, in units of dx.
-const MEMORIES: [f64; 5] = [0.1, 0.3, 1.0, 3.0, 10.0];
 /// A residual that exceeds another one by at most this share is hardly larger: of a candidate, and
 /// of an increment.
 const HARDLY: f64 = 0.05;
@@ -28,9 +27,6 @@ const ENOUGH: usize = 100_000;
 const SAMPLES_PER_NODE: f64 = 5.0;
 /// Encoder counts in dx, at least.
 const COUNTS_PER_NODE: f64 = 2.0;
-/// Steps times parameters of a mechanism that is tried: four times what 60 s need with nodes
-/// every 1/70 of the travel.
-const MOST_WORK: f64 = 1.6e8;
 
 /// A method that was compared.
 #[derive(Debug, Clone, PartialEq)]
@@ -70,10 +66,7 @@ pub enum Failure {
 /// How a method that was asked for fails: where it was validated, or where it claims to be passive.
 /// The paper's method and the baselines make no such claim.
 pub fn failure(cell: &Cell) -> Option<Failure> {
-    let claims = matches!(
-        cell.method,
-        Method::Passive(_) | Method::Friction(_) | Method::Mechanism(_)
-    );
+    let claims = cell.method.claim() == Claim::Passive;
     if cell.scores.iter().any(|score| score.vaf < 0.0) {
         return Some(Failure::Constant);
     }
@@ -89,8 +82,8 @@ pub struct Comparison {
     pub recommended: Option<usize>,
     /// The next best that does not fail.
     pub second: Option<usize>,
-    /// Why the mechanism was not tried.
-    pub not_tried: Option<String>,
+    /// The candidates that were not tried, and why.
+    pub not_tried: Vec<(&'static str, String)>,
     /// Standard deviation of the noise of single samples of the force, N, if it is white.
     pub noise_n: Option<f64>,
     /// Whether whole strokes were left out, and not parts of them.
@@ -122,40 +115,24 @@ pub fn run(
     let samples: usize = training.recordings.iter().map(|r| r.len()).sum();
     let folds = Folds::new(&training.recordings);
     let trials = Trials::new(training, &folds, samples.div_ceil(ENOUGH), lookup);
-    let (passive, dx_mm) = trials.passive()?;
-    let Method::Passive(Passive { state, .. }) = passive else {
-        return Err(IdentifyError::Undetermined);
-    };
-    let hat = Method::Hat(Hat {
-        state,
-        ..Hat::default()
-    });
-    let friction = trials.friction()?;
-    let static_dx_mm = trials.best_dx(Method::Static);
-    let plans = [
-        (friction, dx_mm),
-        (passive, dx_mm),
-        (Method::Static, static_dx_mm),
-        (trials.ewls(dx_mm), dx_mm),
-        (hat, dx_mm),
-    ];
-    let candidate = |(method, dx_mm): (Method, f64)| -> Result<Candidate, IdentifyError> {
-        Ok(Candidate {
-            cell: one(training, method, dx_mm, lookup, recordings, &step)?,
-            left_out: trials.left_out(method, dx_mm),
-        })
-    };
-    let mut candidates = plans
-        .into_iter()
-        .map(candidate)
-        .collect::<Result<Vec<_>, _>>()?;
-    let not_tried = match trials.mechanism(recordings, &step) {
-        Ok(mechanism) => {
-            candidates.push(mechanism);
-            None
+    let (mut candidates, mut not_tried) = (Vec::new(), Vec::new());
+    for known in ESTIMATORS {
+        let name = known.names[0].0;
+        match (known.candidate)(&trials)? {
+            Candidacy::Never => {}
+            Candidacy::NotTried(why) => not_tried.push((name, why)),
+            Candidacy::With(method, dx_mm) => {
+                match one(training, method, dx_mm, lookup, recordings, &step) {
+                    Ok(cell) => candidates.push(Candidate {
+                        left_out: trials.left_out(&cell, method, dx_mm),
+                        cell,
+                    }),
+                    Err(error) if method.simulates() => not_tried.push((name, error.to_string())),
+                    Err(error) => return Err(error),
+                }
+            }
         }
-        Err(why) => Some(why),
-    };
+    }
     let residual = |i: usize| candidates[i].left_out.map_or(f64::INFINITY, |l| l.rms_n);
     let mut sound: Vec<usize> = (0..candidates.len())
         .filter(|i| candidates[*i].failure().is_none())
@@ -191,7 +168,8 @@ fn one(
 }
 
 /// The methods without each fold.
-struct Trials<'t, 'r> {
+#[derive(Debug)]
+pub(super) struct Trials<'t, 'r> {
     training: &'t Training<'r>,
     folds: &'t Folds<'t>,
     /// Without each fold; `None` where the rest does not suit any method.
@@ -201,6 +179,8 @@ struct Trials<'t, 'r> {
     dx_mm: Vec<f64>,
     /// The terms that all recordings together carry.
     terms: Terms,
+    /// See [`Self::table`].
+    table: OnceLock<(State, f64)>,
 }
 
 impl<'t, 'r> Trials<'t, 'r> {
@@ -213,8 +193,7 @@ impl<'t, 'r> Trials<'t, 'r> {
             .max(COUNTS_PER_NODE * counts.fold(0.0, f64::max));
         // 3 · 0.2 has to equal 0.6
         let plain = |dx: f64| format!("{dx:.6e}").parse().unwrap_or(dx);
-        let mut probe = Method::Passive(Passive::default());
-        (probe, _) = training.carried(probe);
+        let (mut probe, _) = training.carried(Passive::default().into());
         Self {
             rest: (0..FOLDS)
                 .map(|fold| Some(folds.without(fold, every)))
@@ -224,33 +203,56 @@ impl<'t, 'r> Trials<'t, 'r> {
                 .filter(|dx| *dx >= least_mm && training.nodes(*dx).is_ok())
                 .collect(),
             terms: probe.terms_mut().map_or(Terms::ALL, |terms| *terms),
+            table: OnceLock::new(),
             training,
             folds,
             lookup,
         }
     }
 
-    fn left_out(&self, method: Method, dx_mm: f64) -> Option<LeftOut> {
-        let mut method = method;
+    /// The recordings.
+    pub(super) fn training(&self) -> &'t Training<'r> {
+        self.training
+    }
+
+    /// Whether whole strokes are left out, and not parts of them.
+    pub(super) fn whole_strokes(&self) -> bool {
+        self.folds.whole_strokes
+    }
+
+    /// The accuracy of a method on what it was identified without.
+    fn left_out(&self, whole: &Cell, method: Method, dx_mm: f64) -> Option<LeftOut> {
+        self.left_out_of(method, |method, rest| {
+            let setting = Setting::new(dx_mm, self.lookup);
+            method.identify_part(whole.fitted.as_deref(), rest, setting)
+        })
+    }
+
+    fn left_out_of(
+        &self,
+        mut method: Method,
+        identify: impl Fn(Method, &Training<'r>) -> Option<Realization> + Sync,
+    ) -> Option<LeftOut> {
         if let Some(terms) = method.terms_mut() {
             // each fold identifies the same terms
             *terms = self.terms;
         }
-        self.folds.left_out(|fold| {
-            let rest = self.rest[fold].as_ref()?;
-            let found = rest.identify(method, dx_mm, self.lookup).ok()?;
-            Some(found.realization)
-        })
+        let of_fold = |fold: usize| identify(method, self.rest[fold].as_ref()?);
+        self.folds.left_out(of_fold)
     }
 
-    fn rms_n(&self, method: Method, dx_mm: f64) -> f64 {
-        let left_out = self.left_out(method, dx_mm);
+    /// The rms error of a method on data left out, N; infinite where it cannot be identified.
+    pub(super) fn rms_n(&self, method: Method, dx_mm: f64) -> f64 {
+        let left_out = self.left_out_of(method, |method, rest| {
+            let found = rest.identify(method, dx_mm, self.lookup).ok()?;
+            Some(found.realization)
+        });
         left_out.map_or(f64::INFINITY, |left_out| left_out.rms_n)
     }
 
     /// The increment of least residual, or a longer one whose residual is hardly larger. Shorter
     /// ones are tried while the residual falls.
-    fn best_dx(&self, method: Method) -> f64 {
+    pub(super) fn best_dx(&self, method: Method) -> f64 {
         let mut tried: Vec<(f64, f64)> = Vec::new();
         let least = |tried: &[(f64, f64)]| tried.iter().map(|t| t.1).fold(f64::INFINITY, f64::min);
         for dx_mm in &self.dx_mm {
@@ -266,14 +268,19 @@ impl<'t, 'r> Trials<'t, 'r> {
         best.map_or(self.training.recordings[0].scale_mm(), |(dx_mm, _)| *dx_mm)
     }
 
-    /// The passive table with its increment.
-    fn passive(&self) -> Result<(Method, f64), IdentifyError> {
-        let default = Passive::default();
-        let of = |delta| {
-            Method::Passive(Passive {
-                state: State::Play(delta),
-                ..default
-            })
+    /// The direction state of a table and the distance of its nodes, mm: those of the passive table
+    /// with the least residual.
+    ///
+    /// # Errors
+    /// [`IdentifyError`] if the recordings do not suit a passive table.
+    pub(super) fn table(&self) -> Result<(State, f64), IdentifyError> {
+        if let Some(found) = self.table.get() {
+            return Ok(*found);
+        }
+        let of = |delta| -> Method {
+            let state = State::Play(delta);
+            let default = Passive::default();
+            Passive { state, ..default }.into()
         };
         let middle_mm = self.dx_mm[self.dx_mm.len() / 2];
         let scanned = self.delta_mm(of(Delta::Scan), middle_mm)?;
@@ -282,76 +289,18 @@ impl<'t, 'r> Trials<'t, 'r> {
             .map(|delta_mm| (delta_mm, self.rms_n(of(Delta::Mm(delta_mm)), dx_mm)))
             .collect();
         let least = tried.iter().map(|t| t.1).fold(f64::INFINITY, f64::min);
-        let shortest = (tried.iter()).find(|(_, rms_n)| *rms_n <= hat_table::TOLERANCE * least);
+        let most = direction_state::TOLERANCE * least;
+        let shortest = (tried.iter()).find(|(_, rms_n)| *rms_n <= most);
         let delta_mm = shortest.map_or(scanned, |(delta_mm, _)| *delta_mm);
-        Ok((of(Delta::Mm(delta_mm)), dx_mm))
+        Ok(*(self.table).get_or_init(|| (State::Play(Delta::Mm(delta_mm)), dx_mm)))
     }
 
-    /// The δ that a scan over all recordings finds.
-    fn delta_mm(&self, method: Method, dx_mm: f64) -> Result<f64, IdentifyError> {
+    /// The δ that a scan over all recordings finds, mm.
+    ///
+    /// # Errors
+    /// [`IdentifyError`] if they do not suit the method.
+    pub(super) fn delta_mm(&self, method: Method, dx_mm: f64) -> Result<f64, IdentifyError> {
         let found = self.training.identify(method, dx_mm, self.lookup)?;
         (found.realization.direction.delta_mm()).ok_or(IdentifyError::Undetermined)
-    }
-
-    fn friction(&self) -> Result<Method, IdentifyError> {
-        let of = |delta| {
-            Method::Friction(Friction {
-                state: State::Dahl(delta),
-                ..Friction::default()
-            })
-        };
-        let delta_mm = self.delta_mm(of(Delta::Scan), self.dx_mm[0])?;
-        Ok(of(Delta::Mm(delta_mm)))
-    }
-
-    /// The recursion with the memory of least residual.
-    fn ewls(&self, dx_mm: f64) -> Method {
-        let [plus, minus] = self.training.directions().map(super::Samples::len);
-        let [low, high] = self.training.range_mm;
-        let per_mm = plus.max(minus) as f64 / (high - low);
-        let of = |memory: &f64| {
-            let forgotten: f64 = 1.0 / (memory * dx_mm * per_mm).max(10.0);
-            let lambda = 1.0 - format!("{forgotten:.0e}").parse().unwrap_or(forgotten);
-            Method::Ewls(Ewls {
-                start: Start::Warm,
-                terms: Terms::default(),
-                ..Ewls::paper(lambda, Resample::Hat)
-            })
-        };
-        let methods = MEMORIES.iter().map(of);
-        let tried = methods.map(|method| (method, self.rms_n(method, dx_mm)));
-        let best = tried.min_by(|a, b| a.1.total_cmp(&b.1));
-        best.map_or_else(|| of(&1.0), |(method, _)| method)
-    }
-
-    /// The mechanism, or why it was not tried. Without each fold it is fitted from where the fit to
-    /// everything ended.
-    fn mechanism(
-        &self,
-        recordings: &[&Recording],
-        step: &(impl Fn(Progress) + Sync),
-    ) -> Result<Candidate, String> {
-        if !self.folds.whole_strokes {
-            return Err("too few strokes".to_owned());
-        }
-        let [low, high] = self.training.range_mm;
-        let dx_mm = 0.5 * self.training.recordings[0].scale_mm();
-        let seconds: f64 = (self.training.recordings.iter())
-            .map(|r| r.duration_s())
-            .sum();
-        let work = seconds * mechanism::PREDICTED_HZ * ((high - low) / dx_mm);
-        if work > MOST_WORK {
-            return Err("it would take minutes: --method mechanism".to_owned());
-        }
-        let method = Method::Mechanism(super::method::Mechanism::default());
-        let cell = one(self.training, method, dx_mm, self.lookup, recordings, step)
-            .map_err(|error| error.to_string())?;
-        let fitted = (cell.fitted.as_deref()).ok_or("it was not fitted".to_owned())?;
-        let left_out = self.folds.left_out(|fold| {
-            let rest = self.rest[fold].as_ref()?;
-            let mechanism = mechanism::refitted(fitted, rest)?;
-            Some(rest.of_mechanism(method, dx_mm, mechanism))
-        });
-        Ok(Candidate { cell, left_out })
     }
 }

@@ -79,6 +79,14 @@ impl Term {
     /// Mass and damping, in the order of the unknowns.
     const BOTH: [Self; 2] = [Self::Mass, Self::Damping];
 
+    /// The unit of its values.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Mass => "kg",
+            Self::Damping => "N·s/mm",
+        }
+    }
+
     /// `value` in kg or N·s/mm, as a person would write it.
     fn shown(self, value: f64) -> String {
         match self {

@@ -23,8 +23,252 @@
 
 use super::constrained;
 use super::lanes::recursion::{Run, Sums};
-use super::method::{Ewls, Sort, Start, Terms};
+use super::method::{Candidacy, Declared, Estimator, Opt, Options, Setting, Sort, Start, Terms};
+use super::resample::{self, Resample, Resampled};
 use super::samples::{Samples, Theta, initial_covariance};
+use super::problem::START_UP_SAMPLES;
+use super::{Cause, Identified, IdentifyError, Training, Trials, Warning, method};
+use crate::model::Provenance;
+use std::fmt;
+use study_wire::predict::Lookup;
+
+/// Memories of the recursion that are compared, in units of dx.
+const MEMORIES: [f64; 5] = [0.1, 0.3, 1.0, 3.0, 10.0];
+
+/// Options of exponentially weighted least squares.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ewls {
+    /// Forgetting factor λ, above 0 and at most 1.
+    pub lambda: f64,
+    /// Resampling of the estimates at the nodes.
+    pub resample: Resample,
+    /// Initial state of the recursion.
+    pub start: Start,
+    /// Order of the samples.
+    pub sort: Sort,
+    /// Whether m, b ≥ 0 in every estimate.
+    pub bounded: bool,
+    /// The terms that are estimated.
+    pub terms: Terms,
+}
+
+impl Ewls {
+    /// The method as published: cold start, ascending order, no bounds, all terms.
+    pub fn paper(lambda: f64, resample: Resample) -> Self {
+        Self {
+            lambda,
+            resample,
+            start: Start::Cold,
+            sort: Sort::Ascending,
+            bounded: false,
+            terms: Terms::ALL,
+        }
+    }
+}
+
+impl Estimator for Ewls {
+    fn name(&self) -> &'static str {
+        Self::NAMES[usize::from(self.bounded)].0
+    }
+
+    fn identify(
+        &self,
+        training: &Training<'_>,
+        setting: Setting<'_>,
+    ) -> Result<Identified, IdentifyError> {
+        // check dx before the long computation
+        training.nodes(setting.dx_mm)?;
+        let estimates = training.estimates(*self)?;
+        training.ewls(&estimates, setting.dx_mm, self.resample, setting.lookup)
+    }
+
+    fn check(&self) -> Result<(), IdentifyError> {
+        method::forgetting(self.lambda)
+    }
+
+    fn write_options(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.start != Start::Cold {
+            write!(f, " start={}", self.start.as_str())?;
+        }
+        if self.sort != Sort::Ascending {
+            write!(f, " sort={}", self.sort.as_str())?;
+        }
+        self.terms.write(f, true)
+    }
+
+    fn lambda(&self) -> Option<f64> {
+        Some(self.lambda)
+    }
+
+    fn terms_mut(&mut self) -> Option<&mut Terms> {
+        Some(&mut self.terms)
+    }
+
+    fn id_template(&self, _several_deltas: bool) -> String {
+        let bounded = if self.bounded { "constrained-" } else { "" };
+        format!("{bounded}lambda-{{lambda}}-dx-{{dx}}")
+    }
+}
+
+impl Declared for Ewls {
+    const NAMES: &'static [(&'static str, &'static str)] = &[
+        (
+            "ewls",
+            "The paper's method: exponentially weighted least squares along x",
+        ),
+        ("constrained", "The paper's method with m, b >= 0"),
+    ];
+    const OPTIONS: &'static [Opt] = &[
+        Opt::Lambda,
+        Opt::Dx,
+        Opt::Start,
+        Opt::Terms,
+        Opt::Stiffness,
+    ];
+
+    fn asked(name: &str, options: &Options) -> Vec<Self> {
+        options.each_lambda(|lambda| Self {
+            lambda,
+            resample: options.resample.unwrap_or(Resample::Bin),
+            start: options.start.unwrap_or(Start::Cold),
+            sort: options.sort.unwrap_or(Sort::Ascending),
+            bounded: name == Self::NAMES[1].0,
+            terms: options.kept(),
+        })
+    }
+
+    /// With the memory of least residual.
+    fn candidate(trials: &Trials<'_, '_>) -> Result<Candidacy, IdentifyError> {
+        let (_, dx_mm) = trials.table()?;
+        let training = trials.training();
+        let [plus, minus] = training.directions().map(Samples::len);
+        let [low, high] = training.range_mm;
+        let per_mm = plus.max(minus) as f64 / (high - low);
+        let of = |memory: &f64| {
+            let forgotten: f64 = 1.0 / (memory * dx_mm * per_mm).max(10.0);
+            let lambda = 1.0 - format!("{forgotten:.0e}").parse().unwrap_or(forgotten);
+            Self {
+                start: Start::Warm,
+                terms: Terms::default(),
+                ..Self::paper(lambda, Resample::Hat)
+            }
+            .into()
+        };
+        let methods = MEMORIES.iter().map(of);
+        let tried = methods.map(|method| (method, trials.rms_n(method, dx_mm)));
+        let best = tried.min_by(|a, b| a.1.total_cmp(&b.1));
+        let method = best.map_or_else(|| of(&1.0), |(method, _)| method);
+        Ok(Candidacy::With(method, dx_mm))
+    }
+}
+
+impl Training<'_> {
+    /// One estimate of θ per sample, in both directions. `options.resample` is not
+    /// used.
+    ///
+    /// # Errors
+    /// [`IdentifyError`] if λ is not in (0, 1] or an estimate is not finite.
+    pub fn estimates(&self, options: Ewls) -> Result<Estimates, IdentifyError> {
+        options.check()?;
+        let one = |samples, backward| {
+            let theta = estimate(samples, &options, backward);
+            let finite = theta.iter().flatten().all(|p| p.is_finite());
+            finite.then_some(theta).ok_or(IdentifyError::Diverged {
+                lambda: options.lambda,
+            })
+        };
+        Ok(Estimates {
+            options,
+            positive: one(&self.positive, false)?,
+            negative: one(&self.negative, true)?,
+        })
+    }
+
+    /// A table of the EWLS family from estimates computed before.
+    ///
+    /// # Errors
+    /// [`IdentifyError`] if dx does not suit the recording.
+    pub fn ewls(
+        &self,
+        estimates: &Estimates,
+        dx_mm: f64,
+        resample: Resample,
+        lookup: Lookup,
+    ) -> Result<Identified, IdentifyError> {
+        let nodes = self.nodes(dx_mm)?;
+        let at_nodes = |samples: &Samples, theta: &[Theta]| {
+            resample::at_nodes(resample, &samples.x_mm, theta, &nodes, dx_mm)
+        };
+        let positive = at_nodes(&self.positive, &estimates.positive);
+        let negative = at_nodes(&self.negative, &estimates.negative);
+        let options = Ewls {
+            resample,
+            ..estimates.options
+        };
+        Ok(self.ewls_table(options, dx_mm, nodes, positive, negative, lookup))
+    }
+
+    /// A table of the EWLS family from the parameters at its nodes.
+    pub(super) fn ewls_table(
+        &self,
+        options: Ewls,
+        dx_mm: f64,
+        nodes: Vec<f64>,
+        positive: Resampled,
+        negative: Resampled,
+        lookup: Lookup,
+    ) -> Identified {
+        let start_up = self.start_up(&options, &nodes);
+        let mut identified = self.table(nodes, positive, negative, Cause::NoSamples, lookup);
+        identified.warnings.extend(start_up);
+        identified.realization.provenance = Provenance {
+            lambda: Some(options.lambda),
+            memory_mm: self.memory_mm(options.lambda),
+            dx_mm: Some(dx_mm),
+            resample: Some(options.resample.as_str().into()),
+            ..self.provenance(options)
+        };
+        identified
+    }
+
+    /// A warning about nodes where the recursion of either direction has seen few
+    /// samples. A warm start has none.
+    fn start_up(&self, options: &Ewls, nodes: &[f64]) -> Option<Warning> {
+        if options.start == Start::Warm {
+            return None;
+        }
+        let end_of_start_up = |x: &[f64]| x[START_UP_SAMPLES.min(x.len() - 1)];
+        let mut low = end_of_start_up(&self.positive.x_mm);
+        let mut high = f64::INFINITY;
+        match options.sort {
+            Sort::Ascending => low = low.max(end_of_start_up(&self.negative.x_mm)),
+            Sort::Travel => {
+                let x = &self.negative.x_mm;
+                high = x[x.len() - 1 - START_UP_SAMPLES.min(x.len() - 1)];
+            }
+        }
+        let early: Vec<f64> = nodes
+            .iter()
+            .copied()
+            .filter(|node| *node < low || *node > high)
+            .collect();
+        early.last().map(|last| Warning::StartUp {
+            nodes: early.len(),
+            to_mm: *last,
+        })
+    }
+}
+
+/// One estimate of θ per sample, in the order of [`Training::directions`].
+#[derive(Debug, Clone)]
+pub struct Estimates {
+    /// The options they were computed with.
+    pub options: Ewls,
+    /// For v > 0.
+    pub positive: Vec<Theta>,
+    /// For v < 0, in ascending order of x.
+    pub negative: Vec<Theta>,
+}
 
 /// One estimate of θ per sample, in the order of `samples` whatever the order of the
 /// recursion. λ has to be in (0, 1]; `backward` says that these samples traveled

@@ -13,14 +13,17 @@
 
 mod runs;
 
+use super::evidence::Evidence;
+use super::ewls::Ewls;
 use super::lanes::errors::errors;
 use super::lanes::recursion::{self, Run, Sums};
 use super::lanes::{LAMBDAS_PER_PASS, Processor};
-use super::mechanism::{Fitted, Progress};
-use super::method::{Ewls, Sort, Start};
+use super::method::{Progress, Setting, Sort, Start};
 use super::resample::{Resample, Resampled};
 use super::vaf::{self, Score};
-use super::{Identified, IdentifyError, Method, Samples, Training, Warning, ewls};
+use super::{
+    Estimate, Fitted, Identified, IdentifyError, Method, Samples, Training, Warning, ewls,
+};
 use crate::model::Realization;
 use crate::recording::{Recording, mean_and_variance};
 use rayon::prelude::*;
@@ -78,6 +81,8 @@ pub struct Cell {
     pub certificate: Certificate,
     /// What is doubtful about the realization.
     pub warnings: Vec<Warning>,
+    /// What was found of each term: see [`Identified::terms`].
+    pub terms: Vec<Estimate>,
     /// How a mechanism was fitted.
     pub fitted: Option<Box<Fitted>>,
 }
@@ -155,12 +160,12 @@ fn run_steps_on(
             });
         }
     }
-    let (carried, left_out): (Vec<Method>, Vec<Vec<Warning>>) =
+    let (carried, evidence): (Vec<Method>, Vec<Vec<Evidence>>) =
         (plan.methods.iter().map(|method| training.carried(*method))).unzip();
     let mut identified = identify(processor, training, &carried, &tables, lookup, step)?;
-    for (tables, left_out) in identified.iter_mut().zip(left_out) {
+    for (tables, evidence) in identified.iter_mut().zip(evidence) {
         for table in tables {
-            table.warnings.extend(left_out.clone());
+            table.add_terms(evidence.clone());
         }
     }
     let methods: Vec<Method> = carried
@@ -219,27 +224,33 @@ fn one_method(
     lookup: Lookup,
     step: Step<'_>,
 ) -> Result<Vec<Identified>, IdentifyError> {
-    match method {
-        Method::Ewls(options) => {
-            let estimates = training.estimates(options)?;
-            let table =
-                |nodes: &Nodes| training.ewls(&estimates, nodes.dx_mm, options.resample, lookup);
-            tables.iter().map(table).collect()
-        }
-        Method::Segments(options) => Ok(vec![training.segments(options, lookup)?]),
-        Method::Friction(options) => Ok(vec![training.friction(options, lookup)?]),
-        Method::Spring => Ok(vec![training.spring(lookup)]),
-        // each fit uses all threads
-        Method::Mechanism(options) => (tables.iter())
-            .map(|nodes| training.mechanism(options, nodes.dx_mm, step))
-            .collect(),
-        Method::TwoSided(_) | Method::Hat(_) | Method::Passive(_) | Method::Static => tables
-            .par_iter()
-            .map(|nodes| training.identify(method, nodes.dx_mm, lookup))
-            .collect::<Vec<_>>()
-            .into_iter()
-            .collect(),
+    let with = |dx_mm| {
+        let setting = Setting {
+            dx_mm,
+            lookup,
+            step,
+        };
+        method.identify(training, setting)
+    };
+    if let Method::Ewls(options) = method {
+        let estimates = training.estimates(options)?;
+        let table =
+            |nodes: &Nodes| training.ewls(&estimates, nodes.dx_mm, options.resample, lookup);
+        return tables.iter().map(table).collect();
     }
+    if !method.has_dx() {
+        return Ok(vec![with(0.0)?]);
+    }
+    if method.simulates() {
+        // each fit uses all threads
+        return tables.iter().map(|nodes| with(nodes.dx_mm)).collect();
+    }
+    tables
+        .par_iter()
+        .map(|nodes| with(nodes.dx_mm))
+        .collect::<Vec<_>>()
+        .into_iter()
+        .collect()
 }
 
 /// The EWLS methods grouped by their options without λ: these options and the
@@ -446,6 +457,7 @@ fn cell(
     let Identified {
         mut realization,
         warnings,
+        terms,
         fitted,
     } = identified;
     for (recording, score) in recordings.iter().zip(&scores) {
@@ -460,6 +472,7 @@ fn cell(
         realization,
         scores,
         warnings,
+        terms,
         fitted,
     }
 }

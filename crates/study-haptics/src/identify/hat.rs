@@ -13,9 +13,16 @@
 //! node.
 
 use super::banded::{Banded, Bound};
+use super::direction_state::BELOW_TABLE;
+use super::method::{
+    Candidacy, Declared, Delta, Estimator, Opt, Options, Rule, Setting, State, Terms,
+};
 use super::samples::{Theta, Weights, weight_of};
 use super::vaf::motion;
+use super::{Identified, IdentifyError, Training, Trials, method};
+use crate::model::Provenance;
 use crate::recording::Recording;
+use std::fmt;
 use study_wire::predict::{Direction, DirectionState, Lookup, locate};
 
 /// Unknowns per node: m, b·B_SCALE, F in + and in −.
@@ -26,6 +33,146 @@ const HALF: usize = 2 * PER_NODE;
 const B_SCALE: f64 = 60.0;
 /// Share of a node's information that keeps m and b at 0 where they are not excited.
 const FLOOR: f64 = 1e-12;
+
+/// Options of the hat table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hat {
+    /// The direction state, in identification and in prediction.
+    pub state: State,
+    /// Weight of the squared second differences of F along the nodes.
+    pub ridge_force: f64,
+    /// Weight of the squared first differences of m and 60·b.
+    pub ridge_dynamics: f64,
+    /// Whether m, b ≥ 0 at every node.
+    pub bounded: bool,
+    /// Which of m and b the table has.
+    pub terms: Terms,
+}
+
+impl Default for Hat {
+    /// Play, with δ found on the training recording, and m, b ≥ 0.
+    fn default() -> Self {
+        Self {
+            state: State::Play(Delta::Scan),
+            ridge_force: 3e-3,
+            ridge_dynamics: 5e-2,
+            bounded: true,
+            terms: Terms::default(),
+        }
+    }
+}
+
+impl Estimator for Hat {
+    fn name(&self) -> &'static str {
+        Self::NAMES[0].0
+    }
+
+    fn identify(
+        &self,
+        training: &Training<'_>,
+        setting: Setting<'_>,
+    ) -> Result<Identified, IdentifyError> {
+        let nodes = training.nodes(setting.dx_mm)?;
+        let penalty = Penalty {
+            ridge_force: self.ridge_force,
+            ridge_dynamics: self.ridge_dynamics,
+            dynamics: [self.terms.m, self.terms.b].map(|kept| {
+                if kept && !self.bounded {
+                    Bound::Free
+                } else {
+                    Bound::of_term(kept)
+                }
+            }),
+        };
+        let mut identified = training.with_state((self.state, BELOW_TABLE), |rule| {
+            training.hat_with(nodes.clone(), setting.lookup, rule, penalty)
+        })?;
+        identified.realization.provenance = Provenance {
+            dx_mm: Some(setting.dx_mm),
+            ..training.provenance(*self)
+        };
+        Ok(identified)
+    }
+
+    fn check(&self) -> Result<(), IdentifyError> {
+        self.state.check()?;
+        method::not_negative("the ridge on F", self.ridge_force)?;
+        method::not_negative("the ridge on m and b", self.ridge_dynamics)
+    }
+
+    fn write_options(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, " ridge={},{}", self.ridge_force, self.ridge_dynamics)?;
+        self.state.write(f)?;
+        f.write_str(if self.bounded { " m,b>=0" } else { "" })?;
+        self.terms.write(f, false)
+    }
+
+    fn terms_mut(&mut self) -> Option<&mut Terms> {
+        Some(&mut self.terms)
+    }
+}
+
+impl Declared for Hat {
+    const NAMES: &'static [(&'static str, &'static str)] =
+        &[("hat", "All nodes at once, with a direction state")];
+    const OPTIONS: &'static [Opt] = &[
+        Opt::Dx,
+        Opt::Direction,
+        Opt::Delta,
+        Opt::Terms,
+        Opt::Ridge,
+        Opt::Bounds,
+    ];
+
+    fn asked(_name: &str, options: &Options) -> Vec<Self> {
+        let default = Self::default();
+        let [ridge_force, ridge_dynamics] =
+            (options.ridge).unwrap_or([default.ridge_force, default.ridge_dynamics]);
+        options.each_state(Rule::Play, |state| Self {
+            state,
+            ridge_force,
+            ridge_dynamics,
+            bounded: options.bounds.unwrap_or(default.bounded),
+            terms: options.kept(),
+        })
+    }
+
+    /// With the direction state and the nodes of the passive table.
+    fn candidate(trials: &Trials<'_, '_>) -> Result<Candidacy, IdentifyError> {
+        let (state, dx_mm) = trials.table()?;
+        let hat = Self {
+            state,
+            ..Self::default()
+        };
+        Ok(Candidacy::With(hat.into(), dx_mm))
+    }
+}
+
+impl Training<'_> {
+    /// A hat table with a direction rule.
+    pub(super) fn hat_with(
+        &self,
+        nodes: Vec<f64>,
+        lookup: Lookup,
+        rule: Direction,
+        penalty: Penalty,
+    ) -> Result<Identified, IdentifyError> {
+        let HatTable {
+            positive,
+            negative,
+            weight,
+        } = table(
+            &self.recordings,
+            &nodes,
+            lookup,
+            rule,
+            penalty,
+            self.weights.as_deref(),
+        )
+        .ok_or(IdentifyError::Undetermined)?;
+        Ok(self.hats(nodes, [positive, negative], &weight, rule, lookup))
+    }
+}
 
 /// Weights of the penalties and the bounds on m and b.
 #[derive(Debug, Clone, Copy)]

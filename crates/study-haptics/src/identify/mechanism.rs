@@ -8,6 +8,7 @@
 //! Every parameter is bounded so that the mechanism is passive
 //! ([`study_wire::mechanism`]).
 
+mod estimator;
 mod levenberg;
 mod objective;
 mod reach;
@@ -16,11 +17,14 @@ mod start;
 #[cfg(test)]
 mod tests;
 
+use super::method::Progress;
+use super::problem::Estimate;
 use super::samples::weight_of;
 use super::signal::{LowPass, SignalError, sampling_interval_s};
 use super::{IdentifyError, Training, Warning};
 use crate::model::Mechanism;
 use crate::recording::Recording;
+pub use estimator::Mechanism as Options;
 use levenberg::Fit;
 use objective::Compared;
 pub use objective::Filter;
@@ -55,15 +59,6 @@ pub struct Settings {
     /// The corner of the low-pass that the recorded force has passed, Hz, if it is known.
     /// Otherwise it is found: see [`Fitted::filter`].
     pub recorded_hz: Option<f64>,
-}
-
-/// What has been done, for a progress bar.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Progress {
-    /// Steps of all starts so far, and at most.
-    pub steps: usize,
-    /// See `steps`.
-    pub of: usize,
 }
 
 /// A start and how far it came.
@@ -129,15 +124,26 @@ const SLOWER: &str = "record slow motion as well, with several speeds below 20 m
 const REVERSALS: &str = "record more reversals, at different positions and with small strokes";
 
 impl Fitted {
+    /// What was found of each scalar.
+    pub(super) fn terms(&self) -> Vec<Estimate> {
+        let values = self.mechanism.scalars.to_array();
+        (PARAMETERS.into_iter().zip(values).zip(self.standard_errors))
+            .map(|(((name, unit, _), value), standard_error)| Estimate {
+                name,
+                unit,
+                value,
+                standard_error,
+                upper_bound: None,
+                identified: is_sure(name, value, standard_error),
+            })
+            .collect()
+    }
+
     /// A warning for each scalar whose standard error is above half its value, or that is 0.
     pub(super) fn warnings(&self) -> Vec<Warning> {
         let values = self.mechanism.scalars.to_array();
         (PARAMETERS.into_iter().zip(values).zip(self.standard_errors))
-            .filter(|(((name, ..), value), error)| {
-                // a force may well be 0
-                let unsure = error.is_none_or(|error| error > UNSURE * value.abs());
-                unsure && *name != "offset force"
-            })
+            .filter(|(((name, ..), value), error)| !is_sure(name, *value, *error))
             .map(
                 |(((parameter, _, excitation), value), error)| Warning::NotDetermined {
                     parameter,
@@ -148,6 +154,11 @@ impl Fitted {
             )
             .collect()
     }
+}
+
+/// Whether a scalar is determined. A force may well be 0.
+fn is_sure(name: &str, value: f64, standard_error: Option<f64>) -> bool {
+    standard_error.is_some_and(|error| error <= UNSURE * value.abs()) || name == "offset force"
 }
 
 impl Layout {

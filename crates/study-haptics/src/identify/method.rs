@@ -1,130 +1,374 @@
-//! The estimators and their options.
+//! What an estimator is, and the options from which it takes its own.
 //!
-//! A [`Method`] specifies a table up to the node spacing dx and the look-up, which a
-//! grid varies; [`Training::identify`](super::Training::identify) takes all three.
-//! Its `Display` is the `provenance.method` of model files: the name followed by the
+//! An estimator is one file of this folder and its line in `estimators!` of `identify.rs`. The
+//! file has a struct with the estimator's options, which implements [`Estimator`] (what it
+//! identifies, which terms it has, what its table claims) and `Declared` (its names in arguments
+//! and model files, which options apply to it, whether and how it is compared with the others).
+//! `friction.rs` is a short model.
+//!
+//! A [`Method`](super::Method) specifies a table up to the node spacing dx and the look-up, which a
+//! grid varies. Its `Display` is the `provenance.method` of model files: the name followed by the
 //! options that differ from the default, so that a table can be reproduced.
 
-use super::IdentifyError;
 use super::resample::Resample;
+use super::{Fitted, Identified, IdentifyError, Method, Training, Trials};
+use crate::model::Realization;
 use std::fmt;
 use study_base::named;
-use study_wire::predict::Direction;
+use study_wire::predict::{Direction, Lookup};
+
+/// The forgetting factors without `lambda`: the range of the paper's grid.
+const DEFAULT_LAMBDAS: [f64; 10] = [
+    0.999, 0.9991, 0.9992, 0.9993, 0.9994, 0.9995, 0.9996, 0.9997, 0.9998, 0.9999,
+];
 
 /// An estimator with its options.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Method {
-    /// The paper's method: exponentially weighted least squares along x.
-    Ewls(Ewls),
-    /// Least squares around each node, with weights that decrease to both sides.
-    TwoSided(TwoSided),
-    /// All nodes at once, by penalized least squares, with a direction state.
-    Hat(Hat),
-    /// The hat table with one mass and bounds that make it passive.
-    Passive(Passive),
-    /// A virtual mechanism, by the simulation error of the force.
-    Mechanism(Mechanism),
-    /// Mass, damping and friction that do not depend on the position.
-    Friction(Friction),
-    /// Baseline: mean force by position and direction.
-    Static,
-    /// Baseline: force by direction, piecewise linear between few nodes.
-    Segments(Segments),
-    /// Baseline: one straight line.
-    Spring,
-}
-
-impl Method {
+pub trait Estimator: fmt::Debug {
     /// The name in arguments and model files.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Ewls(Ewls { bounded: false, .. }) => "ewls",
-            Self::Ewls(_) => "constrained",
-            Self::TwoSided(_) => "two-sided",
-            Self::Hat(_) => "hat",
-            Self::Passive(_) => "passive",
-            Self::Mechanism(_) => "mechanism",
-            Self::Friction(_) => "friction",
-            Self::Static => "static",
-            Self::Segments(_) => "segments",
-            Self::Spring => "spring",
-        }
-    }
+    fn name(&self) -> &'static str;
 
-    /// Whether the nodes are multiples of dx.
-    pub fn has_dx(self) -> bool {
-        !matches!(self, Self::Segments(_) | Self::Spring | Self::Friction(_))
-    }
+    /// Identifies a realization.
+    ///
+    /// # Errors
+    /// [`IdentifyError`] if the recordings do not suit the estimator.
+    fn identify(
+        &self,
+        training: &Training<'_>,
+        setting: Setting<'_>,
+    ) -> Result<Identified, IdentifyError>;
 
-    /// The forgetting factor, if the method has one.
-    pub fn lambda(self) -> Option<f64> {
-        match self {
-            Self::Ewls(options) => Some(options.lambda),
-            Self::TwoSided(TwoSided {
-                width: Width::Lambda(lambda),
-                ..
-            }) => Some(lambda),
-            _ => None,
-        }
-    }
-
-    /// The terms, of a method that has a choice of them.
-    pub(super) fn terms_mut(&mut self) -> Option<&mut Terms> {
-        match self {
-            Self::Ewls(Ewls { terms, .. })
-            | Self::TwoSided(TwoSided { terms, .. })
-            | Self::Hat(Hat { terms, .. })
-            | Self::Passive(Passive { terms, .. })
-            | Self::Friction(Friction { terms, .. }) => Some(terms),
-            Self::Mechanism(_) | Self::Static | Self::Segments(_) | Self::Spring => None,
-        }
+    /// Identifies it from a part of the recordings; `whole` is how a mechanism was fitted to all of
+    /// them. `None` if the part does not determine it.
+    fn identify_part(
+        &self,
+        _whole: Option<&Fitted>,
+        part: &Training<'_>,
+        setting: Setting<'_>,
+    ) -> Option<Realization> {
+        Some(self.identify(part, setting).ok()?.realization)
     }
 
     /// Checks the options.
     ///
     /// # Errors
     /// [`IdentifyError`] for the first option that is out of range.
-    pub fn check(self) -> Result<(), IdentifyError> {
-        if let Some(lambda) = self.lambda()
-            && !(lambda > 0.0 && lambda <= 1.0)
-        {
-            return Err(IdentifyError::Lambda(lambda));
-        }
-        match self {
-            Self::Ewls(_) | Self::Static | Self::Spring => Ok(()),
-            Self::TwoSided(options) => match options.width {
-                Width::Mm(mm) => positive("the width of two-sided weights", mm),
-                // without forgetting there would be a single θ for all positions
-                Width::Lambda(1.0) => Err(IdentifyError::Lambda(1.0)),
-                Width::Lambda(_) => Ok(()),
-            },
-            Self::Hat(options) => {
-                options.state.check()?;
-                not_negative("the ridge on F", options.ridge_force)?;
-                not_negative("the ridge on m and b", options.ridge_dynamics)
-            }
-            Self::Passive(options) => {
-                options.state.check()?;
-                not_negative("the ridge on F", options.ridge_force)?;
-                not_negative("the ridge on b", options.ridge_damping)
-            }
-            Self::Friction(options) => options.state.check(),
-            Self::Mechanism(options) => match options.recorded_hz {
-                Some(hz) => positive("the corner of the low-pass", hz),
-                None => Ok(()),
-            },
-            Self::Segments(options) => {
-                if (1..super::resample::MAX_NODES).contains(&options.count) {
-                    Ok(())
-                } else {
-                    Err(IdentifyError::Segments(options.count))
-                }
-            }
+    fn check(&self) -> Result<(), IdentifyError> {
+        Ok(())
+    }
+
+    /// The options that differ from the default, each after a space.
+    ///
+    /// # Errors
+    /// As [`fmt::Display`].
+    fn write_options(&self, _f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        Ok(())
+    }
+
+    /// Whether the nodes are multiples of dx.
+    fn has_dx(&self) -> bool {
+        true
+    }
+
+    /// Whether it simulates the target step by step: it takes even samples and reports its steps.
+    fn simulates(&self) -> bool {
+        false
+    }
+
+    /// What its realizations claim.
+    fn claim(&self) -> Claim {
+        Claim::Nothing
+    }
+
+    /// The forgetting factor, if it has one.
+    fn lambda(&self) -> Option<f64> {
+        None
+    }
+
+    /// The terms, if there is a choice of them.
+    fn terms_mut(&mut self) -> Option<&mut Terms> {
+        None
+    }
+
+    /// The template of the ids of its model files, with `{lambda}`, `{dx}` and `{delta}`.
+    fn id_template(&self, several_deltas: bool) -> String {
+        let delta = if several_deltas { "-delta-{delta}" } else { "" };
+        let dx = if self.has_dx() { "-dx-{dx}" } else { "" };
+        format!("{}{delta}{dx}", self.name())
+    }
+}
+
+/// How an estimator is asked for.
+pub(super) trait Declared: Estimator + Sized {
+    /// Its name and what it is, as the help lists it; those of its variants.
+    const NAMES: &'static [(&'static str, &'static str)];
+    /// The options that apply to it, beside those of all.
+    const OPTIONS: &'static [Opt];
+
+    /// What options ask for under one of its names.
+    fn asked(name: &str, options: &Options) -> Vec<Self>;
+
+    /// How it is compared with the other estimators.
+    ///
+    /// # Errors
+    /// [`IdentifyError`] if the recordings do not suit it.
+    fn candidate(_trials: &Trials<'_, '_>) -> Result<Candidacy, IdentifyError> {
+        Ok(Candidacy::Never)
+    }
+}
+
+/// Whether an estimator takes part in a comparison.
+#[derive(Debug)]
+pub(super) enum Candidacy {
+    /// It is no candidate.
+    Never,
+    /// With these options and this dx, mm.
+    With(Method, f64),
+    /// It was not tried, and why.
+    NotTried(String),
+}
+
+/// What the realizations of an estimator claim.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Claim {
+    /// Nothing: their certificate tells.
+    Nothing,
+    /// To pass their certificate.
+    Passive,
+    /// To be what others are compared with.
+    Baseline,
+}
+
+/// What [`Estimator::identify`] needs besides recordings and options.
+#[derive(Clone, Copy)]
+pub struct Setting<'s> {
+    /// Distance of the nodes, mm; without meaning where there is no dx.
+    pub dx_mm: f64,
+    /// Look-up between nodes.
+    pub lookup: Lookup,
+    /// Called after each step of a simulation, from any thread.
+    pub step: &'s (dyn Fn(Progress) + Sync),
+}
+
+impl Setting<'_> {
+    /// A dx and a look-up, without reports of steps.
+    pub fn new(dx_mm: f64, lookup: Lookup) -> Self {
+        Self {
+            dx_mm,
+            lookup,
+            step: &|_| (),
         }
     }
 }
 
-fn positive(option: &'static str, value: f64) -> Result<(), IdentifyError> {
+/// What has been done, for a progress bar.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Progress {
+    /// Steps of all starts so far, and at most.
+    pub steps: usize,
+    /// See `steps`.
+    pub of: usize,
+}
+
+/// An estimator in [`ESTIMATORS`](super::ESTIMATORS).
+#[derive(Debug)]
+pub struct Known {
+    /// Its name and what it is; those of its variants.
+    pub names: &'static [(&'static str, &'static str)],
+    /// The options that apply to it, beside those of all.
+    pub options: &'static [Opt],
+    pub(super) asked: fn(&str, &Options) -> Vec<Method>,
+    pub(super) candidate: fn(&Trials<'_, '_>) -> Result<Candidacy, IdentifyError>,
+}
+
+/// Declares the estimators from their files, in the order in which they are preferred where
+/// their residuals hardly differ.
+macro_rules! estimators {
+    ($($(#[$doc:meta])+ $file:ident: $variant:ident($kind:path),)+) => {
+        $(pub mod $file;)+
+
+        /// An estimator with its options.
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub enum Method {
+            $($(#[$doc])+ $variant($kind),)+
+        }
+
+        impl std::ops::Deref for Method {
+            type Target = dyn method::Estimator;
+
+            fn deref(&self) -> &Self::Target {
+                match self { $(Self::$variant(of) => of,)+ }
+            }
+        }
+
+        impl std::ops::DerefMut for Method {
+            fn deref_mut(&mut self) -> &mut Self::Target {
+                match self { $(Self::$variant(of) => of,)+ }
+            }
+        }
+
+        $(impl From<$kind> for Method {
+            fn from(of: $kind) -> Self {
+                Self::$variant(of)
+            }
+        })+
+
+        /// All estimators.
+        pub static ESTIMATORS: &[method::Known] = &[$(method::Known {
+            names: <$kind as method::Declared>::NAMES,
+            options: <$kind as method::Declared>::OPTIONS,
+            asked: |name, options| {
+                let asked = <$kind as method::Declared>::asked(name, options);
+                asked.into_iter().map(Method::from).collect()
+            },
+            candidate: <$kind as method::Declared>::candidate,
+        },)+];
+    };
+}
+pub(super) use estimators;
+
+named! {
+    /// An option that not every estimator has, by its name in arguments.
+    Opt {
+        /// Forgetting factors.
+        Lambda = "--lambda",
+        /// Distances of nodes.
+        Dx = "--dx",
+        /// A warm start of the recursion.
+        Start = "--start warm",
+        /// The shape of two-sided weights.
+        Window = "--window",
+        /// The width of two-sided weights.
+        Width = "--width",
+        /// The rule of the direction state.
+        Direction = "--direction",
+        /// Its length.
+        Delta = "--delta",
+        /// Which of mass and damping are identified.
+        Terms = "--terms",
+        /// A stiffness among the terms.
+        Stiffness = "--terms k",
+        /// Limited influence of outliers.
+        Huber = "--huber",
+        /// Weights of penalties.
+        Ridge = "--ridge",
+        /// Whether mass and damping are at least 0.
+        Bounds = "--bounds",
+        /// A number of segments.
+        Segments = "--segments",
+    }
+}
+
+named! {
+    /// A term that `--terms` names.
+    TermName {
+        /// The mass.
+        M = "m",
+        /// The damping.
+        B = "b",
+        /// The stiffness.
+        K = "k",
+        /// The force by position; in friction the Coulomb friction with an offset.
+        F0 = "f0",
+    }
+}
+
+named! {
+    /// A rule of the direction state.
+    Rule {
+        /// The sign of v, as in the paper.
+        Sign = "sign",
+        /// Play (backlash).
+        Play = "play",
+        /// Dahl friction.
+        Dahl = "dahl",
+    }
+}
+
+/// What a user asks for. What is not given has the default of the estimator.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Options {
+    /// The name of an estimator.
+    pub method: Option<String>,
+    /// Forgetting factors, above 0 and at most 1.
+    pub lambda: Vec<f64>,
+    /// Distances of the nodes, mm.
+    pub dx_mm: Vec<f64>,
+    /// Resampling of the estimates of a recursion at the nodes.
+    pub resample: Option<Resample>,
+    /// Initial state of a recursion.
+    pub start: Option<Start>,
+    /// Order of the samples in a recursion.
+    pub sort: Option<Sort>,
+    /// Shape of two-sided weights.
+    pub window: Option<Window>,
+    /// Width of two-sided weights, mm.
+    pub width_mm: Option<f64>,
+    /// Rule of the direction state.
+    pub direction: Option<Rule>,
+    /// Lengths of the direction state, mm.
+    pub delta_mm: Vec<f64>,
+    /// Weights of the penalties on the force and on the dynamics.
+    pub ridge: Option<[f64; 2]>,
+    /// Whether outliers have limited influence.
+    pub huber: bool,
+    /// The terms that are identified; empty: those that the recordings carry.
+    pub terms: Vec<TermName>,
+    /// Whether mass and damping are at least 0.
+    pub bounds: Option<bool>,
+    /// Number of segments.
+    pub segments: Option<usize>,
+    /// The corner of the low-pass that all signals have passed, Hz.
+    pub filter_hz: Option<f64>,
+    /// Whether the default of dx is a range, for a figure, and not two values.
+    pub range_of_dx: bool,
+}
+
+impl Options {
+    /// The terms that are identified.
+    pub(super) fn kept(&self) -> Terms {
+        let kept = |term| self.terms.is_empty() || self.terms.contains(&term);
+        Terms {
+            m: kept(TermName::M),
+            b: kept(TermName::B),
+            k: kept(TermName::K),
+            only_carried: self.terms.is_empty(),
+        }
+    }
+
+    /// An estimator for each forgetting factor.
+    pub(super) fn each_lambda<E>(&self, of: impl Fn(f64) -> E) -> Vec<E> {
+        let lambdas = match self.lambda.is_empty() {
+            true => &DEFAULT_LAMBDAS[..],
+            false => &self.lambda,
+        };
+        lambdas.iter().map(|lambda| of(*lambda)).collect()
+    }
+
+    /// An estimator for each direction state.
+    pub(super) fn each_state<E>(&self, default: Rule, of: impl Fn(State) -> E) -> Vec<E> {
+        let state = |delta| match self.direction.unwrap_or(default) {
+            Rule::Sign => State::Sign,
+            Rule::Play => State::Play(delta),
+            Rule::Dahl => State::Dahl(delta),
+        };
+        match self.delta_mm.is_empty() {
+            true => vec![of(state(Delta::Scan))],
+            false => (self.delta_mm.iter())
+                .map(|mm| of(state(Delta::Mm(*mm))))
+                .collect(),
+        }
+    }
+}
+
+impl fmt::Display for Method {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())?;
+        self.write_options(f)
+    }
+}
+
+/// Refuses a length that is not above 0.
+pub(super) fn positive(option: &'static str, value: f64) -> Result<(), IdentifyError> {
     if value.is_finite() && value > 0.0 {
         Ok(())
     } else {
@@ -132,7 +376,8 @@ fn positive(option: &'static str, value: f64) -> Result<(), IdentifyError> {
     }
 }
 
-fn not_negative(option: &'static str, value: f64) -> Result<(), IdentifyError> {
+/// Refuses a weight below 0.
+pub(super) fn not_negative(option: &'static str, value: f64) -> Result<(), IdentifyError> {
     if value.is_finite() && value >= 0.0 {
         Ok(())
     } else {
@@ -140,34 +385,11 @@ fn not_negative(option: &'static str, value: f64) -> Result<(), IdentifyError> {
     }
 }
 
-/// Options of exponentially weighted least squares.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Ewls {
-    /// Forgetting factor λ, above 0 and at most 1.
-    pub lambda: f64,
-    /// Resampling of the estimates at the nodes.
-    pub resample: Resample,
-    /// Initial state of the recursion.
-    pub start: Start,
-    /// Order of the samples.
-    pub sort: Sort,
-    /// Whether m, b ≥ 0 in every estimate.
-    pub bounded: bool,
-    /// The terms that are estimated.
-    pub terms: Terms,
-}
-
-impl Ewls {
-    /// The method as published: cold start, ascending order, no bounds, all terms.
-    pub fn paper(lambda: f64, resample: Resample) -> Self {
-        Self {
-            lambda,
-            resample,
-            start: Start::Cold,
-            sort: Sort::Ascending,
-            bounded: false,
-            terms: Terms::ALL,
-        }
+/// Refuses a forgetting factor that is not above 0 and at most 1.
+pub(super) fn forgetting(lambda: f64) -> Result<(), IdentifyError> {
+    match lambda > 0.0 && lambda <= 1.0 {
+        true => Ok(()),
+        false => Err(IdentifyError::Lambda(lambda)),
     }
 }
 
@@ -191,19 +413,6 @@ named! {
     }
 }
 
-/// Options of two-sided least squares.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TwoSided {
-    /// Shape of the weights.
-    pub window: Window,
-    /// Width L of the weights.
-    pub width: Width,
-    /// Whether m, b ≥ 0 at every node.
-    pub bounded: bool,
-    /// The terms that are estimated.
-    pub terms: Terms,
-}
-
 named! {
     /// The weight of a sample by its distance from a node.
     Window {
@@ -211,98 +420,6 @@ named! {
         Exponential = "exponential",
         /// (1 − |u|³)³ with u = (x − node)/(3L), 0 for |u| > 1.
         Tricube = "tricube",
-    }
-}
-
-/// The width L of two-sided weights.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Width {
-    /// The memory of EWLS with this λ: L = 1 / ((1 − λ) ρ), with the sample density ρ
-    /// of each direction.
-    Lambda(f64),
-    /// A length, mm.
-    Mm(f64),
-}
-
-/// Options of the hat table.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Hat {
-    /// The direction state, in identification and in prediction.
-    pub state: State,
-    /// Weight of the squared second differences of F along the nodes.
-    pub ridge_force: f64,
-    /// Weight of the squared first differences of m and 60·b.
-    pub ridge_dynamics: f64,
-    /// Whether m, b ≥ 0 at every node.
-    pub bounded: bool,
-    /// Which of m and b the table has.
-    pub terms: Terms,
-}
-
-impl Default for Hat {
-    /// Play, with δ found on the training recording, and m, b ≥ 0.
-    fn default() -> Self {
-        Self {
-            state: State::Play(Delta::Scan),
-            ridge_force: 3e-3,
-            ridge_dynamics: 5e-2,
-            bounded: true,
-            terms: Terms::default(),
-        }
-    }
-}
-
-/// Options of the virtual mechanism.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Mechanism {
-    /// The corner of the low-pass that the recorded forces have passed, Hz; `None`: found.
-    pub recorded_hz: Option<f64>,
-}
-
-/// Options of the friction model.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Friction {
-    /// The direction state, in identification and in prediction.
-    pub state: State,
-    /// Which of m and b it has.
-    pub terms: Terms,
-}
-
-impl Default for Friction {
-    /// Dahl, with δ found on the training recordings.
-    fn default() -> Self {
-        Self {
-            state: State::Dahl(Delta::Scan),
-            terms: Terms::default(),
-        }
-    }
-}
-
-/// Options of the passive table.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Passive {
-    /// The direction state, in identification and in prediction.
-    pub state: State,
-    /// Weight of the squared second differences of F⁺ and F⁻ along the nodes.
-    pub ridge_force: f64,
-    /// Weight of the squared first differences of b times the rms speed.
-    pub ridge_damping: f64,
-    /// Which of m and b the table has.
-    pub terms: Terms,
-    /// Whether outliers have limited influence: Huber's (1964) weights with k = 1.345.
-    pub huber: bool,
-}
-
-impl Default for Passive {
-    /// Play, with δ found on the training recordings.
-    fn default() -> Self {
-        Self {
-            state: State::Play(Delta::Scan),
-            ridge_force: 3e-3,
-            ridge_damping: 6e-2,
-            terms: Terms::default(),
-            huber: false,
-        }
     }
 }
 
@@ -345,13 +462,29 @@ impl Terms {
         only_carried: false,
     };
 
+    /// Of mass and damping those that are not left out, as text: ` terms=b`; with a stiffness if
+    /// the estimator has one.
+    pub(super) fn write(self, f: &mut fmt::Formatter<'_>, stiffness: bool) -> fmt::Result {
+        let all = [("m", self.m), ("b", self.b), ("k", self.k)];
+        let all = if stiffness { &all[..] } else { &all[..2] };
+        if all.iter().all(|(_, kept)| *kept) {
+            return Ok(());
+        }
+        let kept = all.iter().filter(|(_, kept)| *kept);
+        let names: Vec<&str> = kept.map(|(name, _)| *name).collect();
+        match names.is_empty() {
+            true => f.write_str(" terms=f0"),
+            false => write!(f, " terms={}", names.join(",")),
+        }
+    }
+
     /// Whether each entry of [`Theta`](super::Theta) is identified.
     pub(super) fn kept(self) -> [bool; 4] {
         [self.m, self.b, self.k, true]
     }
 }
 
-/// The direction state of a hat table.
+/// The direction state of a table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum State {
     /// The sign of v.
@@ -363,11 +496,19 @@ pub enum State {
 }
 
 impl State {
-    fn check(self) -> Result<(), IdentifyError> {
+    pub(super) fn check(self) -> Result<(), IdentifyError> {
         match self {
             Self::Play(Delta::Mm(mm)) | Self::Dahl(Delta::Mm(mm)) => positive("delta", mm),
             _ => Ok(()),
         }
+    }
+
+    /// ` delta=scan`, if so.
+    pub(super) fn write(self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Play(Delta::Scan) | Self::Dahl(Delta::Scan) => " delta=scan",
+            _ => "",
+        })
     }
 
     /// The direction rule with a given δ, mm.
@@ -388,169 +529,4 @@ pub enum Delta {
     /// The shortest whose rms error on the training recordings exceeds the least one by
     /// at most a tenth, between 1/100 and 1/4 of the travel.
     Scan,
-}
-
-/// Options of the segmented baseline.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Segments {
-    /// Number of segments over the range of both directions.
-    pub count: usize,
-}
-
-impl Default for Segments {
-    /// Twelve segments.
-    fn default() -> Self {
-        Self { count: 12 }
-    }
-}
-
-impl fmt::Display for Method {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.as_str())?;
-        match self {
-            Self::Ewls(options) => {
-                if options.start != Start::Cold {
-                    write!(f, " start={}", options.start.as_str())?;
-                }
-                if options.sort != Sort::Ascending {
-                    write!(f, " sort={}", options.sort.as_str())?;
-                }
-                terms(f, options.terms)
-            }
-            Self::TwoSided(options) => {
-                write!(f, " window={}", options.window.as_str())?;
-                if let Width::Mm(mm) = options.width {
-                    write!(f, " width={mm}")?;
-                }
-                bounds(f, options.bounded)?;
-                terms(f, options.terms)
-            }
-            Self::Hat(options) => {
-                write!(
-                    f,
-                    " ridge={},{}",
-                    options.ridge_force, options.ridge_dynamics
-                )?;
-                scanned(f, options.state)?;
-                bounds(f, options.bounded)?;
-                without_k(f, options.terms)
-            }
-            Self::Passive(options) => {
-                write!(
-                    f,
-                    " ridge={},{}",
-                    options.ridge_force, options.ridge_damping
-                )?;
-                scanned(f, options.state)?;
-                if options.huber {
-                    f.write_str(" huber")?;
-                }
-                without_k(f, options.terms)
-            }
-            Self::Segments(options) => write!(f, " count={}", options.count),
-            Self::Friction(options) => {
-                scanned(f, options.state)?;
-                without_k(f, options.terms)
-            }
-            Self::Mechanism(options) => match options.recorded_hz {
-                Some(hz) => write!(f, " recorded={hz}"),
-                None => Ok(()),
-            },
-            Self::Static | Self::Spring => Ok(()),
-        }
-    }
-}
-
-fn scanned(f: &mut fmt::Formatter<'_>, state: State) -> fmt::Result {
-    f.write_str(match state {
-        State::Play(Delta::Scan) | State::Dahl(Delta::Scan) => " delta=scan",
-        _ => "",
-    })
-}
-
-/// The terms of a method with a stiffness, if they are not all.
-fn terms(f: &mut fmt::Formatter<'_>, terms: Terms) -> fmt::Result {
-    listed(f, &[("m", terms.m), ("b", terms.b), ("k", terms.k)])
-}
-
-/// The terms of a method without a stiffness, if they are not all.
-fn without_k(f: &mut fmt::Formatter<'_>, terms: Terms) -> fmt::Result {
-    listed(f, &[("m", terms.m), ("b", terms.b)])
-}
-
-fn listed(f: &mut fmt::Formatter<'_>, terms: &[(&str, bool)]) -> fmt::Result {
-    if terms.iter().all(|(_, kept)| *kept) {
-        return Ok(());
-    }
-    let kept = terms.iter().filter(|(_, kept)| *kept);
-    let names: Vec<&str> = kept.map(|(name, _)| *name).collect();
-    match names.is_empty() {
-        true => f.write_str(" terms=f0"),
-        false => write!(f, " terms={}", names.join(",")),
-    }
-}
-
-fn bounds(f: &mut fmt::Formatter<'_>, bounded: bool) -> fmt::Result {
-    f.write_str(if bounded { " m,b>=0" } else { "" })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_displayed_method_has_every_option_that_is_not_the_default() {
-        let paper = Ewls::paper(0.999, Resample::Point);
-        assert_eq!(Method::Ewls(paper).to_string(), "ewls");
-        let warm = Ewls {
-            start: Start::Warm,
-            sort: Sort::Travel,
-            bounded: true,
-            ..paper
-        };
-        assert_eq!(
-            Method::Ewls(warm).to_string(),
-            "constrained start=warm sort=travel"
-        );
-        assert_eq!(
-            Method::Hat(Hat::default()).to_string(),
-            "hat ridge=0.003,0.05 delta=scan m,b>=0"
-        );
-    }
-
-    #[test]
-    fn options_out_of_range_are_refused() {
-        let two_sided = |width| {
-            Method::TwoSided(TwoSided {
-                window: Window::Tricube,
-                width,
-                bounded: false,
-                terms: Terms::default(),
-            })
-        };
-        let hat = |delta, ridge| {
-            Method::Hat(Hat {
-                state: State::Play(Delta::Mm(delta)),
-                ridge_force: ridge,
-                ..Hat::default()
-            })
-        };
-        for bad in [
-            two_sided(Width::Mm(0.0)),
-            two_sided(Width::Mm(f64::NAN)),
-            two_sided(Width::Lambda(1.0)),
-            two_sided(Width::Lambda(-0.5)),
-            hat(0.0, 0.0),
-            hat(f64::INFINITY, 0.0),
-            hat(0.5, -1.0),
-            hat(0.5, f64::NAN),
-            Method::Segments(Segments { count: 0 }),
-            Method::Segments(Segments { count: usize::MAX }),
-            Method::Ewls(Ewls::paper(1.5, Resample::Bin)),
-            Method::Ewls(Ewls::paper(f64::NAN, Resample::Bin)),
-        ] {
-            assert!(bad.check().is_err(), "{bad}");
-        }
-        assert_eq!(hat(0.5, 0.0).check(), Ok(()));
-    }
 }

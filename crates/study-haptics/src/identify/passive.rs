@@ -10,11 +10,17 @@
 //! the rms speed, so that all of them are forces and no weight depends on a unit.
 
 use super::banded::{Banded, Bound};
+use super::direction_state::BELOW_TABLE;
 use super::hat::HatTable;
-use super::method::Terms;
+use super::method::{
+    Candidacy, Claim, Declared, Delta, Estimator, Opt, Options, Rule, Setting, State, Terms,
+};
 use super::samples::{Weights, weight_of};
-use super::vaf::motion;
+use super::vaf::{self, motion};
+use super::{Identified, IdentifyError, Training, Trials, method};
+use crate::model::Provenance;
 use crate::recording::Recording;
+use std::fmt;
 use study_wire::predict::{Direction, DirectionState, Lookup, locate};
 
 /// Unknowns per node: C, D, b in + and in −.
@@ -24,16 +30,168 @@ const HALF: usize = 2 * PER_NODE;
 /// Share of a node's information that keeps unknowns at 0 where they are not excited.
 const FLOOR: f64 = 1e-12;
 
+/// Errors above this many standard deviations are large: 95 % efficient with normal errors.
+const HUBER: f64 = 1.345;
+/// Standard deviation over median of the size, with normal errors.
+const SIGMA_PER_MAD: f64 = 1.4826;
+/// Weighted solutions, each with the weights of the one before.
+const HUBER_STEPS: usize = 4;
+
+/// Options of the passive table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Passive {
+    /// The direction state, in identification and in prediction.
+    pub state: State,
+    /// Weight of the squared second differences of F⁺ and F⁻ along the nodes.
+    pub ridge_force: f64,
+    /// Weight of the squared first differences of b times the rms speed.
+    pub ridge_damping: f64,
+    /// Which of m and b the table has.
+    pub terms: Terms,
+    /// Whether outliers have limited influence: Huber's (1964) weights with k = 1.345.
+    pub huber: bool,
+}
+
+impl Default for Passive {
+    /// Play, with δ found on the training recordings.
+    fn default() -> Self {
+        Self {
+            state: State::Play(Delta::Scan),
+            ridge_force: 3e-3,
+            ridge_damping: 6e-2,
+            terms: Terms::default(),
+            huber: false,
+        }
+    }
+}
+
+impl Estimator for Passive {
+    fn name(&self) -> &'static str {
+        Self::NAMES[0].0
+    }
+
+    fn identify(
+        &self,
+        training: &Training<'_>,
+        setting: Setting<'_>,
+    ) -> Result<Identified, IdentifyError> {
+        let (lookup, dx_mm) = (setting.lookup, setting.dx_mm);
+        let nodes = training.nodes(dx_mm)?;
+        let penalty = Penalty {
+            ridge_force: self.ridge_force,
+            ridge_damping: self.ridge_damping,
+            terms: self.terms,
+        };
+        let weighted = |rule, weights: Weights<'_>| -> Result<Identified, IdentifyError> {
+            let HatTable {
+                positive,
+                negative,
+                weight,
+            } = table(&training.recordings, &nodes, lookup, rule, penalty, weights)
+                .ok_or(IdentifyError::Undetermined)?;
+            Ok(training.hats(nodes.clone(), [positive, negative], &weight, rule, lookup))
+        };
+        let mut identified = training.with_state((self.state, BELOW_TABLE), |rule| {
+            let mut identified = weighted(rule, training.weights.as_deref())?;
+            for _ in 0..if self.huber { HUBER_STEPS } else { 0 } {
+                let weights = huber(&training.recordings, &identified);
+                identified = weighted(rule, Some(&weights))?;
+            }
+            Ok(identified)
+        })?;
+        identified.realization.provenance = Provenance {
+            dx_mm: Some(dx_mm),
+            ..training.provenance(*self)
+        };
+        Ok(identified)
+    }
+
+    fn check(&self) -> Result<(), IdentifyError> {
+        self.state.check()?;
+        method::not_negative("the ridge on F", self.ridge_force)?;
+        method::not_negative("the ridge on b", self.ridge_damping)
+    }
+
+    fn write_options(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, " ridge={},{}", self.ridge_force, self.ridge_damping)?;
+        self.state.write(f)?;
+        f.write_str(if self.huber { " huber" } else { "" })?;
+        self.terms.write(f, false)
+    }
+
+    fn claim(&self) -> Claim {
+        Claim::Passive
+    }
+
+    fn terms_mut(&mut self) -> Option<&mut Terms> {
+        Some(&mut self.terms)
+    }
+}
+
+impl Declared for Passive {
+    const NAMES: &'static [(&'static str, &'static str)] = &[(
+        "passive",
+        "A hat table with one mass and bounds: passes its certificate by construction",
+    )];
+    const OPTIONS: &'static [Opt] = &[
+        Opt::Dx,
+        Opt::Direction,
+        Opt::Delta,
+        Opt::Terms,
+        Opt::Huber,
+        Opt::Ridge,
+    ];
+
+    fn asked(_name: &str, options: &Options) -> Vec<Self> {
+        let default = Self::default();
+        let [ridge_force, ridge_damping] =
+            (options.ridge).unwrap_or([default.ridge_force, default.ridge_damping]);
+        options.each_state(Rule::Play, |state| Self {
+            state,
+            ridge_force,
+            ridge_damping,
+            terms: options.kept(),
+            huber: options.huber,
+        })
+    }
+
+    fn candidate(trials: &Trials<'_, '_>) -> Result<Candidacy, IdentifyError> {
+        let (state, dx_mm) = trials.table()?;
+        let passive = Self {
+            state,
+            ..Self::default()
+        };
+        Ok(Candidacy::With(passive.into(), dx_mm))
+    }
+}
+
+/// Huber's weights of all samples: 1 up to [`HUBER`] robust standard deviations of the
+/// error, then in inverse proportion to it.
+fn huber(recordings: &[&Recording], of: &Identified) -> Vec<Vec<f64>> {
+    let errors: Vec<Vec<f64>> = (recordings.iter())
+        .map(|recording| vaf::errors(&of.realization, recording))
+        .collect();
+    let mut sizes: Vec<f64> = errors.iter().flatten().map(|e| e.abs()).collect();
+    let middle = sizes.len() / 2;
+    let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
+    let most = HUBER * SIGMA_PER_MAD * *median;
+    let weight = |e: &f64| if e.abs() > most { most / e.abs() } else { 1.0 };
+    errors
+        .iter()
+        .map(|e| e.iter().map(weight).collect())
+        .collect()
+}
+
 /// Weights of the penalties, and the terms that the table has.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Penalty {
-    pub(super) ridge_force: f64,
-    pub(super) ridge_damping: f64,
-    pub(super) terms: Terms,
+struct Penalty {
+    ridge_force: f64,
+    ridge_damping: f64,
+    terms: Terms,
 }
 
 /// The table of least cost; `None` if recordings and ridges leave it undetermined.
-pub(super) fn table(
+fn table(
     recordings: &[&Recording],
     nodes: &[f64],
     lookup: Lookup,

@@ -54,6 +54,36 @@ pub enum IdentifyError {
     Diverged { lambda: f64 },
 }
 
+/// What an estimator found of one of its terms, and how well the recordings determine it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// The term, such as "mass".
+    pub name: &'static str,
+    /// Its unit, such as "kg".
+    pub unit: &'static str,
+    /// The value that it has, or would have if it were identified.
+    pub value: f64,
+    /// Its standard error, in the unit; `None` at a bound or where it is not known.
+    pub standard_error: Option<f64>,
+    /// What the term is at most, with a confidence of 99 %, in the unit.
+    pub upper_bound: Option<f64>,
+    /// Whether the recordings determine it: otherwise it is left out, or no more than set.
+    pub identified: bool,
+}
+
+impl From<&Evidence> for Estimate {
+    fn from(evidence: &Evidence) -> Self {
+        Self {
+            name: evidence.term.as_str(),
+            unit: evidence.term.unit(),
+            value: evidence.value,
+            standard_error: Some(evidence.standard_error),
+            upper_bound: evidence.upper_bound,
+            identified: evidence.is_carried(),
+        }
+    }
+}
+
 /// Why nodes were interpolated between their neighbors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Cause {

@@ -11,9 +11,12 @@
 //! the order of the samples does not change the table.
 
 use super::constrained;
-use super::method::{Terms, Window};
+use super::method::{self, Declared, Estimator, Opt, Options, Setting, Terms, Window};
 use super::resample::{self, Resampled};
 use super::samples::{INITIAL_COVARIANCE, Samples, Theta};
+use super::{Cause, Identified, IdentifyError, Training};
+use crate::model::Provenance;
+use std::fmt;
 
 /// Support of tricube weights in multiples of L; the effective width is then about
 /// that of exponential weights.
@@ -21,6 +24,129 @@ const TRICUBE_SUPPORT: f64 = 3.0;
 
 /// Least sum of weights for four parameters: two samples each.
 pub(super) const MIN_WEIGHT: f64 = 8.0;
+
+/// Options of two-sided least squares.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TwoSided {
+    /// Shape of the weights.
+    pub window: Window,
+    /// Width L of the weights.
+    pub width: Width,
+    /// Whether m, b ≥ 0 at every node.
+    pub bounded: bool,
+    /// The terms that are estimated.
+    pub terms: Terms,
+}
+
+/// The width L of two-sided weights.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Width {
+    /// The memory of EWLS with this λ: L = 1 / ((1 − λ) ρ), with the sample density ρ
+    /// of each direction.
+    Lambda(f64),
+    /// A length, mm.
+    Mm(f64),
+}
+
+impl Estimator for TwoSided {
+    fn name(&self) -> &'static str {
+        Self::NAMES[0].0
+    }
+
+    fn identify(
+        &self,
+        training: &Training<'_>,
+        setting: Setting<'_>,
+    ) -> Result<Identified, IdentifyError> {
+        let (options, dx_mm) = (*self, setting.dx_mm);
+        let nodes = training.nodes(dx_mm)?;
+        let [l_plus, l_minus] = training.directions().map(|samples| match options.width {
+            Width::Mm(mm) => Ok(mm),
+            Width::Lambda(lambda) => {
+                (samples.memory_mm(lambda)).ok_or(IdentifyError::Lambda(lambda))
+            }
+        });
+        let (l_plus, l_minus) = (l_plus?, l_minus?);
+        let estimate = |samples: &Samples, width_mm| {
+            let of = (options.bounded, options.terms);
+            at_nodes(samples, &nodes, options.window, width_mm, of)
+                .ok_or(IdentifyError::Narrow { width_mm })
+        };
+        let positive = estimate(&training.positive, l_plus)?;
+        let negative = estimate(&training.negative, l_minus)?;
+        let mut identified = training.table(nodes, positive, negative, Cause::FewSamples, setting.lookup);
+        identified.realization.provenance = Provenance {
+            lambda: self.lambda(),
+            memory_mm: Some(l_plus.min(l_minus)),
+            dx_mm: Some(dx_mm),
+            ..training.provenance(options)
+        };
+        Ok(identified)
+    }
+
+    fn check(&self) -> Result<(), IdentifyError> {
+        match self.width {
+            Width::Mm(mm) => method::positive("the width of two-sided weights", mm),
+            // without forgetting there would be a single θ for all positions
+            Width::Lambda(1.0) => Err(IdentifyError::Lambda(1.0)),
+            Width::Lambda(lambda) => method::forgetting(lambda),
+        }
+    }
+
+    fn write_options(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, " window={}", self.window.as_str())?;
+        if let Width::Mm(mm) = self.width {
+            write!(f, " width={mm}")?;
+        }
+        f.write_str(if self.bounded { " m,b>=0" } else { "" })?;
+        self.terms.write(f, true)
+    }
+
+    fn lambda(&self) -> Option<f64> {
+        match self.width {
+            Width::Lambda(lambda) => Some(lambda),
+            Width::Mm(_) => None,
+        }
+    }
+
+    fn terms_mut(&mut self) -> Option<&mut Terms> {
+        Some(&mut self.terms)
+    }
+
+    fn id_template(&self, _several_deltas: bool) -> String {
+        match self.width {
+            Width::Lambda(_) => "two-sided-{lambda}-dx-{dx}".to_owned(),
+            Width::Mm(_) => "two-sided-dx-{dx}".to_owned(),
+        }
+    }
+}
+
+impl Declared for TwoSided {
+    const NAMES: &'static [(&'static str, &'static str)] =
+        &[("two-sided", "Weighted least squares around each node")];
+    const OPTIONS: &'static [Opt] = &[
+        Opt::Lambda,
+        Opt::Dx,
+        Opt::Window,
+        Opt::Width,
+        Opt::Terms,
+        Opt::Stiffness,
+        Opt::Bounds,
+    ];
+
+    fn asked(_name: &str, options: &Options) -> Vec<Self> {
+        let of = |width| Self {
+            window: options.window.unwrap_or(Window::Tricube),
+            width,
+            bounded: options.bounds.unwrap_or(false),
+            terms: options.kept(),
+        };
+        match options.width_mm {
+            Some(mm) => vec![of(Width::Mm(mm))],
+            None => options.each_lambda(|lambda| of(Width::Lambda(lambda))),
+        }
+    }
+}
 
 /// θ at the nodes from the samples of one direction, with weights of width `l_mm`.
 /// Nodes with too few samples around them are interpolated between their neighbors;
@@ -226,7 +352,7 @@ fn tricube(samples: &Samples, nodes: &[f64], reach_mm: f64) -> Vec<Sums> {
 mod tests {
     use super::*;
     use crate::identify::ewls;
-    use crate::identify::method::Ewls;
+    use crate::identify::Ewls;
 
     /// Samples of a nonlinear force, 100 per mm.
     fn samples() -> Samples {

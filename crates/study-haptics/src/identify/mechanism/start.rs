@@ -1,7 +1,8 @@
 //! Where the fit starts: the detents of a passive table, and two guesses of the backlash
 //! and of the share of the mass before it.
 
-use crate::identify::method::{Method, Passive, Terms};
+use crate::identify::method::Terms;
+use crate::identify::passive::Passive;
 use crate::identify::{IdentifyError, Training};
 use crate::model::{Mechanism, Profile};
 use study_wire::mechanism::Scalars;
@@ -19,10 +20,10 @@ const BEFORE: [f64; 2] = [0.35, 0.7];
 /// # Errors
 /// [`IdentifyError`] if the recordings do not suit a passive table.
 pub(super) fn starts(training: &Training<'_>, dx_mm: f64) -> Result<Vec<Mechanism>, IdentifyError> {
-    let method = Method::Passive(Passive {
+    let method = Passive {
         terms: Terms::ALL,
         ..Passive::default()
-    });
+    };
     let table = training
         .identify(method, dx_mm, Lookup::Linear)?
         .realization;

@@ -39,7 +39,9 @@ fn detents_lie_between_crests() {
 fn parts_add_up_and_a_constant_error_is_in_the_nrmse_only() {
     let r = recording("r", |_, x, v| switch(x, v));
     let training = Training::new(&r).unwrap();
-    let found = training.static_profile(0.5, Lookup::Linear).unwrap();
+    let found = training
+        .identify(crate::identify::Static, 0.5, Lookup::Linear)
+        .unwrap();
     let shifted = recording("s", |_, x, v| switch(x, v) - 1.5);
     let plain = validate(&found.realization, &r, &detents(&r)).unwrap();
     let off = validate(&found.realization, &shifted, &detents(&r)).unwrap();

@@ -1,18 +1,17 @@
 //! The figures that are looked at first, for the terminal and the files.
 
-use super::Results;
+use super::position::ByPosition;
 use super::printed::Printed;
+use super::{Compared, Coverage, Drawing, Shown, terminal};
+use study_haptics::identify::identification::{Identification, Source};
 use study_haptics::recording::Recording;
-use study_report::identification::{
-    self, ByPosition, Compared, Coverage, Drawing, Shown, terminal,
-};
 
-fn by_position(results: &Results<'_>) -> Option<ByPosition> {
+fn by_position(results: &Identification) -> Option<ByPosition> {
     let cell = results.cells.get(results.best.unwrap_or(0))?;
-    let training: Vec<&Recording> = results.training.iter().map(|(_, r)| r).collect();
+    let training: Vec<&Recording> = results.training.iter().map(|s| &s.recording).collect();
     let reported = results.reported();
     let of_reported =
-        |((_, recording), _): &(&(_, &Recording), _)| std::ptr::eq(*recording, reported);
+        |(source, _): &(&Source, _)| std::ptr::eq(&raw const source.recording, reported);
     let ceiling = (results.recordings.iter().zip(&results.ceilings)).find(of_reported);
     let noise_n = ceiling.and_then(|(_, ceiling)| ceiling.map(|c| c.noise_n));
     Some(ByPosition::of(
@@ -23,18 +22,18 @@ fn by_position(results: &Results<'_>) -> Option<ByPosition> {
     ))
 }
 
-fn coverage(results: &Results<'_>) -> Option<Coverage> {
-    let training: Vec<&Recording> = results.training.iter().map(|(_, r)| r).collect();
+fn coverage(results: &Identification) -> Option<Coverage> {
+    let training: Vec<&Recording> = results.training.iter().map(|s| &s.recording).collect();
     Coverage::of(&training)
 }
 
-fn shown(results: &Results<'_>) -> Shown {
+fn shown(results: &Identification) -> Shown {
     let Printed { units, lever_mm } = Printed::of(results);
     Shown { units, lever_mm }
 }
 
 /// As text for a terminal of this width.
-pub(super) fn text(results: &Results<'_>, width: usize) -> String {
+pub(super) fn text(results: &Identification, width: usize) -> String {
     let shown = shown(results);
     let by_position = by_position(results);
     let force = by_position.map(|found| terminal::displacement(&found, width, shown));
@@ -43,12 +42,12 @@ pub(super) fn text(results: &Results<'_>, width: usize) -> String {
 }
 
 /// As figures.
-pub(super) fn drawings(results: &Results<'_>) -> Vec<Drawing> {
+pub(super) fn drawings(results: &Identification) -> Vec<Drawing> {
     let shown = shown(results);
     let by_position = by_position(results);
     let mut drawings: Vec<Drawing> = Vec::new();
-    drawings.extend(by_position.map(|found| identification::displacement(&found, shown)));
-    drawings.extend(coverage(results).map(|found| identification::coverage(&found, shown)));
+    drawings.extend(by_position.map(|found| super::displacement(&found, shown)));
+    drawings.extend(coverage(results).map(|found| super::coverage(&found, shown)));
     drawings.extend(results.comparison.as_ref().and_then(|comparison| {
         let candidates = comparison.candidates.iter().enumerate();
         let compared = candidates.map(|(i, candidate)| Compared {
@@ -58,7 +57,7 @@ pub(super) fn drawings(results: &Results<'_>) -> Vec<Drawing> {
             is_recommended: comparison.recommended == Some(i),
         });
         let compared: Vec<Compared> = compared.collect();
-        identification::methods(&compared, comparison.noise_n, shown)
+        super::methods(&compared, comparison.noise_n, shown)
     }));
     drawings
 }

@@ -1,9 +1,8 @@
 //! Units, names and columns of what `study identify` prints.
 
-use super::Results;
-use super::args::NamedPath;
 use std::fmt::Write as _;
 use study_base::text::Untrusted;
+use study_haptics::identify::identification::{Identification, Source};
 use study_haptics::model::Units;
 use unicode_width::UnicodeWidthStr as _;
 
@@ -15,8 +14,8 @@ pub(super) struct Printed {
 }
 
 impl Printed {
-    pub(super) fn of(results: &Results<'_>) -> Self {
-        let (units, lever_mm) = results.args.units().unwrap_or((Units::Linear, 1.0));
+    pub(super) fn of(results: &Identification) -> Self {
+        let (units, lever_mm) = results.turned.unwrap_or((Units::Linear, 1.0));
         Self { units, lever_mm }
     }
 
@@ -43,8 +42,8 @@ impl Printed {
 }
 
 /// The name, truncated so that the numbers stay on the screen.
-pub(super) fn short_name(named: &NamedPath) -> String {
-    let name: String = named.name.chars().take(24).collect();
+pub(super) fn short_name(source: &Source) -> String {
+    let name: String = source.recording.name.chars().take(24).collect();
     Untrusted(&name).to_string()
 }
 

@@ -1,15 +1,8 @@
-//! Methods of [`Training`] that identify hat tables: with a direction state, passive, and the
-//! segmented baseline, a hat table of forces alone.
+//! Tables with a direction state: of a given length δ, or of the one that a scan finds.
 
-use super::banded::Bound;
-use super::friction;
-use super::hat::{self, HatTable, Penalty};
-use super::method::{Delta, Friction, Hat, Method, Passive, Segments, State};
-use super::passive;
+use super::method::{Delta, State};
 use super::resample::Resampled;
-use super::samples::Weights;
 use super::{Cause, Identified, IdentifyError, Theta, Training, Warning, two_sided, vaf};
-use crate::model::Provenance;
 use study_wire::predict::{Direction, Lookup};
 
 /// Least and greatest δ of the scan, as shares of the travel.
@@ -17,8 +10,8 @@ const SCAN: [f64; 2] = [0.01, 0.25];
 /// The scan goes on below its least δ down to this share of the travel, while each step reduces
 /// the error by more than this share: for a table, whose friction over δ is a stiffness to the
 /// device, and for the friction model.
-const BELOW_TABLE: [f64; 2] = [0.002, 0.1];
-const BELOW_FRICTION: [f64; 2] = [0.0005, 0.01];
+pub(super) const BELOW_TABLE: [f64; 2] = [0.002, 0.1];
+pub(super) const BELOW_FRICTION: [f64; 2] = [0.0005, 0.01];
 /// Ratio of one δ of the scan to the one before.
 const STEP: f64 = std::f64::consts::SQRT_2;
 /// Golden sections of the neighborhood of the best, to 1 % of it.
@@ -26,125 +19,13 @@ const GOLDEN_STEPS: usize = 10;
 /// A direction state that changes over fewer encoder counts follows their noise.
 const LEAST_COUNTS: f64 = 20.0;
 
-/// Errors above this many standard deviations are large: 95 % efficient with normal errors.
-const HUBER: f64 = 1.345;
-/// Standard deviation over median of the size, with normal errors.
-const SIGMA_PER_MAD: f64 = 1.4826;
-/// Weighted solutions, each with the weights of the one before.
-const HUBER_STEPS: usize = 4;
-
 /// The rms error of the chosen δ over the least one is at most this. Chosen, together
 /// with the ridge on m and b, on simulated switches: see `docs/estimators.md`.
 pub(super) const TOLERANCE: f64 = 1.1;
 
 impl Training<'_> {
-    /// All nodes at once, by penalized least squares, with a direction state.
-    pub(super) fn hat(
-        &self,
-        options: Hat,
-        dx_mm: f64,
-        lookup: Lookup,
-    ) -> Result<Identified, IdentifyError> {
-        let nodes = self.nodes(dx_mm)?;
-        let penalty = Penalty {
-            ridge_force: options.ridge_force,
-            ridge_dynamics: options.ridge_dynamics,
-            dynamics: [options.terms.m, options.terms.b].map(|kept| {
-                if kept && !options.bounded {
-                    Bound::Free
-                } else {
-                    Bound::of_term(kept)
-                }
-            }),
-        };
-        let mut identified = self.with_state((options.state, BELOW_TABLE), |rule| {
-            self.hat_with(nodes.clone(), lookup, rule, penalty)
-        })?;
-        identified.realization.provenance = Provenance {
-            dx_mm: Some(dx_mm),
-            ..self.provenance(Method::Hat(options))
-        };
-        Ok(identified)
-    }
-
-    /// The passive table.
-    pub(super) fn passive(
-        &self,
-        options: Passive,
-        dx_mm: f64,
-        lookup: Lookup,
-    ) -> Result<Identified, IdentifyError> {
-        let nodes = self.nodes(dx_mm)?;
-        let penalty = passive::Penalty {
-            ridge_force: options.ridge_force,
-            ridge_damping: options.ridge_damping,
-            terms: options.terms,
-        };
-        let weighted = |rule, weights: Weights<'_>| -> Result<Identified, IdentifyError> {
-            let HatTable {
-                positive,
-                negative,
-                weight,
-            } = passive::table(&self.recordings, &nodes, lookup, rule, penalty, weights)
-                .ok_or(IdentifyError::Undetermined)?;
-            Ok(self.hats(nodes.clone(), [positive, negative], &weight, rule, lookup))
-        };
-        let mut identified = self.with_state((options.state, BELOW_TABLE), |rule| {
-            let mut identified = weighted(rule, self.weights.as_deref())?;
-            for _ in 0..if options.huber { HUBER_STEPS } else { 0 } {
-                identified = weighted(rule, Some(&self.huber(&identified)))?;
-            }
-            Ok(identified)
-        })?;
-        identified.realization.provenance = Provenance {
-            dx_mm: Some(dx_mm),
-            ..self.provenance(Method::Passive(options))
-        };
-        Ok(identified)
-    }
-
-    /// Mass, damping and friction that do not depend on the position.
-    pub(super) fn friction(
-        &self,
-        options: Friction,
-        lookup: Lookup,
-    ) -> Result<Identified, IdentifyError> {
-        let samples: usize = self.recordings.iter().map(|r| r.len()).sum();
-        let weight = [[0.5 * samples as f64; 2]; 2];
-        let mut identified = self.with_state((options.state, BELOW_FRICTION), |rule| {
-            let sides = friction::parameters(
-                &self.recordings,
-                rule,
-                options.terms,
-                self.weights.as_deref(),
-            )
-            .ok_or(IdentifyError::Undetermined)?
-            .map(|theta| vec![theta; 2]);
-            Ok(self.hats(self.range_mm.to_vec(), sides, &weight, rule, lookup))
-        })?;
-        identified.realization.provenance = self.provenance(Method::Friction(options));
-        Ok(identified)
-    }
-
-    /// Huber's weights of all samples: 1 up to [`HUBER`] robust standard deviations of the
-    /// error, then in inverse proportion to it.
-    fn huber(&self, of: &Identified) -> Vec<Vec<f64>> {
-        let errors: Vec<Vec<f64>> = (self.recordings.iter())
-            .map(|recording| vaf::errors(&of.realization, recording))
-            .collect();
-        let mut sizes: Vec<f64> = errors.iter().flatten().map(|e| e.abs()).collect();
-        let middle = sizes.len() / 2;
-        let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
-        let most = HUBER * SIGMA_PER_MAD * *median;
-        let weight = |e: &f64| if e.abs() > most { most / e.abs() } else { 1.0 };
-        errors
-            .iter()
-            .map(|e| e.iter().map(weight).collect())
-            .collect()
-    }
-
     /// The table with the given direction state, or with the δ that the scan finds.
-    fn with_state(
+    pub(super) fn with_state(
         &self,
         (state, below): (State, [f64; 2]),
         table: impl Fn(Direction) -> Result<Identified, IdentifyError>,
@@ -268,57 +149,9 @@ impl Training<'_> {
         Ok(identified)
     }
 
-    /// Baseline: force by direction, piecewise linear between equally spaced nodes over
-    /// the range of both directions (a segmented static model, MacLean 1996).
-    pub(super) fn segments(
-        &self,
-        options: Segments,
-        lookup: Lookup,
-    ) -> Result<Identified, IdentifyError> {
-        let [low, high] = self.range_mm;
-        let nodes: Vec<f64> = (0..=options.count)
-            .map(|i| low + (high - low) * i as f64 / options.count as f64)
-            .collect();
-        if nodes.windows(2).any(|pair| pair[0] >= pair[1]) {
-            return Err(IdentifyError::NoOverlap(self.recordings[0].name.clone()));
-        }
-        let penalty = Penalty {
-            // only interpolates over segments without samples
-            ridge_force: 1e-6,
-            ridge_dynamics: 0.0,
-            dynamics: [Bound::Zero; 2],
-        };
-        let mut identified = self.hat_with(nodes, lookup, Direction::Sign, penalty)?;
-        identified.realization.provenance = self.provenance(Method::Segments(options));
-        Ok(identified)
-    }
-
-    fn hat_with(
-        &self,
-        nodes: Vec<f64>,
-        lookup: Lookup,
-        rule: Direction,
-        penalty: Penalty,
-    ) -> Result<Identified, IdentifyError> {
-        let HatTable {
-            positive,
-            negative,
-            weight,
-        } = hat::table(
-            &self.recordings,
-            &nodes,
-            lookup,
-            rule,
-            penalty,
-            self.weights.as_deref(),
-        )
-        .ok_or(IdentifyError::Undetermined)?;
-        Ok(self.hats(nodes, [positive, negative], &weight, rule, lookup))
-    }
-
     /// A table with a direction state from the parameters at its nodes and the weight of
     /// the samples behind each.
-    fn hats(
+    pub(super) fn hats(
         &self,
         nodes: Vec<f64>,
         [positive, negative]: [Vec<Theta>; 2],

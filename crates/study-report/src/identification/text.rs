@@ -1,185 +1,19 @@
 //! What `study identify` prints.
 
-use super::args::NamedPath;
 use super::printed::{Printed, align, short_name};
-use super::{Results, comparison, first, loops};
-use serde_json::{Map, Value, json};
+use super::{comparison, first, json, loops};
 use std::fmt::Write as _;
 use study_base::text::Untrusted;
-use study_haptics::identify::Method;
 use study_haptics::identify::grid::Cell;
+use study_haptics::identify::identification::Identification;
 use study_haptics::identify::mechanism::{Filter, Fitted, PARAMETERS};
-use study_haptics::identify::vaf::Score;
 use study_haptics::identify::validation::{Accuracy, JUST_NOTICEABLE_N};
-use study_haptics::model::Units;
-use study_haptics::recording::Recording;
-use study_wire::certificate::Certificate;
+use study_haptics::model::{Realization, Units};
+use study_haptics::safe_play::{self, Danger};
+use study_wire::certificate::{Certificate, SERVO_RATES_HZ};
 
 /// Most cells shown as a list; more are shown as rows of lambda and columns of dx.
 const MAX_ROWS: usize = 30;
-
-/// The results as a JSON document, format `study-identify/1`.
-pub(super) fn json(results: &Results<'_>) -> String {
-    let cells: Vec<Value> = results
-        .cells
-        .iter()
-        .map(|cell| {
-            let provenance = &cell.realization.provenance;
-            let by_file = |of: fn(&Score) -> f64| -> Map<String, Value> {
-                (results.recordings.iter().zip(&cell.scores))
-                    .map(|((named, _), score)| (named.name.clone(), of(score).into()))
-                    .collect()
-            };
-            let warnings: Vec<String> = cell.warnings.iter().map(ToString::to_string).collect();
-            let [start, sort] = start_and_sort(cell.method);
-            json!({
-                "method": cell.method.as_str(),
-                "lambda": provenance.lambda,
-                "memory_mm": provenance.memory_mm,
-                "dx_mm": provenance.dx_mm,
-                "resample": provenance.resample,
-                "lookup": cell.realization.lookup.as_str(),
-                "direction": cell.realization.direction.as_str(),
-                "delta_mm": cell.realization.direction.delta_mm(),
-                "start": start,
-                "sort": sort,
-                "estimator": provenance.method,
-                "filter": provenance.filter,
-                "nodes": cell.realization.x_mm.len(),
-                "vaf": by_file(|s| s.vaf),
-                "bias_n": by_file(|s| s.bias_n),
-                "residual_n": by_file(|s| s.residual_n),
-                "negative_mass": cell.certificate.negative_mass,
-                "negative_damping": cell.certificate.negative_damping,
-                "certificate": certificate(&cell.certificate),
-                "warnings": warnings,
-                "mechanism": cell.fitted.as_deref().map(mechanism),
-            })
-        })
-        .collect();
-    let recording = |named: &NamedPath, recording: &Recording, role: &str| {
-        let warnings: Vec<String> = recording.warnings.iter().map(ToString::to_string).collect();
-        json!({
-            "file": named.path.file_name().map(|name| name.to_string_lossy()),
-            "name": named.name,
-            "sha256": recording.sha256,
-            "role": role,
-            "warnings": warnings,
-        })
-    };
-    let further = (results.training.iter().skip(1)).map(|(named, r)| (*named, r, "training"));
-    let others = results
-        .recordings
-        .iter()
-        .enumerate()
-        .map(|(i, (named, r))| {
-            let validates = i < results.args.validate.len();
-            (*named, *r, if validates { "validate" } else { "test" })
-        });
-    let recordings: Vec<Value> = (further.chain(others))
-        .map(|(named, r, role)| recording(named, r, role))
-        .collect();
-    let validation: Map<String, Value> = results
-        .recordings
-        .iter()
-        .zip(results.validations.iter().zip(&results.ceilings))
-        .filter_map(|((named, _), (validation, ceiling))| {
-            let v = validation.as_ref()?;
-            let detents: Vec<Value> = v
-                .detents
-                .iter()
-                .map(|(x_mm, p)| json!({ "x_mm": x_mm, "part": p.as_ref().map(part) }))
-                .collect();
-            let document = json!({
-                "whole": part(&v.whole),
-                "positive": v.positive.as_ref().map(part),
-                "negative": v.negative.as_ref().map(part),
-                "detents": detents,
-                "ceiling": ceiling.map(|c| json!({
-                    "vaf": c.vaf, "noise_n": c.noise_n, "apart_mm": c.apart_mm,
-                    "residual_over_least": c.residual(v.whole.vaf),
-                })),
-            });
-            Some((named.name.clone(), document))
-        })
-        .collect();
-    let mut document = json!({
-        "format": "study-identify/1",
-        "tool_version": env!("CARGO_PKG_VERSION"),
-        "training": results.training.first().map(|(named, r)| recording(named, r, "training")),
-        "recordings": recordings,
-        "best": results.best,
-        "validation": validation,
-        "force_curve": loops::json(results),
-        "cells": cells,
-    });
-    if let Some(comparison) = &results.comparison {
-        document["comparison"] = comparison::json(comparison);
-    }
-    format!("{document:#}\n")
-}
-
-fn part(accuracy: &Accuracy) -> Value {
-    json!({
-        "samples": accuracy.samples,
-        "vaf": accuracy.vaf,
-        "bias_n": accuracy.bias_n,
-        "residual_n": accuracy.residual_n,
-        "nrmse": accuracy.nrmse,
-    })
-}
-
-/// Numbers that are not finite, such as an unbounded stiffness, become null.
-fn certificate(certificate: &Certificate) -> Value {
-    let margins: Map<String, Value> = certificate
-        .conditions()
-        .iter()
-        .map(|(condition, margin)| {
-            let document = json!({
-                "value": margin.value, "unit": condition.unit(), "at_mm": margin.at_mm,
-            });
-            (condition.as_str().to_owned(), document)
-        })
-        .collect();
-    json!({
-        "pass": certificate.passes(),
-        "margins": margins,
-        "stiffness_n_per_mm": certificate.stiffness_n_per_mm,
-        "state_n_per_mm": certificate.state_n_per_mm,
-        "damping_n_s_per_mm": certificate.damping_n_s_per_mm,
-        "mass_kg": certificate.mass_kg,
-    })
-}
-
-/// The parameters of a mechanism, its low-pass and all starts.
-fn mechanism(fitted: &Fitted) -> Value {
-    let values = fitted.mechanism.scalars.to_array();
-    let parameters: Vec<Value> = (PARAMETERS.iter().zip(values))
-        .zip(fitted.standard_errors)
-        .map(|(((name, unit, _), value), error)| {
-            json!({ "name": name, "unit": unit, "value": value, "standard_error": error })
-        })
-        .collect();
-    let starts: Vec<Value> = (fitted.attempts.iter())
-        .map(|a| {
-            json!({
-                "gap_mm": a.gap_mm, "mass_kg": a.mass_kg,
-                "compared_rms_n": a.compared_n, "fitted_rms_n": a.fitted_n,
-            })
-        })
-        .collect();
-    let (filtered, corner_hz) = match fitted.filter {
-        Filter::Recorded(hz) => (true, hz),
-        Filter::Both(hz) => (false, hz),
-    };
-    json!({
-        "parameters": parameters,
-        "starts": starts,
-        "iterations": fitted.iterations,
-        "recorded_force_low_passed": filtered,
-        "corner_hz": corner_hz,
-    })
-}
 
 /// The parameters of a mechanism as text.
 fn mechanism_in_detail(fitted: &Fitted) -> String {
@@ -230,14 +64,6 @@ fn mechanism_in_detail(fitted: &Fitted) -> String {
     out
 }
 
-/// The names of start and sort, for the methods that have them.
-fn start_and_sort(method: Method) -> [Option<&'static str>; 2] {
-    match method {
-        Method::Ewls(options) => [Some(options.start.as_str()), Some(options.sort.as_str())],
-        _ => [None; 2],
-    }
-}
-
 /// A number without the digits that a conversion of units leaves.
 fn plain(value: f64) -> String {
     let rounded = format!("{value:.6e}").parse::<f64>();
@@ -245,7 +71,7 @@ fn plain(value: f64) -> String {
 }
 
 /// The results as text for a terminal of this width.
-pub(super) fn table(results: &Results<'_>, width: usize) -> String {
+pub fn text(results: &Identification, width: usize) -> String {
     let mut out = String::new();
     let p = Printed::of(results);
     if p.units != Units::Linear {
@@ -256,7 +82,7 @@ pub(super) fn table(results: &Results<'_>, width: usize) -> String {
             p.lever_mm
         );
     }
-    for (_, training) in results.training {
+    for training in results.training.iter().map(|source| &source.recording) {
         let fastest = p.length(training.top_speed_mm_s());
         let decimals = if fastest < 10.0 { 2 } else { 0 };
         let _ = writeln!(
@@ -281,7 +107,7 @@ pub(super) fn table(results: &Results<'_>, width: usize) -> String {
     out.push('\n');
     match surface(results) {
         Some(rows) => {
-            let name = (results.recordings.first()).map_or("", |(named, _)| &named.name);
+            let name = (results.recordings.first()).map_or("", |source| &source.recording.name);
             let name = Untrusted(name);
             let x = p.x();
             let _ = writeln!(
@@ -303,7 +129,7 @@ pub(super) fn table(results: &Results<'_>, width: usize) -> String {
 }
 
 /// With the best cell in detail and the warnings.
-fn finished(mut out: String, results: &Results<'_>, width: usize) -> String {
+fn finished(mut out: String, results: &Identification, width: usize) -> String {
     out.push_str(&best_in_detail(results));
     out.push_str(&loops::text(results));
     for (warning, cells) in warnings(results) {
@@ -313,7 +139,7 @@ fn finished(mut out: String, results: &Results<'_>, width: usize) -> String {
 }
 
 /// A large grid as rows of lambda and columns of dx; `None` for a small one.
-fn surface(results: &Results<'_>) -> Option<Vec<Vec<String>>> {
+fn surface(results: &Identification) -> Option<Vec<Vec<String>>> {
     if results.cells.len() <= MAX_ROWS {
         return None;
     }
@@ -350,7 +176,7 @@ fn surface(results: &Results<'_>) -> Option<Vec<Vec<String>>> {
 }
 
 /// The accuracy of the best cell by direction and detent, its ceiling and certificate.
-fn best_in_detail(results: &Results<'_>) -> String {
+fn best_in_detail(results: &Identification) -> String {
     let Some(cell) = results.best.map(|best| &results.cells[best]) else {
         return String::new();
     };
@@ -361,10 +187,10 @@ fn best_in_detail(results: &Results<'_>) -> String {
     let mut ceilings = String::new();
     // a torque in N·m is some 30 times smaller than its force
     let decimals = if p.units == Units::Linear { 3 } else { 5 };
-    for ((named, _), (validation, ceiling)) in results
+    for (source, (validation, ceiling)) in results
         .recordings
         .iter()
-        .zip(results.validations.iter().zip(&results.ceilings))
+        .zip(results.accuracies.iter().zip(&results.ceilings))
     {
         let Some(v) = validation else { continue };
         let mut row = |samples: String, accuracy: &Option<Accuracy>| {
@@ -379,7 +205,7 @@ fn best_in_detail(results: &Results<'_>) -> String {
                 ]);
             }
         };
-        row(short_name(named), &Some(v.whole));
+        row(short_name(source), &Some(v.whole));
         row("v > 0".into(), &v.positive);
         row("v < 0".into(), &v.negative);
         for ([low, high], part) in &v.detents {
@@ -390,7 +216,7 @@ fn best_in_detail(results: &Results<'_>) -> String {
             let _ = writeln!(
                 ceilings,
                 "highest VAF that a model can reach on {}: {:.6} (its repetition differs by noise of {:.*} {}); the residual is {:.1} times the least one",
-                Untrusted(&named.name),
+                Untrusted(&source.recording.name),
                 c.vaf,
                 decimals,
                 p.force(c.noise_n),
@@ -417,17 +243,17 @@ fn best_in_detail(results: &Results<'_>) -> String {
             "best"
         },
         cell.certificate,
-        super::required_damping(&cell.certificate),
+        required_damping(&cell.certificate),
         100.0 * cell.certificate.negative_mass,
         100.0 * cell.certificate.negative_damping,
-        super::dangers(&cell.realization),
+        dangers(&cell.realization),
     )
 }
 
 /// The settings that all cells share.
 fn settings(cell: &Cell) -> String {
     let mut parts = vec![cell.method.as_str().to_owned()];
-    let [start, sort] = start_and_sort(cell.method);
+    let [start, sort] = json::start_and_sort(cell.method);
     parts.extend(start.map(|start| format!("{start} start")));
     parts.extend(sort.map(|sort| format!("{sort} in x")));
     if let Some(resample) = &cell.realization.provenance.resample {
@@ -437,7 +263,7 @@ fn settings(cell: &Cell) -> String {
     parts.join(", ")
 }
 
-fn heads(results: &Results<'_>) -> Vec<String> {
+fn heads(results: &Identification) -> Vec<String> {
     let p = Printed::of(results);
     let (x, f) = (p.x(), p.f());
     let mut heads = vec![String::new()];
@@ -448,8 +274,8 @@ fn heads(results: &Results<'_>) -> Vec<String> {
     if has_delta(results) {
         heads.push(format!("delta {x}"));
     }
-    for (named, _) in &results.recordings {
-        heads.push(format!("VAF {}", short_name(named)));
+    for source in &results.recordings {
+        heads.push(format!("VAF {}", short_name(source)));
         heads.extend([format!("bias {f}"), format!("residual {f}")]);
     }
     heads.extend(["m<0", "b<0", "passive"].map(String::from));
@@ -457,7 +283,7 @@ fn heads(results: &Results<'_>) -> Vec<String> {
 }
 
 /// Whether a cell has a forgetting factor or a width of its weights.
-fn has_memory(results: &Results<'_>) -> bool {
+fn has_memory(results: &Identification) -> bool {
     let memory = |cell: &Cell| {
         let provenance = &cell.realization.provenance;
         provenance.lambda.is_some() || provenance.memory_mm.is_some()
@@ -466,12 +292,12 @@ fn has_memory(results: &Results<'_>) -> bool {
 }
 
 /// Whether a cell has a direction state.
-fn has_delta(results: &Results<'_>) -> bool {
+fn has_delta(results: &Identification) -> bool {
     let delta = |cell: &Cell| cell.realization.direction.delta_mm();
     results.cells.iter().any(|cell| delta(cell).is_some())
 }
 
-fn row(results: &Results<'_>, cell: &Cell, best: bool) -> Vec<String> {
+fn row(results: &Identification, cell: &Cell, best: bool) -> Vec<String> {
     let p = Printed::of(results);
     let decimals = p.decimals();
     let provenance = &cell.realization.provenance;
@@ -507,17 +333,17 @@ fn row(results: &Results<'_>, cell: &Cell, best: bool) -> Vec<String> {
 }
 
 /// The VAF of the best cell, on what it was selected, and the VAF to report.
-fn selection(results: &Results<'_>) -> String {
+fn selection(results: &Identification) -> String {
     let Some(best) = results.best else {
         return "no cell has a VAF\n".into();
     };
     let cell = &results.cells[best];
-    let validations = results.args.validate.len();
+    let validations = results.validations;
     let list = |from: usize, to: usize| {
         results.recordings[from..to]
             .iter()
             .zip(&cell.scores[from..to])
-            .map(|((named, _), s)| format!("{:.6} on {}", s.vaf, Untrusted(&named.name)))
+            .map(|(source, s)| format!("{:.6} on {}", s.vaf, Untrusted(&source.recording.name)))
             .collect::<Vec<_>>()
             .join(", ")
     };
@@ -550,7 +376,7 @@ fn selection(results: &Results<'_>) -> String {
 }
 
 /// Each warning once, with the number of cells that have it.
-fn warnings(results: &Results<'_>) -> Vec<(String, String)> {
+fn warnings(results: &Identification) -> Vec<(String, String)> {
     let mut counts: Vec<(String, usize)> = Vec::new();
     for warning in results.cells.iter().flat_map(|cell| &cell.warnings) {
         let text = warning.to_string();
@@ -563,4 +389,38 @@ fn warnings(results: &Results<'_>) -> Vec<(String, String)> {
         .into_iter()
         .map(|(text, count)| (text, format!("{count} of {} cells", results.cells.len())))
         .collect()
+}
+
+/// The damping that a device needs to render a realization.
+pub fn required_damping(certificate: &Certificate) -> String {
+    if certificate.stiffness_n_per_mm.is_infinite() {
+        return "the force jumps at nodes: no servo rate suffices".to_owned();
+    }
+    let at = |hz: f64| {
+        format!(
+            "{:.2} at {} kHz",
+            certificate.device_damping_n_s_per_m(hz, 0.0),
+            hz / 1000.0
+        )
+    };
+    let state = match certificate.state_n_per_mm {
+        Some(n_per_mm) => format!(" and {n_per_mm:.2} over the direction state"),
+        None => String::new(),
+    };
+    format!(
+        "K up to {:.2} N/mm{state}, |b| up to {:.1} N·s/m; required device damping in N·s/m: {}",
+        certificate.stiffness_n_per_mm,
+        1000.0 * certificate.damping_n_s_per_mm,
+        SERVO_RATES_HZ.map(at).join(", ")
+    )
+}
+
+/// What an adversary makes on a device of a realization that passes its certificate.
+fn dangers(realization: &Realization) -> String {
+    if !realization.certificate().passes() {
+        return String::new();
+    }
+    let found = safe_play::search(realization, &safe_play::Device::default());
+    let line = |danger: &Danger| format!("warning: on a device, {danger}\n");
+    found.iter().map(line).collect()
 }

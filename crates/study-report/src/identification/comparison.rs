@@ -1,24 +1,19 @@
 //! What `study identify` prints of a comparison of methods.
 
 use super::printed::{Printed, align, short_name};
-use super::{Results, args::NamedPath};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use study_haptics::identify::compare::{Candidate, Comparison};
+use study_haptics::identify::identification::Identification;
 
 /// One table and one sentence.
-pub(super) fn table(results: &Results<'_>, comparison: &Comparison) -> String {
+pub(super) fn table(results: &Identification, comparison: &Comparison) -> String {
     let p = Printed::of(results);
     let (x, f) = (p.x(), p.f());
-    let named: Vec<&NamedPath> = results.recordings.iter().map(|(named, _)| *named).collect();
     let mut heads: Vec<String> = ["", "method"].map(String::from).into();
     heads.extend([format!("dx {x}"), format!("delta {x}")]);
     heads.extend(["VAF left out".into(), format!("residual {f}")]);
-    heads.extend(
-        named
-            .iter()
-            .map(|named| format!("VAF {}", short_name(named))),
-    );
+    heads.extend((results.recordings.iter()).map(|source| format!("VAF {}", short_name(source))));
     heads.push("passive".into());
     let mut rows = vec![heads];
     for (i, candidate) in comparison.candidates.iter().enumerate() {
@@ -57,8 +52,8 @@ pub(super) fn table(results: &Results<'_>, comparison: &Comparison) -> String {
             let _ = writeln!(out, "{} failed: {failure}", candidate.cell.method.as_str());
         }
     }
-    if let Some(why) = &comparison.not_tried {
-        let _ = writeln!(out, "mechanism not tried: {why}");
+    for (name, why) in &comparison.not_tried {
+        let _ = writeln!(out, "{name} not tried: {why}");
     }
     let _ = writeln!(out, "\n{}", sentence(p, comparison));
     out
@@ -107,11 +102,15 @@ pub(super) fn json(comparison: &Comparison) -> Value {
         })
     };
     let candidates: Vec<Value> = comparison.candidates.iter().map(candidate).collect();
-    json!({
+    let mut document = json!({
         "candidates": candidates,
         "recommended": comparison.recommended,
-        "mechanism_not_tried": comparison.not_tried,
+        "mechanism_not_tried": null,
         "noise_n": comparison.noise_n,
         "whole_strokes": comparison.whole_strokes,
-    })
+    });
+    for (name, why) in &comparison.not_tried {
+        document[format!("{name}_not_tried")] = json!(why);
+    }
+    document
 }

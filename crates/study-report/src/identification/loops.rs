@@ -1,10 +1,10 @@
 //! What `study identify` says of force curves: how much repetitions differ, and how well the
 //! realization plays their force.
 
-use super::Results;
 use super::printed::{Printed, align};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
+use study_haptics::identify::identification::Identification;
 use study_haptics::identify::repetition::{BINS, Curve, Loops, WITHIN};
 use study_haptics::recording::Recording;
 
@@ -21,8 +21,8 @@ struct Found {
     played: Option<Curve>,
 }
 
-fn find(results: &Results<'_>) -> Option<Found> {
-    let training: Vec<&Recording> = results.training.iter().map(|(_, r)| r).collect();
+fn find(results: &Identification) -> Option<Found> {
+    let training: Vec<&Recording> = results.training.iter().map(|s| &s.recording).collect();
     let loops = Loops::of(&training)?;
     let (measured, difference) = loops.mean(loops.within_mm)?;
     let best = results.best.map(|best| &results.cells[best].realization);
@@ -49,7 +49,7 @@ fn ceiling(measured: &Curve, difference: &Curve) -> f64 {
 }
 
 /// As text; empty if no training recording is a force curve.
-pub(super) fn text(results: &Results<'_>) -> String {
+pub(super) fn text(results: &Identification) -> String {
     let Some(found) = find(results) else {
         return String::new();
     };
@@ -97,7 +97,7 @@ pub(super) fn text(results: &Results<'_>) -> String {
 }
 
 /// The same for `--json`; null if no training recording is a force curve.
-pub(super) fn json(results: &Results<'_>) -> Value {
+pub(super) fn json(results: &Identification) -> Value {
     let Some(found) = find(results) else {
         return Value::Null;
     };
