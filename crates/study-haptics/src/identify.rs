@@ -31,6 +31,7 @@ pub mod coverage;
 pub mod delivery;
 mod direction_state;
 pub mod evidence;
+mod features;
 pub mod folds;
 pub mod grid;
 pub mod identification;
@@ -47,23 +48,23 @@ pub mod validation;
 
 method::estimators! {
     /// Mass, damping and friction that do not depend on the position.
-    friction: Friction(friction::Friction),
+    friction: Friction(Friction),
     /// The hat table with one mass and bounds that make it passive.
-    passive: Passive(passive::Passive),
+    passive: Passive(Passive),
     /// Baseline: mean force by position and direction.
-    static_profile: Static(static_profile::Static),
+    static_profile: Static(Static),
     /// The paper's method: exponentially weighted least squares along x.
-    ewls: Ewls(ewls::Ewls),
+    ewls: Ewls(Ewls),
     /// All nodes at once, by penalized least squares, with a direction state.
-    hat: Hat(hat::Hat),
+    hat: Hat(Hat),
     /// A virtual mechanism, by the simulation error of the force.
     mechanism: Mechanism(mechanism::Options),
     /// Least squares around each node, with weights that decrease to both sides.
-    two_sided: TwoSided(two_sided::TwoSided),
+    two_sided: TwoSided(TwoSided),
     /// Baseline: force by direction, piecewise linear between few nodes.
-    segments: Segments(segments::Segments),
+    segments: Segments(Segments),
     /// Baseline: one straight line.
-    spring: Spring(spring::Spring),
+    spring: Spring(Spring),
 }
 
 pub use ewls::{Estimates, Ewls};

@@ -7,9 +7,11 @@
 //! with the least residual is recommended, or one before it in the list whose residual is hardly larger.
 
 use super::folds::{FOLDS, Folds, LeftOut};
+use super::friction::Friction;
 use super::grid::{self, Cell, Plan};
 use super::method::{Candidacy, Claim, Delta, Progress, Setting, State, Terms};
 use super::passive::Passive;
+use super::vaf::{self, Score};
 use super::{ESTIMATORS, IdentifyError, Method, Training, direction_state, evidence};
 use crate::model::Realization;
 use crate::recording::Recording;
@@ -21,6 +23,8 @@ const DX: [f64; 8] = [2.0, 1.0, 0.5, 0.25, 0.1, 0.05, 0.025, 0.01];
 /// A residual that exceeds another one by at most this share is hardly larger: of a candidate, and
 /// of an increment.
 const HARDLY: f64 = 0.05;
+/// A residual that is this many times another one is far from it.
+pub const FAR: f64 = 2.0;
 /// Samples that are enough to choose an increment; of more, every so many-th is used.
 const ENOUGH: usize = 100_000;
 /// Samples per node, at least, on average and in each direction.
@@ -43,6 +47,7 @@ impl Candidate {
         match self.left_out {
             None => Some(Failure::Undetermined),
             Some(LeftOut { vaf, .. }) if vaf < 0.0 => Some(Failure::Constant),
+            _ if self.cell.scores.iter().any(|score| score.vaf < 0.0) => Some(Failure::Constant),
             _ if !self.cell.certificate.passes() => Some(Failure::Certificate),
             _ => None,
         }
@@ -91,6 +96,17 @@ pub struct Comparison {
 }
 
 impl Comparison {
+    /// The best candidate that does not fail, and how many times its residual that of this one
+    /// is, where it is [`FAR`] times or more.
+    pub fn beaten(&self, candidate: &Candidate) -> Option<(&Candidate, f64)> {
+        let rms_n = |c: &Candidate| c.left_out.map_or(f64::INFINITY, |l| l.rms_n);
+        let best = (self.candidates.iter())
+            .filter(|other| other.failure().is_none())
+            .min_by(|a, b| rms_n(a).total_cmp(&rms_n(b)))?;
+        let ratio = rms_n(candidate) / rms_n(best);
+        (ratio >= FAR && ratio.is_finite()).then_some((best, ratio))
+    }
+
     /// The recommended candidate, or the one of least residual if all fail.
     pub fn best(&self) -> Option<&Candidate> {
         let residual = |c: &Candidate| c.left_out.map_or(f64::INFINITY, |l| l.rms_n);
@@ -148,6 +164,36 @@ pub fn run(
         noise_n: evidence::white_noise_n(&training.recordings),
         whole_strokes: folds.whole_strokes,
     })
+}
+
+/// A simple estimator whose residual on the recordings is [`FAR`] times less than that of a
+/// realization which was asked for, or less, and how many times.
+pub fn beaten_by(
+    training: &Training<'_>,
+    cell: &Cell,
+    lookup: Lookup,
+    recordings: &[&Recording],
+) -> Option<(Method, f64)> {
+    let square = |scores: &[Score]| -> f64 {
+        let each = scores
+            .iter()
+            .map(|s| s.residual_n.powi(2) + s.bias_n.powi(2));
+        each.sum()
+    };
+    let scale_mm = training.recordings[0].scale_mm();
+    let dx_mm = (cell.realization.provenance.dx_mm).unwrap_or(0.5 * scale_mm);
+    let simple: [Method; 2] = [Friction::default().into(), Passive::default().into()];
+    (simple.into_iter())
+        .filter(|method| method.name() != cell.method.name())
+        .filter_map(|method| {
+            let found = training.identify(method, dx_mm, lookup).ok()?;
+            let scores: Vec<Score> = (recordings.iter())
+                .map(|recording| vaf::score(&found.realization, recording))
+                .collect();
+            Some((method, (square(&cell.scores) / square(&scores)).sqrt()))
+        })
+        .filter(|(_, ratio)| *ratio >= FAR)
+        .max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// One realization from everything.

@@ -24,9 +24,9 @@
 use super::constrained;
 use super::lanes::recursion::{Run, Sums};
 use super::method::{Candidacy, Declared, Estimator, Opt, Options, Setting, Sort, Start, Terms};
+use super::problem::START_UP_SAMPLES;
 use super::resample::{self, Resample, Resampled};
 use super::samples::{Samples, Theta, initial_covariance};
-use super::problem::START_UP_SAMPLES;
 use super::{Cause, Identified, IdentifyError, Training, Trials, Warning, method};
 use crate::model::Provenance;
 use std::fmt;
@@ -118,13 +118,7 @@ impl Declared for Ewls {
         ),
         ("constrained", "The paper's method with m, b >= 0"),
     ];
-    const OPTIONS: &'static [Opt] = &[
-        Opt::Lambda,
-        Opt::Dx,
-        Opt::Start,
-        Opt::Terms,
-        Opt::Stiffness,
-    ];
+    const OPTIONS: &'static [Opt] = &[Opt::Lambda, Opt::Dx, Opt::Start, Opt::Terms, Opt::Stiffness];
 
     fn asked(name: &str, options: &Options) -> Vec<Self> {
         options.each_lambda(|lambda| Self {

@@ -7,6 +7,7 @@
 
 use super::coverage;
 use super::compare::{self, Candidate, Comparison, Failure};
+use super::features;
 use super::grid::{self, Cell};
 use super::method::{Claim, Options, Progress};
 use super::plan::OptionError;
@@ -396,6 +397,26 @@ pub fn run(
             validation::validate(realization, recording, &detents)
         })
         .collect();
+    if request.options.method.is_some()
+        && let Some(cell) = best.map(|best| &cells[best])
+        && cell.method.claim() == Claim::Passive
+        && !scored.is_empty()
+    {
+        let training = Training::of(&trained)
+            .map_err(|error| IdentificationError::Estimator(training[0].path.clone(), error))?;
+        let beaten = compare::beaten_by(&training, cell, request.lookup, &scored);
+        if let Some((method, ratio)) = beaten {
+            say(format!(
+                "warning: the residual of {} is {ratio:.1} times that of {}: without --method the methods are compared",
+                cell.method.as_str(),
+                method.as_str(),
+            ));
+        }
+    }
+    let narrow = best.and_then(|best| features::narrower(&trained, &cells[best].realization));
+    if let Some((warning, best)) = narrow.zip(best) {
+        cells[best].warnings.push(warning);
+    }
     let mut found = Identification {
         training,
         recordings,

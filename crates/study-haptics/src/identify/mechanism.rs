@@ -8,6 +8,7 @@
 //! Every parameter is bounded so that the mechanism is passive
 //! ([`study_wire::mechanism`]).
 
+mod decision;
 mod estimator;
 mod levenberg;
 mod objective;
@@ -24,11 +25,14 @@ use super::signal::{LowPass, SignalError, sampling_interval_s};
 use super::{IdentifyError, Training, Warning};
 use crate::model::Mechanism;
 use crate::recording::Recording;
+pub use decision::Decision;
+use decision::Part;
 pub use estimator::Mechanism as Options;
 use levenberg::Fit;
 use objective::Compared;
 pub use objective::Filter;
 use rayon::prelude::*;
+use sensitivity::{STRIBECK, STRIBECK_MM_S};
 use study_wire::mechanism::{MechanismView, SCALARS, State};
 use study_wire::predict::Motion;
 
@@ -50,6 +54,8 @@ const UNSURE: f64 = 0.5;
 const ITERATIONS: [usize; 2] = [12, 40];
 /// The same when a fit is repeated on a part of the recordings.
 const REFITTED: usize = 8;
+/// An rms error that is larger by this factor at most is as good, with fewer parameters.
+const AS_GOOD: f64 = 1.002;
 
 /// Options of the identification.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -84,9 +90,11 @@ pub struct Fitted {
     /// [`Scalars::to_array`](study_wire::mechanism::Scalars::to_array); `None` at a bound or
     /// where the recordings do not determine it.
     pub standard_errors: [Option<f64>; SCALARS],
-    /// The low-pass of the comparison. Where the recorded force has probably passed one
-    /// already, the one of [`CORNERS_HZ`] whose prediction has the least error.
+    /// The low-pass of the comparison. Where the recorded force has passed one already, the one
+    /// of the headers, or that of [`CORNERS_HZ`] whose prediction has the least error.
     pub filter: Filter,
+    /// How the low-pass was decided; `None` if it was given.
+    pub decision: Option<Decision>,
     /// All starts.
     pub attempts: Vec<Attempt>,
     /// Steps of the fit that is reported.
@@ -213,35 +221,61 @@ pub fn identify(
     let mut order: Vec<usize> = (0..starts.len()).collect();
     order.sort_by(|a, b| attempts[*a].compared_n.total_cmp(&attempts[*b].compared_n));
     let best = begun[order[0]].as_ref().ok_or(IdentifyError::NoMechanism)?;
-    let filter = match known {
-        Some(known) => known,
+    let (filter, decision) = match known {
+        Some(known) => (known, None),
         None => {
-            let view = best.mechanism.view();
-            let forces: Vec<_> = part.iter().map(|c| c.predict(&view, STARTED_HZ)).collect();
-            let tried = (CORNERS_HZ.into_iter().map(Filter::Recorded))
-                .chain([Filter::Both(CORNER_HZ)])
-                .filter_map(|filter| {
-                    // a corner above half the rate is none
-                    let part = compared(filter, share).ok()?;
-                    let squares = part.iter().zip(&forces).map(|(c, f)| c.square(f));
-                    let (square, n) = squares.fold((0.0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
-                    Some((filter, square / n as f64))
-                });
-            let best = tried.min_by(|a, b| a.1.total_cmp(&b.1));
-            best.ok_or(IdentifyError::NoMechanism)?.0
+            let part = Part {
+                recordings,
+                share,
+                top_mm_s,
+            };
+            let decided = part.decide(&best.mechanism);
+            let (filter, decision) = decided.ok_or(IdentifyError::NoMechanism)?;
+            (filter, Some(decision))
         }
     };
     let whole = compared(filter, 2.0)?;
-    let fitted: Vec<(usize, Fit)> = order[..2.min(order.len())]
-        .par_iter()
-        .filter_map(|i| {
-            let begun = &begun[*i].as_ref()?.mechanism;
-            let from = reach::held(begun, &reach::of(begun, recordings, None));
-            let mut fit = fit(&from, &whole, PREDICTED_HZ, ITERATIONS[1])?;
-            fit.mechanism = reach::bridged(fit.mechanism, &reach::of(&from, recordings, None));
-            Some((*i, fit))
-        })
-        .collect();
+    // from where a start came to in the comparison, with these scalars set
+    let continued = |which: &[usize], set: [bool; SCALARS]| -> Vec<(usize, Fit)> {
+        (which.par_iter())
+            .filter_map(|i| {
+                let mut begun = begun[*i].as_ref()?.mechanism.clone();
+                if set[STRIBECK] {
+                    begun.scalars.stribeck = 0.0;
+                }
+                if set[STRIBECK_MM_S] {
+                    begun.scalars.stribeck_mm_s = starts[*i].scalars.stribeck_mm_s;
+                }
+                let from = reach::held(&begun, &reach::of(&begun, recordings, None));
+                let mut fit = levenberg::fit_with(
+                    &from,
+                    &set,
+                    &whole,
+                    PREDICTED_HZ,
+                    ITERATIONS[1],
+                    top_mm_s,
+                    &step,
+                )?;
+                fit.mechanism = reach::bridged(fit.mechanism, &reach::of(&from, recordings, None));
+                Some((*i, fit))
+            })
+            .collect()
+    };
+    let least = |fits: &[(usize, Fit)]| {
+        (fits.iter())
+            .min_by(|a, b| a.1.rms_n.total_cmp(&b.1.rms_n))
+            .map(|(_, fit)| fit.clone())
+    };
+    let mut fitted = continued(&order[..2.min(order.len())], [false; SCALARS]);
+    // what is not determined spoils the others: it is set, and every start is continued
+    if let Some(best) = least(&fitted)
+        && let Some(set) = best.hopeless()
+    {
+        let again = continued(&order, set);
+        if least(&again).is_some_and(|fit| fit.rms_n <= AS_GOOD * best.rms_n) {
+            fitted = again;
+        }
+    }
     for (i, fit) in &fitted {
         attempts[*i].fitted_n = Some(fit.rms_n);
     }
@@ -251,6 +285,7 @@ pub fn identify(
     Ok(Fitted {
         reach_mm: reach::of(&best.mechanism, recordings, None).range_mm,
         filter,
+        decision,
         standard_errors: best.standard_errors,
         mechanism: Mechanism {
             recorded_hz: match filter {

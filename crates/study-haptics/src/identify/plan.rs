@@ -146,7 +146,7 @@ mod tests {
     use super::*;
     use crate::identify::method::{Delta, Rule, Sort, Start, State, Terms, Window};
     use crate::identify::resample::Resample;
-    use crate::identify::{Ewls, Hat, Passive, Segments, TwoSided, Width};
+    use crate::identify::{Ewls, Hat, Segments, TwoSided, Width};
 
     #[test]
     fn a_displayed_method_has_every_option_that_is_not_the_default() {

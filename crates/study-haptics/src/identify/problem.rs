@@ -139,6 +139,11 @@ pub enum Warning {
     /// The recordings do not carry this term.
     #[error("{0}; --terms overrides this")]
     LeftOut(Evidence),
+    /// The force has features between the nodes.
+    #[error(
+        "{rms_n:.3} N rms of the force repeat at places closer than 2 dx = {} mm, which nodes at this distance cannot follow: choose a smaller dx", 2.0 * .dx_mm
+    )]
+    Narrow { rms_n: f64, dx_mm: f64 },
     #[error("the stiffness of the spring is negative: {k_n_per_mm:.4} N/mm")]
     NegativeSpring { k_n_per_mm: f64 },
 }

@@ -38,7 +38,9 @@ impl Estimator for Segments {
             .map(|i| low + (high - low) * i as f64 / self.count as f64)
             .collect();
         if nodes.windows(2).any(|pair| pair[0] >= pair[1]) {
-            return Err(IdentifyError::NoOverlap(training.recordings[0].name.clone()));
+            return Err(IdentifyError::NoOverlap(
+                training.recordings[0].name.clone(),
+            ));
         }
         let penalty = Penalty {
             // only interpolates over segments without samples
@@ -72,10 +74,8 @@ impl Estimator for Segments {
 }
 
 impl Declared for Segments {
-    const NAMES: &'static [(&'static str, &'static str)] = &[(
-        "segments",
-        "Baseline: piecewise linear force by direction",
-    )];
+    const NAMES: &'static [(&'static str, &'static str)] =
+        &[("segments", "Baseline: piecewise linear force by direction")];
     const OPTIONS: &'static [Opt] = &[Opt::Segments];
 
     fn asked(_name: &str, options: &Options) -> Vec<Self> {

@@ -74,7 +74,8 @@ impl Estimator for TwoSided {
         };
         let positive = estimate(&training.positive, l_plus)?;
         let negative = estimate(&training.negative, l_minus)?;
-        let mut identified = training.table(nodes, positive, negative, Cause::FewSamples, setting.lookup);
+        let mut identified =
+            training.table(nodes, positive, negative, Cause::FewSamples, setting.lookup);
         identified.realization.provenance = Provenance {
             lambda: self.lambda(),
             memory_mm: Some(l_plus.min(l_minus)),
@@ -351,8 +352,8 @@ fn tricube(samples: &Samples, nodes: &[f64], reach_mm: f64) -> Vec<Sums> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::identify::ewls;
     use crate::identify::Ewls;
+    use crate::identify::ewls;
 
     /// Samples of a nonlinear force, 100 per mm.
     fn samples() -> Samples {

@@ -52,6 +52,17 @@ pub(super) fn table(results: &Identification, comparison: &Comparison) -> String
             let _ = writeln!(out, "{} failed: {failure}", candidate.cell.method.as_str());
         }
     }
+    for candidate in &comparison.candidates {
+        if candidate.failure().is_none()
+            && let Some((best, ratio)) = comparison.beaten(candidate)
+        {
+            let [name, best] = [candidate, best].map(|c| c.cell.method.as_str());
+            let _ = writeln!(
+                out,
+                "{name}: its residual is {ratio:.1} times that of {best}"
+            );
+        }
+    }
     for (name, why) in &comparison.not_tried {
         let _ = writeln!(out, "{name} not tried: {why}");
     }

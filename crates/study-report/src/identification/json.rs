@@ -168,6 +168,11 @@ fn mechanism(fitted: &Fitted) -> Value {
         "iterations": fitted.iterations,
         "recorded_force_low_passed": filtered,
         "corner_hz": corner_hz,
+        "low_pass_decision": fitted.decision.map(|decision| json!({
+            "by_header": decision.by_header,
+            "left_out_rms_n": decision.rms_n[0],
+            "left_out_rms_without_n": decision.rms_n[1],
+        })),
     })
 }
 

@@ -35,14 +35,24 @@ fn mechanism_in_detail(fitted: &Fitted) -> String {
         ]);
     }
     let mut out = align(&rows);
+    let decided = (fitted.decision).map_or(String::new(), |decision| {
+        let [through, without] = decision.rms_n;
+        let by = match decision.by_header {
+            true => "as the header says",
+            false => "as the errors say",
+        };
+        format!(
+            " ({by}: where the measured force was left out, its error is {through:.4} N rms with a low-pass and {without:.4} N without)"
+        )
+    });
     let _ = match fitted.filter {
         Filter::Recorded(hz) => writeln!(
             out,
-            "the recorded force passed a low-pass of about {hz} Hz; so does the predicted one"
+            "the recorded force passed a low-pass of about {hz} Hz; so does the predicted one{decided}"
         ),
         Filter::Both(hz) => writeln!(
             out,
-            "recorded force not filtered; fitted below {hz} Hz, predicted without a filter"
+            "recorded force not filtered; fitted below {hz} Hz, predicted without a filter{decided}"
         ),
     };
     let [low, high] = fitted.reach_mm;

@@ -1,9 +1,7 @@
 //! The mechanism as an estimator.
 
 use super::{Fitted, PREDICTED_HZ, Settings, identify, refitted};
-use crate::identify::method::{
-    self, Candidacy, Claim, Declared, Estimator, Opt, Options, Setting,
-};
+use crate::identify::method::{self, Candidacy, Claim, Declared, Estimator, Opt, Options, Setting};
 use crate::identify::{Identified, IdentifyError, Training, Trials};
 use crate::model::{self, Provenance, Realization, Trained};
 use std::collections::BTreeMap;
@@ -35,7 +33,13 @@ impl Mechanism {
             x_mm: training.range_mm,
             v_mm_s: training.top_speed_mm_s,
         };
-        Realization::of_mechanism(String::new(), provenance, BTreeMap::new(), trained, mechanism)
+        Realization::of_mechanism(
+            String::new(),
+            provenance,
+            BTreeMap::new(),
+            trained,
+            mechanism,
+        )
     }
 }
 
@@ -117,13 +121,16 @@ impl Declared for Mechanism {
         }
         let training = trials.training();
         let [low, high] = training.range_mm;
-        let dx_mm = 0.5 * training.recordings[0].scale_mm();
+        let default_mm = 0.5 * training.recordings[0].scale_mm();
+        // where a table needs much closer nodes, so does the mechanism
+        let dx_mm = match trials.table()? {
+            (_, table_mm) if table_mm <= 0.5 * default_mm => table_mm,
+            _ => default_mm,
+        };
         let seconds: f64 = training.recordings.iter().map(|r| r.duration_s()).sum();
         let work = seconds * PREDICTED_HZ * ((high - low) / dx_mm);
         Ok(match work > MOST_WORK {
-            true => {
-                Candidacy::NotTried("it would take minutes: --method mechanism".to_owned())
-            }
+            true => Candidacy::NotTried("it would take minutes: --method mechanism".to_owned()),
             false => Candidacy::With(Self::default().into(), dx_mm),
         })
     }

@@ -7,6 +7,7 @@
 
 use super::super::banded::{Banded, Bound};
 use super::objective::{Compared, Sum};
+use super::sensitivity::{STRIBECK, STRIBECK_MM_S};
 use super::{Layout, sensitivity};
 use crate::model::{Mechanism, Profile};
 use study_wire::mechanism::{SCALARS, SLOWEST_S, Scalars};
@@ -22,6 +23,8 @@ const SMALL: f64 = 2e-4;
 const SMALL_STEPS: usize = 3;
 /// Standard errors of fewer stretches than this are not worth printing.
 const LEAST_STRETCHES: f64 = 10.0;
+/// A standard error this many times a value leaves nothing of it.
+const HOPELESS: f64 = 3.0;
 /// λ at the start and beyond which no step helps.
 const LAMBDA: [f64; 2] = [1e-2, 1e8];
 
@@ -33,6 +36,22 @@ pub(super) struct Fit {
     pub(super) rms_n: f64,
     pub(super) iterations: usize,
     pub(super) standard_errors: [Option<f64>; SCALARS],
+}
+
+impl Fit {
+    /// The scalars that the recordings leave so uncertain that they only take part in what others
+    /// determine: those of the friction's dependence on the speed, if their standard errors are
+    /// many times their values.
+    pub(super) fn hopeless(&self) -> Option<[bool; SCALARS]> {
+        let values = self.mechanism.scalars.to_array();
+        let hopeless =
+            |i: usize| self.standard_errors[i].is_some_and(|error| error > HOPELESS * values[i]);
+        let mut set = [false; SCALARS];
+        set[STRIBECK] = hopeless(STRIBECK);
+        // the speed is that of the excess, and nothing without it
+        set[STRIBECK_MM_S] = set[STRIBECK] || hopeless(STRIBECK_MM_S);
+        set[STRIBECK_MM_S].then_some(set)
+    }
 }
 
 /// The parameters as one list.
@@ -56,6 +75,21 @@ fn unpack(parameters: &[f64], like: &Mechanism) -> Mechanism {
         detent: profile(detent, &like.detent),
         friction: profile(friction, &like.friction),
         recorded_hz: like.recorded_hz,
+    }
+}
+
+impl Sum {
+    /// As if nothing were known about the scalars that are `set`, so that they stay.
+    fn forget(&mut self, set: &[bool; SCALARS]) {
+        let all = self.gradient.len();
+        for i in (0..SCALARS).filter(|i| set[*i]) {
+            self.gradient[i] = 0.0;
+            self.scores.iter_mut().for_each(|score| score[i] = 0.0);
+            for j in 0..all {
+                self.normal[i * all + j] = 0.0;
+                self.normal[j * all + i] = 0.0;
+            }
+        }
     }
 }
 
@@ -113,6 +147,20 @@ pub(super) fn fit(
     top_mm_s: f64,
     step_done: &(impl Fn() + Sync),
 ) -> Option<Fit> {
+    let set = [false; SCALARS];
+    fit_with(from, &set, on, hz, iterations, top_mm_s, step_done)
+}
+
+/// The same; scalars that are `set` keep their values.
+pub(super) fn fit_with(
+    from: &Mechanism,
+    set: &[bool; SCALARS],
+    on: &[Compared<'_>],
+    hz: f64,
+    iterations: usize,
+    top_mm_s: f64,
+    step_done: &(impl Fn() + Sync),
+) -> Option<Fit> {
     let layout = Layout {
         detents: from.detent.n.len(),
         frictions: from.friction.n.len(),
@@ -141,6 +189,7 @@ pub(super) fn fit(
             sum.add(&other);
         }
         let data = (sum.square, sum.errors);
+        sum.forget(set);
         add_ridges(&mut sum, &pack(mechanism), layout);
         sum.square.is_finite().then_some((sum, data))
     };

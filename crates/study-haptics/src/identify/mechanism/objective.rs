@@ -47,6 +47,8 @@ pub(super) struct Compared<'r> {
     low_pass: LowPass,
     /// The measured force, averaged and low-passed, N.
     force_n: Vec<f64>,
+    /// The measured force, averaged, N; `None` if it is `force_n`.
+    measured_n: Option<Vec<f64>>,
     /// The averaged samples that count, and how far apart they are.
     rows: Vec<usize>,
     stride: usize,
@@ -83,9 +85,9 @@ impl<'r> Compared<'r> {
         let rate_hz = 1.0 / interval_s / block as f64;
         let low_pass = LowPass::new(corner_hz, rate_hz)?;
         let force_n = averaged(&recording.f_n[..samples], block);
-        let force_n = match filter {
-            Filter::Both(_) => low_pass.zero_phase(&force_n),
-            Filter::Recorded(_) => force_n,
+        let (force_n, measured_n) = match filter {
+            Filter::Both(_) => (low_pass.zero_phase(&force_n), Some(force_n)),
+            Filter::Recorded(_) => (force_n, None),
         };
         let stride = ((rate_hz / corner_hz / PER_PERIOD) as usize).max(1);
         Ok(Self {
@@ -95,6 +97,7 @@ impl<'r> Compared<'r> {
             block,
             low_pass,
             force_n,
+            measured_n,
             rows: ((SETTLING_S * rate_hz) as usize..samples / block)
                 .step_by(stride)
                 .collect(),
@@ -132,6 +135,21 @@ impl<'r> Compared<'r> {
     pub(super) fn square(&self, predicted_n: &[f64]) -> (f64, usize) {
         let low = self.low_pass.zero_phase(predicted_n);
         let errors = self.errors(&low);
+        errors.fold((0.0, 0), |(square, n), e| (square + e * e, n + 1))
+    }
+
+    /// The squared error of what the mechanism predicts of the force as it was measured, at the
+    /// samples that count, and their number.
+    pub(super) fn square_of_measured(
+        &self,
+        mechanism: &MechanismView<'_>,
+        least_hz: f64,
+    ) -> (f64, usize) {
+        let predicted = self.predict(mechanism, least_hz);
+        let Some(measured_n) = &self.measured_n else {
+            return self.square(&predicted);
+        };
+        let errors = self.rows.iter().map(|i| predicted[*i] - measured_n[*i]);
         errors.fold((0.0, 0), |(square, n), e| (square + e * e, n + 1))
     }
 

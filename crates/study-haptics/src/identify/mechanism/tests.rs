@@ -2,7 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that fails says where")]
 
+use super::decision::Part;
 use super::objective::Compared;
+use super::sensitivity::{STRIBECK, STRIBECK_MM_S};
 use super::{Filter, Fitted, PARAMETERS, levenberg, predict, reach};
 use crate::identify::Warning;
 use crate::identify::signal::LowPass;
@@ -159,6 +161,7 @@ fn what_the_recordings_do_not_determine_is_told() {
             mechanism: truth(),
             standard_errors,
             filter: Filter::Recorded(CORNER_HZ),
+            decision: None,
             attempts: Vec::new(),
             iterations: 1,
             reach_mm: [-7.0, 7.0],
@@ -175,4 +178,63 @@ fn what_the_recordings_do_not_determine_is_told() {
             name => assert_eq!(warned(i), [name]),
         }
     }
+}
+
+/// Of one plant, with its force through a low-pass and without: the fit that predicts the measured
+/// force better where it was left out decides, unless the header says it.
+#[test]
+fn a_low_pass_of_the_force_is_found_or_stated_by_the_header() {
+    let clean = recording();
+    let filtered = noisy(&clean, 1);
+    let f_n = predict(&truth().view(), &clean, clean.len(), STEPS_HZ);
+    let plain = noisy(&Recording { f_n, ..clean }, 1);
+    let decided = |recording: &Recording, filter: &str| {
+        let recording = Recording {
+            header: vec![format!("filter: {filter}")],
+            ..recording.clone()
+        };
+        let part = Part {
+            recordings: &[&recording],
+            share: 0.5,
+            top_mm_s: 100.0,
+        };
+        part.decide(&truth()).unwrap()
+    };
+    let (filter, decision) = decided(&filtered, "");
+    assert_eq!(filter, Filter::Recorded(CORNER_HZ), "{decision:?}");
+    assert!(!decision.by_header && decision.rms_n[0] < decision.rms_n[1]);
+    let (filter, decision) = decided(&plain, "unknown");
+    assert!(matches!(filter, Filter::Both(_)), "{decision:?}");
+    assert!(!decision.by_header && decision.rms_n[1] < decision.rms_n[0]);
+    // the header is believed; the errors of both say what it costs
+    let (filter, decision) = decided(&filtered, "none");
+    assert!(matches!(filter, Filter::Both(_)));
+    assert!(decision.by_header && decision.rms_n[0] < decision.rms_n[1]);
+    let (filter, _) = decided(&filtered, "Butterworth at 40 Hz; both ways");
+    assert_eq!(filter, Filter::Recorded(40.0));
+}
+
+/// What is set is not fitted: it stays, has no standard error, and leaves the others theirs.
+#[test]
+fn a_scalar_that_is_set_stays() {
+    let recording = noisy(&recording(), 3);
+    let on = [Compared::new(&recording, Filter::Recorded(CORNER_HZ), 7.0).unwrap()];
+    let mut set = [false; SCALARS];
+    set[STRIBECK] = true;
+    set[STRIBECK_MM_S] = true;
+    let mut from = truth();
+    from.scalars.gap_mm *= 1.1;
+    let fit = levenberg::fit_with(&from, &set, &on, STEPS_HZ, 6, 100.0, &|| ()).unwrap();
+    let (before, after) = (from.scalars.to_array(), fit.mechanism.scalars.to_array());
+    for i in 0..SCALARS {
+        assert_eq!(before[i] == after[i], set[i], "{}", PARAMETERS[i].0);
+        assert_eq!(
+            fit.standard_errors[i].is_none(),
+            set[i],
+            "{}",
+            PARAMETERS[i].0
+        );
+    }
+    assert!((fit.mechanism.scalars.gap_mm - truth().scalars.gap_mm).abs() < 0.02);
+    assert_eq!(fit.hopeless(), None);
 }

@@ -21,6 +21,27 @@ pub fn description(corner_hz: f64) -> String {
     format!("zero-phase low-pass, Butterworth of 2nd order both ways, at {corner_hz} Hz")
 }
 
+/// The corner of the filter that a header describes, Hz: the number before the last "Hz".
+/// `Some(None)` if it says that there was none; `None` if it says nothing that can be read.
+///
+/// ```
+/// use study_haptics::identify::signal::filter::{description, stated_hz};
+/// assert_eq!(stated_hz(&description(30.0)), Some(Some(30.0)));
+/// assert_eq!(stated_hz("none; as measured"), Some(None));
+/// assert_eq!(stated_hz("moving average over 5 ms"), None);
+/// ```
+pub fn stated_hz(description: &str) -> Option<Option<f64>> {
+    let text = description.trim();
+    if text.starts_with("none") {
+        return Some(None);
+    }
+    let before = text[..text.rfind("Hz")?].trim_end();
+    let number = |c: char| c.is_ascii_digit() || c == '.';
+    let digits = before.rsplit(|c| !number(c)).next()?;
+    let hz: f64 = digits.parse().ok()?;
+    (hz > 0.0).then_some(Some(hz))
+}
+
 /// A zero-phase low-pass filter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LowPass {
