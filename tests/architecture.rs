@@ -68,12 +68,12 @@ device: outcome model plant wire
 rater: protocol model plant wire
 rehearsal: analyze device load protocol rater runner store
 runner: session device store identify outcome protocol rendering model rater safe_play wire
-report: archive analyze stats identify load model outcome power preregister procedure protocol recording store study
+report: archive analyze stats identify load model outcome power preregister procedure protocol recording safe_play store study wire
 tui: runner page session outcome protocol
 plain: runner page session outcome protocol tui
 screen: runner page session protocol
 front: runner page session protocol
-cli: analyze archive check device export front identify load model outcome plain plant power procedure protocol rater recording rehearsal rendering report runner safe_play schedule screen session stats store study trajectory tui wire
+cli: analyze archive check device export front identify load model outcome plain plant power procedure protocol rater recording rehearsal rendering report runner schedule screen session stats store study trajectory tui wire
 main: cli
 certificate: predict
 predict: real

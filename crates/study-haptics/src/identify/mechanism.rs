@@ -19,10 +19,9 @@ mod start;
 mod tests;
 
 use super::method::Progress;
-use super::problem::Estimate;
 use super::samples::weight_of;
 use super::signal::{LowPass, SignalError, sampling_interval_s};
-use super::{IdentifyError, Training, Warning};
+use super::{Estimate, IdentifyError, Training, Warning};
 use crate::model::Mechanism;
 use crate::recording::Recording;
 pub use decision::Decision;

@@ -2,8 +2,7 @@
 //! and of the share of the mass before it.
 
 use crate::identify::method::Terms;
-use crate::identify::passive::Passive;
-use crate::identify::{IdentifyError, Training};
+use crate::identify::{IdentifyError, Passive, Training};
 use crate::model::{Mechanism, Profile};
 use study_wire::mechanism::Scalars;
 use study_wire::predict::Lookup;
