@@ -268,7 +268,7 @@ fn bad_arguments_and_bad_recordings_give_one_clear_error_each() {
         "--method",
         "magic",
         2,
-        "possible values: ewls, constrained, two-sided, hat, passive, mechanism, friction, static, segments, spring",
+        "possible values: friction, passive, static, ewls, constrained, hat, mechanism, two-sided, segments, spring",
     );
     refused(&[TRAINING, "--method", "ewls"], 2, "--validate");
     refused(&[TRAINING, "--validate", "absent.csv"], 1, "absent.csv: ");
@@ -295,6 +295,8 @@ fn each_figure_comes_in_four_files() {
         .assert()
         .success();
     for figure in [
+        "force-displacement",
+        "coverage",
         "fig4-vaf",
         "fig5-parameters",
         "fig6-force",
@@ -307,5 +309,7 @@ fn each_figure_comes_in_four_files() {
         assert!(read("pdf").starts_with(b"%PDF-"), "{figure}");
         assert!(read("csv").iter().filter(|b| **b == b'\n').count() > 4);
     }
-    assert_eq!(fs::read_dir(&out).unwrap().count(), 20);
+    // and a page with all of them
+    assert!(out.join("identification.html").exists());
+    assert_eq!(fs::read_dir(&out).unwrap().count(), 29);
 }

@@ -23,6 +23,8 @@ const DX: [f64; 8] = [2.0, 1.0, 0.5, 0.25, 0.1, 0.05, 0.025, 0.01];
 /// A residual that exceeds another one by at most this share is hardly larger: of a candidate, and
 /// of an increment.
 const HARDLY: f64 = 0.05;
+/// Increments in a row that may be tried in vain.
+const PATIENCE: usize = 3;
 /// A residual that is this many times another one is far from it.
 pub const FAR: f64 = 2.0;
 /// Samples that are enough to choose an increment; of more, every so many-th is used.
@@ -297,15 +299,21 @@ impl<'t, 'r> Trials<'t, 'r> {
     }
 
     /// The increment of least residual, or a longer one whose residual is hardly larger. Shorter
-    /// ones are tried while the residual falls.
+    /// ones are tried until [`PATIENCE`] in a row have not reduced it: nodes as far apart as the
+    /// detents of a knob say nothing of nodes that follow them.
     pub(super) fn best_dx(&self, method: Method) -> f64 {
         let mut tried: Vec<(f64, f64)> = Vec::new();
+        let mut in_vain = 0;
         let least = |tried: &[(f64, f64)]| tried.iter().map(|t| t.1).fold(f64::INFINITY, f64::min);
         for dx_mm in &self.dx_mm {
             let rms_n = self.rms_n(method, *dx_mm);
             let falls = rms_n < least(&tried);
             tried.push((*dx_mm, rms_n));
-            if !falls && rms_n.is_finite() {
+            in_vain = match falls || rms_n.is_infinite() {
+                true => 0,
+                false => in_vain + 1,
+            };
+            if in_vain == PATIENCE {
                 break;
             }
         }

@@ -5,8 +5,8 @@
 //! [`Source::read`] reads a recording, [`run`] identifies, [`Identification::model_files`] has the
 //! files. What is remarkable on the way is handed to `say`, a sentence at a time.
 
-use super::coverage;
 use super::compare::{self, Candidate, Comparison, Failure};
+use super::coverage;
 use super::features;
 use super::grid::{self, Cell};
 use super::method::{Claim, Options, Progress};
