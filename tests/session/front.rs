@@ -173,6 +173,8 @@ fn a_command_that_is_no_front_is_refused_before_the_session() {
 /// A front whose lines the test writes and reads.
 struct Relay {
     folder: PathBuf,
+    /// The numbers of its two programs, by which they are killed.
+    pids: String,
     input: BufReader<File>,
     output: File,
     schema: Value,
@@ -180,28 +182,37 @@ struct Relay {
     page: Value,
 }
 
-/// Two programs of the shell that pass lines on, and the numbers by which they are killed.
-const SCRIPT: &str = "cd $(dirname $0)\necho $$ > pids.new\ncat < out &\necho $! >> pids.new\nmv pids.new pids\nexec cat > in\n";
+/// Two programs of the shell that pass lines on. Each start has pipes of its own, so that one
+/// that ends takes no line of the next, however late the test turns to it.
+const SCRIPT: &str = "cd $(dirname $0)\nmkfifo in.$$ out.$$\ncat < out.$$ 2> /dev/null &\necho $$ $! > pids.new\nmv pids.new pids\nexec cat > in.$$\n";
 
 impl Relay {
     fn command(folder: &Path) -> String {
         fs::write(folder.join("front.sh"), SCRIPT).unwrap();
-        let made = Command::new("mkfifo")
-            .args([folder.join("in"), folder.join("out")])
-            .status();
-        assert!(made.unwrap().success());
         format!("sh {}", folder.join("front.sh").display())
     }
 
-    /// Takes the place of the front, once it is started.
-    fn open(folder: &Path) -> Self {
-        // First what only the new program opens: one that ends may still read the other.
-        let input = BufReader::new(File::open(folder.join("in")).unwrap());
-        let output = OpenOptions::new().write(true).open(folder.join("out"));
+    /// Takes the place of the front once another one than `before` is started.
+    fn open(folder: &Path, before: &str) -> Self {
+        let begin = Instant::now();
+        let pids = loop {
+            match fs::read_to_string(folder.join("pids")) {
+                Ok(pids) if pids != before => break pids,
+                _ => assert!(begin.elapsed() < PATIENCE, "no front is started"),
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        };
+        let own = pids.split(' ').next().unwrap();
+        let input = File::open(folder.join(format!("in.{own}"))).unwrap();
+        let output = OpenOptions::new()
+            .write(true)
+            .open(folder.join(format!("out.{own}")))
+            .unwrap();
         let mut relay = Self {
-            input,
-            output: output.unwrap(),
+            input: BufReader::new(input),
+            output,
             folder: folder.to_owned(),
+            pids,
             schema: schema(),
             replies: 0,
             page: Value::Null,
@@ -211,11 +222,9 @@ impl Relay {
         relay
     }
 
-    /// Opens it again after it was lost. What is left of the old one must be gone before.
+    /// Opens it again after it was lost.
     fn again(self) -> Self {
-        let folder = self.folder.clone();
-        drop(self);
-        Self::open(&folder)
+        Self::open(&self.folder, &self.pids)
     }
 
     fn writes(&mut self, line: &[u8]) {
@@ -298,9 +307,8 @@ impl Relay {
     }
 
     fn kill(&self) {
-        let pids = fs::read_to_string(self.folder.join("pids")).unwrap();
         let mut kill = Command::new("kill");
-        kill.arg("-9").args(pids.split_whitespace());
+        kill.arg("-9").args(self.pids.split_whitespace());
         assert!(kill.status().unwrap().success());
     }
 }
@@ -335,7 +343,7 @@ fn patient() -> (TempDir, Session, Relay) {
     changed_protocol("turn-signal", &protocol, &[PATIENT, once]);
     let command = Relay::command(folder.path());
     let session = Session::start(folder.path(), &protocol, &command);
-    let relay = Relay::open(folder.path());
+    let relay = Relay::open(folder.path(), "");
     (folder, session, relay)
 }
 
