@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use study_analysis::analyze::{Analysis, Exclusion, Include, Rules, analyze};
 use study_base::text::{ModelId, ParticipantId, QuestionId};
 use study_plan::protocol::columns::UsedColumn;
-use study_plan::protocol::{Answer, DeviceKind, Role, Unfinished};
+use study_plan::protocol::{Answer, Role, Unfinished};
 use study_report::text::{Page, comments, page};
 use study_report::{Source, csv};
 use study_session::outcome::ratings::Ratings;
@@ -18,59 +18,19 @@ fn id(text: &str) -> QuestionId {
 }
 
 fn row(who: &str, model: &str, repetition: u32, rating: i64) -> RatingRow {
+    let participant = ParticipantId::new(who).unwrap();
+    let asked = (id("realism"), Answer::Rating(rating));
     RatingRow {
-        study: "example".to_owned(),
-        participant: ParticipantId::new(who).unwrap(),
-        session: 1,
         row: Some(1),
-        trial: 1,
         block: repetition,
-        position: Some(1),
-        planned_position: 1,
         model: Some(ModelId::new(model).unwrap()),
-        role: Role::Test,
         repetition,
-        previous_model: None,
-        practice: false,
-        pilot: false,
-        simulated: false,
-        device_kind: DeviceKind::Simulated,
-        device_id: "d".to_owned(),
-        operator: "lw".to_owned(),
-        tool_version: "0".to_owned(),
-        protocol_version: 1,
-        answers: BTreeMap::from([(id("realism"), Answer::Rating(rating))]),
-        corrected: false,
-        declined: false,
-        remarks: String::new(),
-        reference_s: None,
-        exploration_s: None,
-        response_s: None,
-        strokes: None,
-        least_energy_j: None,
-        switches_per_s: None,
-        clamp_count: None,
-        started_at: None,
-        rated_at: None,
-        attempt: Some(1),
-        status: Status::Ok,
         vaf: Some(match model {
             "A" => 0.7,
             "B" => 0.8,
             _ => 0.9,
         }),
-        covariates: BTreeMap::new(),
-        part: None,
-        track: None,
-        level: None,
-        correct: None,
-        replays: None,
-        fidelity: None,
-        host_late_ms: None,
-        input_channel: None,
-        front_name: None,
-        group: None,
-        session_id: None,
+        ..RatingRow::answered(participant, 1, 1, asked)
     }
 }
 

@@ -3,13 +3,12 @@
 
 use crate::analyze::psychophysics::{PartAnalysis, StudyData, parts};
 use crate::analyze::{Include, Rules};
-use std::collections::BTreeMap;
 use study_base::rng::Stream;
 use study_base::text::{ModelId, PartId, ParticipantId, QuestionId};
 use study_plan::protocol::parts::{Pairs, Part, Presentations, Task, TrackRules};
-use study_plan::protocol::{Answer, DeviceKind, GroupRules, ModelEntry, Protocol, Role, Scale};
+use study_plan::protocol::{Answer, GroupRules, ModelEntry, Protocol, Role, Scale};
 use study_session::outcome::ratings::{Ratings, Realization, Row, Subject};
-use study_session::outcome::{IntervalRow, RatingRow, Status};
+use study_session::outcome::{IntervalRow, RatingRow};
 
 /// More participants choose no other test.
 const ENOUGH: u32 = 1000;
@@ -320,55 +319,12 @@ impl Made<'_> {
         question: &QuestionId,
     ) -> &mut RatingRow {
         let trial = self.rows.len() as u32 + 1;
+        let asked = (question.clone(), answer);
         self.rows.push(RatingRow {
-            study: String::new(),
-            participant: who.participant.clone(),
-            session: who.session,
-            row: None,
-            trial,
-            block: 1,
-            position: Some(trial),
-            planned_position: trial,
-            model: None,
-            role: Role::Test,
-            repetition: 1,
-            previous_model: None,
-            practice: false,
-            pilot: false,
-            simulated: false,
-            device_kind: DeviceKind::Simulated,
-            device_id: String::new(),
-            operator: String::new(),
-            tool_version: String::new(),
-            protocol_version: 1,
-            answers: BTreeMap::from([(question.clone(), answer)]),
-            corrected: false,
-            declined: false,
-            remarks: String::new(),
-            reference_s: None,
-            exploration_s: None,
-            response_s: None,
-            strokes: None,
-            least_energy_j: None,
-            switches_per_s: None,
-            clamp_count: None,
-            started_at: None,
-            rated_at: None,
-            attempt: Some(1),
-            status: Status::Ok,
-            vaf: None,
-            covariates: BTreeMap::new(),
             part: Some(part.id.clone()),
-            track: None,
-            level: None,
-            correct: None,
-            replays: None,
-            fidelity: None,
-            host_late_ms: None,
-            input_channel: None,
-            front_name: None,
             group: who.group.map(|g| g.id.clone()),
             session_id: who.session_id.cloned(),
+            ..RatingRow::answered(who.participant.clone(), who.session, trial, asked)
         });
         let last = self.rows.len() - 1;
         &mut self.rows[last]

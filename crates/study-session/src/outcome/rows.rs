@@ -82,6 +82,67 @@ pub struct RatingRow {
     pub session_id: Option<PartId>,
 }
 
+impl RatingRow {
+    /// The first attempt at a trial in which a question was answered. Nothing else is known.
+    pub fn answered(
+        participant: ParticipantId,
+        session: u32,
+        trial: u32,
+        (question, answer): (QuestionId, Answer),
+    ) -> Self {
+        Self {
+            study: String::new(),
+            participant,
+            session,
+            row: None,
+            trial,
+            block: 1,
+            position: Some(trial),
+            planned_position: trial,
+            model: None,
+            role: Role::Test,
+            repetition: 1,
+            previous_model: None,
+            practice: false,
+            pilot: false,
+            simulated: false,
+            device_kind: DeviceKind::Simulated,
+            device_id: String::new(),
+            operator: String::new(),
+            tool_version: String::new(),
+            protocol_version: 1,
+            answers: BTreeMap::from([(question, answer)]),
+            corrected: false,
+            declined: false,
+            remarks: String::new(),
+            reference_s: None,
+            exploration_s: None,
+            response_s: None,
+            strokes: None,
+            least_energy_j: None,
+            switches_per_s: None,
+            clamp_count: None,
+            started_at: None,
+            rated_at: None,
+            attempt: Some(1),
+            status: Status::Ok,
+            vaf: None,
+            covariates: BTreeMap::new(),
+            part: None,
+            track: None,
+            level: None,
+            correct: None,
+            replays: None,
+            fidelity: None,
+            host_late_ms: None,
+            input_channel: None,
+            front_name: None,
+            group: None,
+            session_id: None,
+        }
+    }
+}
+
 /// One row of `intervals.csv`: a presentation.
 #[derive(Debug, Clone, PartialEq)]
 #[allow(missing_docs, reason = "IntervalColumn has the meanings")]
