@@ -29,5 +29,6 @@ mod rules;
 mod schema;
 mod study;
 mod trials;
+mod verdicts;
 #[path = "../support/world.rs"]
 mod world;

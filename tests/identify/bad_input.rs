@@ -6,7 +6,7 @@
 use assert_cmd::Command;
 use std::fmt::Write as _;
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use study_haptics::recording;
 
 const NAMES: &str = "t_s,x_mm,v_mm_s,a_m_s2,f_n";
@@ -200,41 +200,50 @@ fn a_far_origin_is_moved_and_said() {
     assert!(vaf(&model) > 0.95, "{model}");
 }
 
+/// The document of `study identify` of motions with every row changed, and what it says.
+fn identified(
+    dir: &Path,
+    change: impl Fn([f64; 5]) -> [f64; 5],
+    more: &[&str],
+) -> (serde_json::Value, String) {
+    let path = |name: &str, rows: Vec<[f64; 5]>| {
+        let changed: Vec<[f64; 5]> = rows.into_iter().map(&change).collect();
+        let path = dir.join(name);
+        fs::write(&path, text(NAMES, &changed)).unwrap();
+        path
+    };
+    let output = Command::cargo_bin("study")
+        .unwrap()
+        .arg("identify")
+        .arg(path("t.csv", training()))
+        .arg("--validate")
+        .arg(path("v.csv", rows(&[(1.5, 15.0)])))
+        .arg("--json")
+        .args(more)
+        .output()
+        .unwrap();
+    let err = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{err}");
+    (serde_json::from_slice(&output.stdout).unwrap(), err)
+}
+
 /// The paper's table of a force with an offset of 10⁸ N has the VAF of the force without it.
 #[test]
 fn a_far_force_is_moved_and_said() {
     let dir = tempfile::tempdir().unwrap();
+    let models = dir.path().join("models");
+    let out = models.to_str().unwrap();
+    let more = ["--lambda", "0.98", "--dx", "1", "--force", "--out", out];
     let identified = |offset_n: f64| {
-        let path = |name: &str, rows: Vec<[f64; 5]>| {
-            let moved: Vec<[f64; 5]> = (rows.into_iter())
-                .map(|[t, x, v, a, f]| [t, x, v, a, f + offset_n])
-                .collect();
-            let path = dir.path().join(name);
-            fs::write(&path, text(NAMES, &moved)).unwrap();
-            path
-        };
-        let output = Command::cargo_bin("study")
-            .unwrap()
-            .arg("identify")
-            .arg(path("t.csv", training()))
-            .arg("--validate")
-            .arg(path("v.csv", rows(&[(1.5, 15.0)])))
-            .args([
-                "--lambda", "0.98", "--dx", "1", "--json", "--force", "--out",
-            ])
-            .arg(dir.path().join("models"))
-            .output()
-            .unwrap();
-        let err = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(output.status.success(), "{err}");
-        let document: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let moved = |[t, x, v, a, f]: [f64; 5]| [t, x, v, a, f + offset_n];
+        let (document, err) = identified(dir.path(), moved, &more);
         (document["cells"][0]["vaf"]["v"].as_f64().unwrap(), err)
     };
     let (here, _) = identified(0.0);
     let (far, err) = identified(1e8);
     assert!((here - far).abs() < 1e-6, "{here} {far}");
     assert!(err.contains("identified at F - 100000000 N"), "{err}");
-    let model = fs::read_to_string(dir.path().join("models/lambda-0.98-dx-1.toml")).unwrap();
+    let model = fs::read_to_string(models.join("lambda-0.98-dx-1.toml")).unwrap();
     let (_, forces) = model.split_once("f0_n = [").unwrap();
     let first: f64 = forces.split(',').next().unwrap().trim().parse().unwrap();
     assert!((first - 1e8).abs() < 1e4, "{first}");
@@ -246,25 +255,8 @@ fn a_far_force_is_moved_and_said() {
 fn a_travel_of_a_tenth_of_a_millimeter_or_of_meters_gives_the_same_table() {
     let vaf = |times: f64| {
         let dir = tempfile::tempdir().unwrap();
-        let path = |name: &str, rows: Vec<[f64; 5]>| {
-            let larger: Vec<[f64; 5]> = (rows.into_iter())
-                .map(|[t, x, v, a, f]| [t, times * x, times * v, times * a, f])
-                .collect();
-            let path = dir.path().join(name);
-            fs::write(&path, text(NAMES, &larger)).unwrap();
-            path
-        };
-        let output = Command::cargo_bin("study")
-            .unwrap()
-            .arg("identify")
-            .arg(path("t.csv", training()))
-            .arg("--validate")
-            .arg(path("v.csv", rows(&[(1.5, 15.0)])))
-            .args(["--method", "passive", "--json"])
-            .output()
-            .unwrap();
-        assert!(output.status.success());
-        let document: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let larger = |[t, x, v, a, f]: [f64; 5]| [t, times * x, times * v, times * a, f];
+        let (document, _) = identified(dir.path(), larger, &["--method", "passive"]);
         let cells = document["cells"].as_array().unwrap();
         let dx: Vec<f64> = (cells.iter())
             .map(|cell| cell["dx_mm"].as_f64().unwrap() / times)

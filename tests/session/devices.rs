@@ -17,13 +17,18 @@ fn protocol(folder: &Path, changes: &[(&str, &str)]) -> PathBuf {
     to
 }
 
-/// Plays a whole session: the pages seen, and the rows of ratings.csv by column.
-fn session(folder: &Path, protocol: &Path, more: &[&str]) -> (Vec<String>, Vec<Row>) {
+/// `study run` on its first page.
+fn run(folder: &Path, protocol: &Path, more: &[&str]) -> Terminal {
     let path = protocol.to_str().unwrap();
-    let mut arguments = vec!["run", path, "--operator", "lw"];
-    arguments.extend(more);
+    let arguments = [&["run", path, "--operator", "lw"], more].concat();
     let mut terminal = Terminal::start(&arguments, folder, 24, 80);
     terminal.wait_for("Who takes part?");
+    terminal
+}
+
+/// Plays a whole session: the pages seen, and the rows of ratings.csv by column.
+fn session(folder: &Path, protocol: &Path, more: &[&str]) -> (Vec<String>, Vec<Row>) {
+    let mut terminal = run(folder, protocol, more);
     let seen = play_to_end(&mut terminal, "P01");
     let (code, out, err) = study(&["verify", "results"], folder);
     assert_eq!(code, 0, "{out}{err}");
@@ -34,6 +39,11 @@ fn session(folder: &Path, protocol: &Path, more: &[&str]) -> (Vec<String>, Vec<R
 }
 
 type Row = std::collections::BTreeMap<String, String>;
+
+/// How a trial ended, on which device, and whether it is a pilot's.
+fn felt(row: &Row) -> [&str; 4] {
+    ["status", "device_kind", "device_id", "pilot"].map(|column| row[column].as_str())
+}
 
 fn ratings(path: &Path) -> Vec<Row> {
     let mut file = csv::Reader::from_path(path).unwrap();
@@ -57,15 +67,11 @@ fn a_session_on_a_child_program_is_real_data_with_telemetry() {
     let (_, rows) = session(folder.path(), &protocol, &["--command", &command]);
     assert_eq!(rows.len(), 5);
     for row in &rows {
-        assert_eq!(row["status"], "ok");
-        assert_eq!(row["pilot"], "false");
-        assert_eq!(row["device_kind"], "process");
-        assert_eq!(row["device_id"], "example-1");
+        assert_eq!(felt(row), ["ok", "process", "example-1", "false"]);
     }
-    let telemetry = folder
-        .path()
-        .join("results/turn-signal/sessions/P01/1/telemetry");
-    assert_eq!(fs::read_dir(telemetry).unwrap().count(), 5);
+    let telemetry = "results/turn-signal/sessions/P01/1/telemetry";
+    let telemetry = fs::read_dir(folder.path().join(telemetry)).unwrap();
+    assert_eq!(telemetry.count(), 5);
 }
 
 /// A shortened study by keys on the simulated device: a mechanism among its playbacks, every
@@ -79,10 +85,7 @@ fn mechanism_by_keys(name: &str, waits: &[(&str, &str)], trials: usize, asked: &
         ("minimum_strokes = 2", "minimum_strokes = 1"),
     ];
     changed_protocol(name, &to, &[&shorter, waits].concat());
-    let arguments = ["run", to.to_str().unwrap(), "--operator", "lw"];
-    let mut terminal = Terminal::start(&arguments, folder.path(), 24, 80);
-    terminal.wait_for("Who takes part?");
-    play_to_end(&mut terminal, "P01");
+    play_to_end(&mut run(folder.path(), &to, &[]), "P01");
     let results = folder.path().join("results").join(name);
     let rows = ratings(&results.join("ratings.csv"));
     let tested: Vec<&Row> = rows
@@ -196,16 +199,7 @@ fn a_program_that_ends_is_reported_with_its_status_and_its_last_line() {
         "if test -e gone; then echo 'no encoder for lambda-0.9995' >&2; exit 7; fi\necho '{hello}'\nwhile read line; do case $line in *load*lambda*) touch gone; echo 'no encoder for lambda-0.9995' >&2; exit 7;; esac; done\n"
     );
     fs::write(&script, text).unwrap();
-    let arguments = [
-        "run",
-        protocol.to_str().unwrap(),
-        "--operator",
-        "lw",
-        "--command",
-        "sh c.sh",
-    ];
-    let mut terminal = Terminal::start(&arguments, folder.path(), 24, 80);
-    terminal.wait_for("Who takes part?");
+    let mut terminal = run(folder.path(), &protocol, &["--command", "sh c.sh"]);
     play_until(&mut terminal, "P01", "DEVICE TROUBLE");
     let flowing = |screen: &str| {
         let screen = screen.replace('┃', "");
@@ -238,12 +232,9 @@ fn info_shows_the_identity_of_a_program() {
     )
     .unwrap();
     let ask = ["device", "info", "--command", "sh c.sh"];
-    let (code, out, err) = study(&ask, folder.path());
-    assert_eq!(code, 0, "{err}");
-    assert!(
-        out.contains("rig-2") && out.contains("at most 9 N"),
-        "{out}"
-    );
+    let (_, out, err) = study(&ask, folder.path());
+    let shown = out.contains("rig-2") && out.contains("at most 9 N");
+    assert!(shown, "{out}{err}");
     let (_, out, _) = study(&[&ask[..], &["--json"]].concat(), folder.path());
     let json: serde_json::Value = serde_json::from_str(&out).unwrap();
     assert_eq!(json["device"]["id"], "rig-2");
@@ -314,9 +305,7 @@ fn a_sample_among_tables_is_mounted_and_a_stopped_mounting_is_repeated() {
     let folder = tempfile::tempdir().unwrap();
     let manual = "id = \"lambda-0.9995\"\ndevice = \"manual\"";
     let protocol = protocol(folder.path(), &[("id = \"lambda-0.9995\"", manual)]);
-    let path = protocol.to_str().unwrap();
-    let mut terminal = Terminal::start(&["run", path, "--operator", "lw"], folder.path(), 24, 80);
-    terminal.wait_for("Who takes part?");
+    let mut terminal = run(folder.path(), &protocol, &[]);
     play_until(&mut terminal, "P01", "Mount sample");
     terminal.keys("\u{1b}");
     terminal.wait_for("Operate the real switch");
@@ -342,16 +331,7 @@ impl Rig {
         let device = Simulator::start(folder.path(), faults);
         let protocol = protocol(folder.path(), &[("\"simulated\"", "\"serial\"")]);
         let port = device.port.to_str().unwrap().to_owned();
-        let arguments = [
-            "run",
-            protocol.to_str().unwrap(),
-            "--operator",
-            "lw",
-            "--port",
-            &port,
-        ];
-        let mut terminal = Terminal::start(&arguments, folder.path(), 24, 80);
-        terminal.wait_for("Who takes part?");
+        let terminal = run(folder.path(), &protocol, &["--port", &port]);
         Self {
             folder,
             device,
@@ -366,16 +346,15 @@ impl Rig {
     /// Plays to the end: the rows, and the entries of the journal.
     fn finish(mut self) -> (Vec<Row>, Vec<serde_json::Value>) {
         play_to_end(&mut self.terminal, "P01");
-        let (code, out, err) = study(&["verify", "results"], self.folder.path());
+        let of_results = |command| study(&[command, "results"], self.folder.path());
+        let (code, out, err) = of_results("verify");
         assert_eq!(code, 0, "{out}{err}");
         let results = self.folder.path().join("results/turn-signal");
         let rows = ratings(&results.join("ratings.csv"));
         assert_eq!(rows.len(), 5);
+        // a simulated device gives no real data
         for row in &rows {
-            assert_eq!(row["status"], "ok");
-            assert_eq!(row["device_kind"], "serial");
-            assert_eq!(row["device_id"], "simulated-1");
-            assert_eq!(row["pilot"], "true", "a simulated device is no real data");
+            assert_eq!(felt(row), ["ok", "serial", "simulated-1", "true"]);
         }
         let journal = fs::read_to_string(results.join("sessions/P01/1/journal.jsonl")).unwrap();
         let events = journal
@@ -383,6 +362,16 @@ impl Rig {
             .map(|line| serde_json::from_str(line).unwrap());
         let events: Vec<serde_json::Value> = events.collect();
         no_rating_without_a_playback(&events);
+        let playbacks = events.iter().map(|entry| &event(entry)["playback"]);
+        let [p99, most] = [0, 1].map(|i| {
+            let late = playbacks
+                .clone()
+                .filter_map(|p| p["host_late_ms"][i].as_f64());
+            late.fold(0.0, f64::max)
+        });
+        let said = format!("late by at most {most:.0} ms, 99 % within {p99:.0} ms");
+        let (_, status, _) = of_results("status");
+        assert!(status.contains(&said), "{said}: {status}");
         (rows, events)
     }
 }
@@ -421,37 +410,24 @@ fn no_rating_without_a_playback(entries: &[serde_json::Value]) {
 
 #[test]
 fn a_session_over_a_port_has_complete_telemetry() {
-    let rig = Rig::start(&[]);
-    let telemetry = rig
-        .folder
-        .path()
-        .join("results/turn-signal/sessions/P01/1/telemetry");
-    let folder = rig.folder.path().to_owned();
-    // the files are read before the rig deletes the folder
-    let mut rig = rig;
+    let mut rig = Rig::start(&[]);
     rig.to("Enter: close");
-    let files: Vec<PathBuf> = fs::read_dir(&telemetry)
-        .unwrap()
-        .map(|f| f.unwrap().path())
-        .collect();
-    assert_eq!(files.len(), 5);
-    let lines: usize = files
-        .iter()
-        .map(|f| fs::read_to_string(f).unwrap().lines().count() - 1)
-        .sum();
-    assert!(folder.exists());
+    // the files are read before the rig deletes the folder
+    let telemetry = "results/turn-signal/sessions/P01/1/telemetry";
+    let files = fs::read_dir(rig.folder.path().join(telemetry)).unwrap();
+    let text = files.map(|file| fs::read_to_string(file.unwrap().path()).unwrap());
+    let rows: Vec<usize> = text.map(|text| text.lines().count() - 1).collect();
+    assert_eq!(rows.len(), 5);
     let (_, events) = rig.finish();
-    let ended = events
-        .iter()
-        .map(event)
-        .filter(|e| e["event"] == "playback_ended");
+    let ended = events.iter().map(event);
+    let ended = ended.filter(|e| e["event"] == "playback_ended");
     let (mut samples, mut lost) = (0, 0);
     for event in ended {
         samples += event["playback"]["samples"].as_u64().unwrap();
         lost += event["playback"]["samples_lost"].as_u64().unwrap();
     }
     assert!(samples > 0);
-    assert_eq!((samples as usize, lost), (lines, 0));
+    assert_eq!((samples as usize, lost), (rows.iter().sum(), 0));
 }
 
 /// The verdict of a commissioning in the same folder is recorded in the session.
@@ -471,24 +447,12 @@ fn a_commissioning_is_recorded_in_the_session_and_a_broken_device_fails_it() {
     let (_, out, _) = tries.into_iter().find(|(code, ..)| *code == 0).unwrap();
     assert!(out.contains("27 of 27 tests passed"), "{out}");
     let protocol = rig.folder.path().join("protocol");
-    let arguments = [
-        "run",
-        protocol.to_str().unwrap(),
-        "--operator",
-        "lw",
-        "--port",
-        &port,
-    ];
-    let mut terminal = Terminal::start(&arguments, rig.folder.path(), 24, 80);
-    terminal.wait_for("Who takes part?");
+    let mut terminal = run(rig.folder.path(), &protocol, &["--port", &port]);
     terminal.keys("\u{15}P02\r");
     terminal.wait_for("Operate the real switch");
     drop(terminal);
-    let journal = rig
-        .folder
-        .path()
-        .join("results/turn-signal/sessions/P02/1/journal.jsonl");
-    let journal = fs::read_to_string(journal).unwrap();
+    let journal = "results/turn-signal/sessions/P02/1/journal.jsonl";
+    let journal = fs::read_to_string(rig.folder.path().join(journal)).unwrap();
     assert!(journal.contains("\"device_check\":\""), "{journal}");
     assert!(
         journal.contains("27 of 27 tests passed; round trip"),
@@ -550,10 +514,8 @@ fn a_cable_that_is_pulled_in_each_state_costs_no_answer() {
     rig.terminal.wait_for("DEVICE TROUBLE");
     let (rows, events) = rig.finish();
     assert!(rows.iter().any(|row| row["realism"] == "6"));
-    let failed = events
-        .iter()
-        .map(event)
-        .filter(|e| e["event"] == "attempt_failed");
+    let failed = events.iter().map(event);
+    let failed = failed.filter(|e| e["event"] == "attempt_failed");
     assert!(failed.count() >= 3);
 }
 
@@ -563,9 +525,7 @@ fn a_bad_line_costs_telemetry_and_no_answer() {
     let faults = ["corrupt", "drop", "duplicate", "reorder", "delay"];
     let faults: Vec<String> = faults.iter().map(|f| format!("{f}=0.005")).collect();
     let faults: Vec<&str> = faults.iter().flat_map(|f| ["--fault", f]).collect();
-    let rig = Rig::start(&faults);
-    let (rows, _) = rig.finish();
-    assert_eq!(rows.len(), 5);
+    Rig::start(&faults).finish();
 }
 
 /// `study record` with a probe at a port gives a recording that can be identified.
@@ -582,15 +542,9 @@ fn a_recording_over_a_port_can_be_identified() {
         let mut tries = (0..20).map(|_| study(arguments, folder.path()));
         tries.find(|(code, ..)| *code == 0).expect("a recording")
     };
-    let first = [
-        "--device",
-        "serial",
-        "--port",
-        port,
-        "--out",
-        "training.csv",
-    ];
-    let (_, _, err) = record(&[&["record", "short.toml"][..], &first].concat());
+    let first = "record short.toml --device serial --out training.csv --port";
+    let first: Vec<&str> = first.split(' ').chain([port]).collect();
+    let (_, _, err) = record(&first);
     assert!(err.contains("wrote training.csv"), "{err}");
     let training = fs::read_to_string(folder.path().join("training.csv")).unwrap();
     let header = training.lines().next().unwrap();
@@ -610,14 +564,8 @@ fn a_recording_over_a_port_can_be_identified() {
     fs::write(folder.path().join("probe.csv"), probe).unwrap();
     let (code, _, err) = study(&["record", "short.toml", "--port", port], folder.path());
     assert_eq!(code, 2, "{err}");
-    let identify = [
-        "identify",
-        "training.csv",
-        "--validate",
-        "probe.csv",
-        "--method",
-        "ewls",
-    ];
+    let identify = "identify training.csv --validate probe.csv --method ewls";
+    let identify: Vec<&str> = identify.split(' ').collect();
     let (code, out, err) = study(&identify, folder.path());
     assert_eq!(code, 0, "{out}{err}");
 }

@@ -85,9 +85,13 @@ impl Desk {
 }
 
 fn playing() -> Screen {
+    exploring(false)
+}
+
+fn exploring(keep_exploring: bool) -> Screen {
     Screen::Playing {
         since_s: 3.0,
-        keep_exploring: false,
+        keep_exploring,
         exposure: Default::default(),
         interval: None,
     }
@@ -95,6 +99,47 @@ fn playing() -> Screen {
 
 fn rate() -> Screen {
     form(vec![realism(), comment()])
+}
+
+/// The question and comment of the first attempt at a trial, on the first of so many pages.
+fn rate_trial(trial: u32, pages: u32) -> Screen {
+    Screen::Form {
+        form: FormId::Trial { trial, attempt: 1 },
+        questions: vec![realism(), comment()],
+        page: 1,
+        pages,
+        to_experimenter: false,
+    }
+}
+
+fn remark(by: Author, text: &str) -> [Input; 1] {
+    let text = text.to_owned();
+    [Input::Remark { by, text }]
+}
+
+/// The experimenter corrects the rating of trial 6.
+fn corrected(n: i64, reason: &str) -> [Input; 1] {
+    [Input::Correct {
+        form: FormId::Trial {
+            trial: 6,
+            attempt: 1,
+        },
+        question: realism().id,
+        answer: Answer::Rating(n),
+        reason: reason.to_owned(),
+        by: Author::Experimenter,
+    }]
+}
+
+fn rating(n: i64) -> Vec<Input> {
+    answers(vec![("realism", Answer::Rating(n))])
+}
+
+fn rating_with(n: i64, comment: &str) -> Vec<Input> {
+    answers(vec![
+        ("realism", Answer::Rating(n)),
+        ("comment", Answer::Text(comment.to_owned())),
+    ])
 }
 
 fn answers(list: Vec<(&str, Answer)>) -> Vec<Input> {
@@ -111,18 +156,14 @@ fn a_rating_and_its_comment_are_sent_together() {
     assert_eq!(desk.types("5"), []);
     assert_eq!(desk.press(KeyCode::Tab), []);
     assert_eq!(desk.types("crisp, but late "), []);
-    let sent = answers(vec![
-        ("realism", Answer::Rating(5)),
-        ("comment", Answer::Text("crisp, but late ".to_owned())),
-    ]);
-    assert_eq!(desk.enter(), sent);
+    assert_eq!(desk.enter(), rating_with(5, "crisp, but late "));
 }
 
 #[test]
 fn an_empty_comment_is_not_sent() {
     let mut desk = Desk::with(rate());
     desk.types("2");
-    assert_eq!(desk.enter(), answers(vec![("realism", Answer::Rating(2))]));
+    assert_eq!(desk.enter(), rating(2));
 }
 
 #[test]
@@ -183,12 +224,7 @@ fn space_in_a_text_is_a_character_even_while_the_device_plays() {
     let mut desk = Desk::with(playing());
     desk.press(KeyCode::F(2));
     assert_eq!(desk.types("it squeaks"), []);
-    let sent = desk.enter();
-    let want = Input::Remark {
-        by: Author::Experimenter,
-        text: "it squeaks".to_owned(),
-    };
-    assert_eq!(sent, [want]);
+    assert_eq!(desk.enter(), remark(Author::Experimenter, "it squeaks"));
     assert_eq!(desk.types(" "), [Input::Stop]);
 }
 
@@ -210,13 +246,7 @@ fn a_remark_has_an_author() {
     desk.control('r');
     desk.press(KeyCode::Tab);
     desk.types("x");
-    assert!(matches!(
-        &desk.enter()[..],
-        [Input::Remark {
-            by: Author::Participant,
-            ..
-        }]
-    ));
+    assert_eq!(desk.enter(), remark(Author::Participant, "x"));
 }
 
 #[test]
@@ -232,10 +262,7 @@ fn a_remark_survives_the_end_of_the_playback_and_a_fault() {
     assert!(!desk.look().contains("half a"));
     desk.goes_to(rate());
     desk.types(" word");
-    assert!(matches!(
-        &desk.enter()[..],
-        [Input::Remark { text, .. }] if text == "half a word"
-    ));
+    assert_eq!(desk.enter(), remark(Author::Experimenter, "half a word"));
 }
 
 #[test]
@@ -246,7 +273,7 @@ fn what_is_typed_into_a_form_survives_a_pause() {
     desk.goes_to(Screen::Paused { since_s: 1.0 });
     assert_eq!(desk.enter(), [Input::Advance]);
     desk.goes_to(rate());
-    assert_eq!(desk.enter(), answers(vec![("realism", Answer::Rating(6))]));
+    assert_eq!(desk.enter(), rating(6));
 }
 
 #[test]
@@ -254,16 +281,7 @@ fn the_next_trial_starts_without_a_choice() {
     let mut desk = Desk::with(rate());
     desk.types("6");
     desk.enter();
-    desk.goes_to(Screen::Form {
-        form: FormId::Trial {
-            trial: 8,
-            attempt: 1,
-        },
-        questions: vec![realism(), comment()],
-        page: 1,
-        pages: 1,
-        to_experimenter: false,
-    });
+    desk.goes_to(rate_trial(8, 1));
     assert_eq!(desk.enter(), []);
 }
 
@@ -278,17 +296,7 @@ fn an_earlier_answer_is_corrected_with_a_reason() {
     desk.types("6");
     desk.enter();
     desk.types("typed wrong");
-    let want = Input::Correct {
-        form: FormId::Trial {
-            trial: 6,
-            attempt: 1,
-        },
-        question: realism().id,
-        answer: Answer::Rating(6),
-        reason: "typed wrong".to_owned(),
-        by: Author::Experimenter,
-    };
-    assert_eq!(desk.enter(), [want]);
+    assert_eq!(desk.enter(), corrected(6, "typed wrong"));
 }
 
 #[test]
@@ -298,41 +306,15 @@ fn a_slip_is_mended_with_four_keys() {
     assert_eq!(desk.types("6"), []);
     assert_eq!(desk.enter(), []);
     assert!(desk.look().contains("trial 6: 3  →  6"), "{}", desk.look());
-    let sent = desk.enter();
-    assert!(
-        matches!(
-            &sent[..],
-            [Input::Correct {
-                answer: Answer::Rating(6),
-                reason,
-                ..
-            }] if reason == "a slip of the key"
-        ),
-        "{sent:?}"
-    );
+    assert_eq!(desk.enter(), corrected(6, "a slip of the key"));
 }
 
 #[test]
 fn shift_tab_goes_back_to_the_question_before_with_its_answer() {
-    let mut view = view(Screen::Form {
-        form: FormId::Trial {
-            trial: 6,
-            attempt: 1,
-        },
-        questions: vec![realism(), comment()],
-        page: 1,
-        pages: 2,
-        to_experimenter: false,
-    });
+    let mut view = view(rate_trial(6, 2));
     // It holds what was answered before, and sends it as it is.
     let mut desk = Desk::at(view.clone());
-    let sent = answers(vec![
-        ("realism", Answer::Rating(3)),
-        (
-            "comment",
-            Answer::Text("crisp, but the middle detent comes late".to_owned()),
-        ),
-    ]);
+    let sent = rating_with(3, "crisp, but the middle detent comes late");
     assert_eq!(desk.enter(), sent);
     assert_eq!(desk.press(KeyCode::BackTab), []);
     assert!(!desk.look().contains("Shift-Tab"));
@@ -350,10 +332,7 @@ fn a_click_on_the_hint_of_a_key_is_that_key() {
     let mut desk = Desk::with(rate());
     desk.types("5");
     let (x, y) = desk.find("Enter: save");
-    assert_eq!(
-        desk.click(x, y),
-        answers(vec![("realism", Answer::Rating(5))])
-    );
+    assert_eq!(desk.click(x, y), rating(5));
     let (x, y) = desk.find("Tab: comment");
     assert_eq!(desk.click(x + 5, y), []);
     assert!(desk.look().contains("Tab: back"));
@@ -402,10 +381,8 @@ fn a_trial_is_marked_bad_only_with_a_reason_and_only_if_there_is_one() {
     desk.press(KeyCode::F(4));
     assert_eq!(desk.enter(), []);
     desk.types("phone");
-    let want = Input::MarkBad {
-        reason: "phone".to_owned(),
-    };
-    assert_eq!(desk.enter(), [want]);
+    let reason = "phone".to_owned();
+    assert_eq!(desk.enter(), [Input::MarkBad { reason }]);
     desk.view.can_mark_bad = None;
     desk.control('b');
     assert!(desk.look().contains("There is no trial to mark as bad."));
@@ -457,12 +434,7 @@ fn a_stopped_trial_is_played_again_or_rated() {
 
 #[test]
 fn enter_advances_only_when_the_session_allows_it() {
-    let mut desk = Desk::with(Screen::Playing {
-        since_s: 1.0,
-        keep_exploring: true,
-        exposure: Default::default(),
-        interval: None,
-    });
+    let mut desk = Desk::with(exploring(true));
     assert_eq!(desk.enter(), []);
     let mut desk = Desk::with(Screen::SaveTrouble {
         what: "no space".to_owned(),
@@ -494,17 +466,13 @@ fn a_click_on_a_box_chooses_it() {
     let mut desk = Desk::with(rate());
     let (x, y) = desk.find("│  6  │");
     assert_eq!(desk.click(x + 3, y - 1), []);
-    assert_eq!(desk.enter(), answers(vec![("realism", Answer::Rating(6))]));
+    assert_eq!(desk.enter(), rating(6));
     // A click between the boxes has no effect; the comment is below them.
     desk.click(x - 1, y);
     let (cx, cy) = desk.find("Comment");
     desk.click(cx + 4, cy + 1);
     desk.types("7");
-    let sent = answers(vec![
-        ("realism", Answer::Rating(6)),
-        ("comment", Answer::Text("7".to_owned())),
-    ]);
-    assert_eq!(desk.enter(), sent);
+    assert_eq!(desk.enter(), rating_with(6, "7"));
 }
 
 #[test]

@@ -9,7 +9,7 @@ use study_session::session::view::{DeviceState, Telemetry};
 use study_session::session::{Effect, Input, Screen};
 
 /// A session whose device waits in the phase of this screen, in the first trial.
-fn in_phase(screen: &str) -> Rig {
+pub(super) fn in_phase(screen: &str) -> Rig {
     let mut rig = Rig::new(plain());
     rig.until("Reference");
     rig.device = DeviceMood::Silent;
@@ -41,7 +41,7 @@ fn failures(rig: &Rig) -> Vec<(u32, u32, Failure)> {
         .collect()
 }
 
-fn screen(rig: &Rig) -> &'static str {
+pub(super) fn screen(rig: &Rig) -> &'static str {
     name(&rig.view().screen)
 }
 
@@ -584,65 +584,4 @@ fn an_account_that_is_no_number_is_a_lost_playback() {
     }));
     assert_eq!(failures(&rig), [(1, 1, Failure::PlaybackLost)]);
     assert_eq!(screen(&rig), "DeviceTrouble");
-}
-
-#[test]
-fn a_pause_stops_the_playback_first() {
-    for (phase, first) in [
-        ("Loading", Effect::Limp),
-        ("Ready", Effect::Limp),
-        ("Playing", Effect::Stop),
-    ] {
-        let mut rig = in_phase(phase);
-        rig.send(Input::Pause);
-        assert_eq!(rig.effects[0], first, "{phase}");
-        if phase == "Playing" {
-            let playback = rig.playback;
-            rig.send(Input::DeviceStopped(playback));
-        }
-        assert_eq!(screen(&rig), "Paused", "{phase}");
-        rig.wait(30.0);
-        assert!(matches!(rig.view().screen, Screen::Paused { since_s } if since_s >= 30.0));
-        rig.effects.clear();
-        rig.send(Input::Answer(Vec::new())).send(Input::PlayAgain);
-        assert_eq!(rig.effects, [], "nothing goes on under a pause");
-        rig.send(Input::Advance);
-        let after = if phase == "Playing" {
-            "Stopped"
-        } else {
-            "Reference"
-        };
-        assert_eq!(screen(&rig), after, "{phase}");
-        assert_eq!(
-            rig.count(|e| matches!(e, Event::Unpaused { paused_s } if *paused_s >= 30.0)),
-            1
-        );
-        rig.finish();
-        rig.assert_whole();
-    }
-}
-
-/// Between Enter and the confirmation of the device.
-#[test]
-fn a_pause_while_the_device_stops_is_kept() {
-    let mut rig = in_phase("Stopping");
-    rig.send(Input::Pause);
-    let playback = rig.playback;
-    rig.send(Input::DeviceStopped(playback));
-    assert_eq!(screen(&rig), "Paused");
-    rig.send(Input::Advance);
-    assert_eq!(screen(&rig), "Form");
-}
-
-#[test]
-fn a_pause_is_no_part_of_the_response_time() {
-    let mut rig = Rig::new(plain());
-    rig.until("Form").wait(3.0);
-    rig.send(Input::Pause).wait(600.0).send(Input::Advance);
-    rig.wait(2.0).answer_page();
-    let response = rig.events().find_map(|e| match e {
-        Event::TrialDone { response_s, .. } => Some(*response_s),
-        _ => None,
-    });
-    assert!((response.unwrap() - 5.0).abs() < 1e-6, "{response:?}");
 }

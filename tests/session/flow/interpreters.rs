@@ -2,7 +2,7 @@
 //! journals are equal but for the channel. Every page is checked against the schema of
 //! docs/page.md, and none has the name of a realization.
 
-use super::parts::{beside_a_reference, pairs, read, track};
+use super::part_rig::{beside_a_reference, pairs, read, track};
 use super::rig::{DeviceMood, Rig, StoreMood};
 use super::studies::{MODELS, PRACTICE, question, rich};
 use crate::kinds::questions;

@@ -1,0 +1,187 @@
+//! Studies with parts, and an observer who answers in them.
+
+use super::rig::Rig;
+use study_base::text::QuestionId;
+use study_plan::procedure::Recorded;
+use study_plan::protocol::file::parse;
+use study_plan::protocol::{Answer, Interval, Protocol, Stimuli};
+use study_session::outcome::Event;
+use study_session::session::{Ending, Input, Screen};
+
+const HEAD: &str = r#"
+format = "study-protocol/2"
+study = { id = "s", title = "t", seed = 3 }
+design = { participants = 4 }
+device = { kind = "simulated", limits = { force_n = 12.0, velocity_mm_s = 1000.0 } }
+models = [{ id = "XQZ-7", file = "a.toml" }, { id = "KJW-3", file = "b.toml" }, { id = "VVB-9", file = "c.toml" }]
+
+[[families]]
+id = "damping"
+from = "a.toml"
+vary = "b"
+range = [1.0, 3.0]
+steps = 41
+"#;
+
+pub(super) const STAIRCASE: &str = r#"{ rule = "staircase", up = 1, down = 3, start = 2.0, steps = [0.2, 0.1], stop = { reversals = 4, max_trials = 60 } }"#;
+pub(super) const QUEST: &str =
+    r#"{ rule = "quest+", trials = 16, lapse = [0.02], slope = [2, 4] }"#;
+
+pub(super) fn read(text: &str) -> Protocol {
+    let parsed = parse("p", &format!("{HEAD}{text}"));
+    let shown = parsed.findings.render(false);
+    parsed.protocol.unwrap_or_else(|| panic!("{shown}"))
+}
+
+/// One track of a method; `more` is added to the track.
+pub(super) fn track(method: &str, procedure: &str, more: &str) -> Protocol {
+    read(&format!(
+        r#"
+[analysis]
+primary = "which"
+[[parts]]
+id = "which"
+kind = "discrimination"
+prompt = "Which?"
+tracks = ["up"]
+[[tracks]]
+id = "up"
+method = "{method}"
+family = "damping"
+standard = 1.0
+procedure = {procedure}
+{more}
+"#
+    ))
+}
+
+pub(super) fn pairs(more: &str) -> Protocol {
+    read(&format!(
+        r#"
+[analysis]
+primary = "real"
+[[parts]]
+id = "real"
+kind = "pairs"
+prompt = "Which?"
+repetitions = 2
+{more}
+"#
+    ))
+}
+
+pub(super) fn beside_a_reference() -> Protocol {
+    let head = HEAD.replace(
+        "file = \"a.toml\" }",
+        "file = \"a.toml\", role = \"hidden-reference\" }",
+    );
+    let text = r#"
+[analysis]
+primary = "close"
+[[parts]]
+id = "close"
+kind = "mushra"
+prompt = "How close?"
+reference = "XQZ-7"
+repetitions = 2
+"#;
+    parse("p", &format!("{head}{text}")).protocol.unwrap()
+}
+
+pub(super) fn magnitudes() -> Protocol {
+    read(
+        r#"
+[analysis]
+primary = "strong"
+[[parts]]
+id = "strong"
+kind = "magnitude"
+prompt = "How strong?"
+family = "damping"
+repetitions = 1
+"#,
+    )
+}
+
+/// The answer of an observer who hears a level of 1.55 and above, and else says the other.
+pub(super) fn observed(rig: &Rig) -> Vec<(QuestionId, Answer)> {
+    let open = rig.session.history().open().unwrap();
+    let mut answers = rig.good_answers();
+    if let (Stimuli::Track { intervals, .. }, Some(level)) =
+        (&open.trial.stimuli, open.attempt.level)
+    {
+        let comparison = intervals.iter().position(|i| *i == Interval::Comparison);
+        let heard = level.presented >= 1.55;
+        let first = comparison == Some(0) && intervals.len() == 2;
+        let word = if first == heard { "first" } else { "second" };
+        let Screen::Form { questions, .. } = rig.view().screen else {
+            return answers;
+        };
+        let word = Answer::Choice(vec![word.to_owned()]);
+        // Other methods have other answers: the first of them.
+        if questions[0].accepts(&word).is_ok() {
+            answers[0].1 = word;
+        }
+    }
+    answers
+}
+
+/// One step; the observer answers.
+pub(super) fn step(rig: &mut Rig) {
+    match rig.view().screen {
+        Screen::Form { .. } => {
+            rig.wait(1.0);
+            let answers = observed(rig);
+            rig.send(Input::Answer(answers));
+        }
+        _ => {
+            rig.step();
+        }
+    }
+}
+
+pub(super) fn finish(rig: &mut Rig) {
+    while rig.ending.is_none() {
+        step(rig);
+    }
+    assert_eq!(rig.ending, Some(Ending::Finished));
+}
+
+pub(super) fn done(rig: &Rig) -> usize {
+    rig.count(|e| matches!(e, Event::TrialDone { .. }))
+}
+
+/// Steps until a screen after so many trials. A gap passes by itself.
+pub(super) fn until(rig: &mut Rig, trials: usize, screen: fn(&Screen) -> bool) {
+    let there = |rig: &Rig| done(rig) >= trials && screen(&rig.view().screen);
+    while !there(rig) {
+        assert_eq!(rig.ending, None);
+        if matches!(rig.view().screen, Screen::Loading { .. }) {
+            rig.wait(1.0);
+            continue;
+        }
+        step(rig);
+    }
+}
+
+pub(super) fn recorded(rig: &Rig, protocol: &Protocol) -> Vec<Recorded> {
+    rig.session.history().recorded(&protocol.tracks[0])
+}
+
+pub(super) fn second(screen: &Screen) -> bool {
+    matches!(
+        screen,
+        Screen::Playing {
+            interval: Some((2, 2)),
+            ..
+        }
+    )
+}
+
+pub(super) fn answering(screen: &Screen) -> bool {
+    matches!(screen, Screen::Form { .. })
+}
+
+pub(super) fn reference(screen: &Screen) -> bool {
+    matches!(screen, Screen::Reference { .. })
+}
