@@ -11,7 +11,7 @@ use study_session::store::{self, Frozen};
 pub(super) struct Args {
     /// Results folder, or the folder of one study in it
     results: PathBuf,
-    /// The amended protocol.toml, or the folder that holds it
+    /// The amended protocol.toml or the folder that contains it
     protocol: PathBuf,
     /// Reason; it is recorded
     #[arg(long, value_name = "TEXT")]

@@ -79,7 +79,7 @@ enum Who {
 /// Which ratings are better.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum Direction {
-    /// Higher ratings, unless said otherwise
+    /// Higher ratings (the default)
     Higher,
     /// Lower ratings
     Lower,

@@ -12,7 +12,7 @@ use study_plan::protocol::{DeviceKind, ModelEntry};
 /// Arguments of `study check`.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// A protocol.toml or the folder that holds one
+    /// A protocol.toml or the folder that contains it
     protocol: PathBuf,
     /// Print one JSON document
     #[arg(long)]

@@ -60,7 +60,7 @@ enum What {
     Safety(safety::Args),
     /// List the codes for the labels of physical samples; not for the experimenter
     Codes {
-        /// A protocol.toml or the folder that holds one
+        /// A protocol.toml or the folder that contains it
         protocol: PathBuf,
     },
 }

@@ -25,7 +25,7 @@ pub(super) struct Args {
     protocol: Option<PathBuf>,
     #[command(flatten)]
     assume: assume::Assume,
-    /// Only the closed forms, at once
+    /// Print only the closed-form results, without simulation
     #[arg(long, conflicts_with_all = ["shards", "merge", "slurm"])]
     closed: bool,
     /// Print one JSON document
@@ -37,7 +37,7 @@ pub(super) struct Args {
     /// Number of threads (results do not depend on it)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
-    /// Divide the work into this many parts, of which --shard is done
+    /// Number of parts into which the work is divided; --shard chooses one
     #[arg(long, value_name = "N", requires = "shard", value_parser = clap::value_parser!(u64).range(1..=100_000))]
     shards: Option<u64>,
     /// Index of the shard to compute, from 0; it is written to --out
@@ -46,7 +46,7 @@ pub(super) struct Args {
     /// Merge the parts in a folder
     #[arg(long, value_name = "DIR", conflicts_with_all = ["shards", "slurm"])]
     merge: Option<PathBuf>,
-    /// Merge although parts are missing
+    /// Merge even if parts are missing
     #[arg(long, requires = "merge")]
     partial: bool,
     /// Write scripts for a Slurm cluster into a folder; nothing is submitted

@@ -14,7 +14,7 @@ use study_report::preregistration::{Options, document};
     after_help = "`study run` freezes the document with the protocol, and the report compares."
 )]
 pub(super) struct Args {
-    /// A protocol.toml or the folder that holds one
+    /// A protocol.toml or the folder that contains it
     protocol: PathBuf,
     /// Planned participants (default: those of the protocol)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]

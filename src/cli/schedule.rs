@@ -22,7 +22,7 @@ const CHUNK: usize = 1000;
 /// Arguments of `study schedule`.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// A protocol.toml or the folder that holds one
+    /// A protocol.toml or the folder that contains it
     protocol: PathBuf,
     /// Rows to show, such as 7 or 1-40 [default: all planned participants]
     #[arg(long, value_name = "RANGE", value_parser = parse_rows)]

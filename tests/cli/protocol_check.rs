@@ -474,7 +474,7 @@ fn a_path_without_a_protocol_is_one_clear_error() {
         let (code, out, err) = run(dir.path(), &args);
         assert_eq!((code, out.as_str()), (1, ""));
         assert!(err.contains(said), "{err}");
-        assert!(err.contains("or the folder that holds one"), "{err}");
+        assert!(err.contains("or the folder that contains it"), "{err}");
     }
     fs::write(dir.path().join("p.toml"), b"a = \"\xff\"").unwrap();
     let (code, _, err) = run(dir.path(), &["check", "p.toml"]);

@@ -227,7 +227,10 @@ fn a_session_with_bundles_is_the_one_with_files() {
     .unwrap();
     check(&missing, "its address is sha256:");
     fs::write(with_bundles.join("jwk.tar"), "PK").unwrap();
-    check(&of_bundles, "the bundle is refused: it is no tar archive");
+    check(
+        &of_bundles,
+        "the bundle is refused: it is not a tar archive",
+    );
     check(
         &of_bundles.replace("jwk.tar", "../jwk.tar"),
         "has to stay inside the protocol's folder",

@@ -234,7 +234,7 @@ fn open(path: &Path, purpose: Purpose<'_>) -> (Option<Loaded>, Vec<Findings>) {
         Ok(bytes) => bytes,
         Err(problem) => {
             let fault = Fault::error(problem.to_string())
-                .hint("PROTOCOL is a protocol.toml or the folder that holds one");
+                .hint("PROTOCOL is a protocol.toml or the folder that contains it");
             return (None, vec![Findings::alone(shown, fault)]);
         }
     };

@@ -177,13 +177,13 @@ pub enum BundleError {
     Extra(String),
     #[error("{MANIFEST}: not a {FORMAT} file; a newer version of study may read it")]
     Format,
-    #[error("{MANIFEST}: line {0} was changed: `study stimulus pack` does not write it so")]
+    #[error("{MANIFEST}: line {0} was changed: it is not as `study stimulus pack` writes it")]
     Line(usize),
     #[error("the {0} is not stated")]
     NotStated(&'static str),
     #[error("the {0} has control characters or more than {MAX_TEXT} characters")]
     Text(&'static str),
-    #[error("`{}` is no day of publication: write it as 2024-05-17", Untrusted(.0))]
+    #[error("`{}` is not a date: write the day of publication as 2024-05-17", Untrusted(.0))]
     Day(String),
     #[error("the {key} is stated as `{}`, and the recording `{}` has `{}`", Untrusted(.stated), Untrusted(.recording), Untrusted(.own))]
     Contradicts {

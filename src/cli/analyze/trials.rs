@@ -20,7 +20,7 @@ pub(super) struct TrialArgs {
     #[arg(long, value_name = "CORE", requires = "task",
           value_parser = clap::builder::PossibleValuesParser::new(Core::NAMES.map(|n| n.1)))]
     core: Option<String>,
-    /// Scale of the levels over which functions are fitted; log: a threshold is a level all the same
+    /// Scale of the levels over which functions are fitted; with log, thresholds are still given as levels
     #[arg(long, value_name = "SCALE", default_value = "lin", requires = "task",
           value_parser = clap::builder::PossibleValuesParser::new(["lin", "log"]))]
     fit_scale: String,

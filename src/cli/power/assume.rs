@@ -68,13 +68,13 @@ pub(super) struct Assume {
     /// Simulated studies of each design
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(10..=10_000_000))]
     studies: Option<u64>,
-    /// Simulate a design no further once the interval of its power is ± this
+    /// Stop simulating a design once the confidence interval of its power is within ± this
     #[arg(long, value_name = "HALF", value_parser = target)]
     within: Option<f64>,
     /// Propose no design whose sessions are longer
     #[arg(long, value_name = "MIN", value_parser = positive)]
     max_session_min: Option<f64>,
-    /// Power that is wanted
+    /// Target power, such as 0.8,0.9
     #[arg(long, value_name = "P,…", value_delimiter = ',', value_parser = target)]
     targets: Vec<f64>,
     /// verdict, pearson, permutation, crossed, friedman, clmm, equivalence, reference-equivalence; of

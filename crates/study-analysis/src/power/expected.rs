@@ -100,7 +100,7 @@ pub enum Reach {
 /// The smallest design of some realizations and repetitions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Smallest {
-    /// Power that is wanted.
+    /// Target power.
     pub target: f64,
     /// Realizations.
     pub realizations: usize,

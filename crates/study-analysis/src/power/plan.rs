@@ -131,7 +131,7 @@ pub struct Plan {
     pub own: Cell,
     /// The designs that are compared.
     pub grid: Vec<Cell>,
-    /// Power that is wanted.
+    /// Target power.
     pub targets: Vec<f64>,
     /// What nobody stated, and so has a default; `key = value`.
     pub defaults: Vec<String>,

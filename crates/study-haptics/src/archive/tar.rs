@@ -25,7 +25,7 @@ pub enum TarError {
     TooLarge { bytes: usize },
     #[error("more than {most} files", most = MAX_FILES)]
     TooMany,
-    #[error("it is no tar archive")]
+    #[error("it is not a tar archive")]
     NotTar,
     #[error("it ends within a file: the copy is not complete")]
     Incomplete,
@@ -35,7 +35,7 @@ pub enum TarError {
     Name(String),
     #[error("`{0}` is {1}, and a bundle has files only")]
     Kind(String, &'static str),
-    #[error("`{0}` does not follow the file before it in the order of names, or is there twice")]
+    #[error("`{0}` is not in the order of the names, or occurs twice")]
     Order(String),
     #[error("the header of `{0}` was changed: name, mode, owner, time or checksum")]
     Header(String),

@@ -122,7 +122,7 @@ fn every_wrong_bundle_is_refused_with_its_cause() {
     };
     let manifest = |old, new| changed(MANIFEST, old, new);
     let cases: Vec<(Vec<u8>, &str)> = vec![
-        (b"no archive".to_vec(), "it is no tar archive"),
+        (b"no archive".to_vec(), "it is not a tar archive"),
         (bundle.bytes[..end / 2].to_vec(), "the copy is not complete"),
         (
             bundle.bytes[..end - 512].to_vec(),

@@ -126,7 +126,7 @@ pub enum Warning {
         at_mm: f64,
     },
     #[error(
-        "the best delta, {delta_mm} mm, is at an end of the scan: a better one may lie beyond it (--delta), and friction that changes at once has none (--direction sign)"
+        "the best delta, {delta_mm} mm, is at an end of the scan: a better one may lie beyond it (--delta); friction that changes direction at once needs none (--direction sign)"
     )]
     DeltaAtEnd { delta_mm: f64 },
     #[error("{parameter} = {value:.2e} is not determined by the recordings{}: {excitation}", .error.map_or(String::new(), |e| format!(" (standard error {e:.1e})")))]

@@ -82,7 +82,7 @@ pub enum ForceCurveFault {
     },
     #[error("the unit of {0} changes: a curve has one unit")]
     UnitChanges(&'static str),
-    #[error("{found} fields, but column {column} is the {expected}th: remove or complete the row")]
+    #[error("{found} fields, but {column} is column {expected}: complete or remove the row")]
     Ragged {
         found: usize,
         column: &'static str,

@@ -84,7 +84,7 @@ pub struct Named {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "the messages have the meanings")]
 pub enum NameError {
-    #[error("a column is KEY=NAME or KEY=NAME:UNIT, with the key t, x, v, a or f")]
+    #[error("write a column as KEY=NAME or KEY=NAME:UNIT, where KEY is t, x, v, a or f")]
     Form,
     #[error("`{}` is no unit of {column}: {units}", Untrusted(.unit))]
     Unit {

@@ -140,7 +140,7 @@ pub struct PowerSpread {
 pub struct PowerPlan {
     /// Simulated studies of each design.
     pub studies: Option<u64>,
-    /// Power that is wanted.
+    /// Target power.
     pub targets: Vec<f64>,
     /// Tests; the first one decides.
     pub tests: Vec<PowerTest>,

@@ -142,7 +142,7 @@ fn every_bad_file_is_told_with_its_line() {
         ),
         (
             TIDY.replace("100,1,0,A switch", "100"),
-            "line 3: 1 fields, but column displacement is the 2th",
+            "line 3: 1 fields, but displacement is column 2",
         ),
         (
             TIDY.replace("100,1,0", "100,0,0").replace("0.1", "0"),
