@@ -75,6 +75,20 @@ fn a_realization_without_ratings_does_not_affect_the_others() {
     assert!(said.text.contains("m1"), "{}", said.text);
 }
 
+#[test]
+fn a_table_with_an_oddity_has_its_warning_and_another_has_none() {
+    let fine = table(some);
+    let (short, _) = fine.trim_end().rsplit_once('\n').unwrap();
+    let codes = |csv: &str| -> Vec<&str> { of(csv).warnings.iter().map(|w| w.code).collect() };
+    for (code, odd) in [
+        ("unbalanced", short.to_owned()),
+        ("vaf-differs", fine.replacen("0.70", "0.71", 1)),
+    ] {
+        assert!(codes(&odd).contains(&code), "{:?}", codes(&odd));
+        assert!(!codes(&fine).contains(&code), "{code}");
+    }
+}
+
 /// Trials numbered from 1 in each of two sessions: what came before a trial is
 /// not known, and no rating of the other session stands in for it.
 #[test]

@@ -414,20 +414,17 @@ fn every_column_of_every_table_is_described() {
                 "each has a meaning"
             );
         }
+        let protocol = fs::read_to_string(folder.join("protocol/1/protocol.toml")).unwrap();
         let (out, _) = export(&folder, "bids", home, "bids", &more);
         for (name, bytes) in files(&out) {
             let Some(table) = name.strip_suffix("_beh.tsv") else {
                 continue;
             };
             let text = String::from_utf8(bytes).unwrap();
-            let sidecar = format!(
-                "{}_beh.json",
-                table
-                    .split_once("_task-")
-                    .map(|(_, t)| format!("task-{t}"))
-                    .unwrap()
-            );
-            let about = json(&out.join(&sidecar));
+            let (_, task) = table.split_once("_task-").unwrap();
+            let about = json(&out.join(format!("task-{task}_beh.json")));
+            let told = protocol.contains("instructions = ");
+            assert_eq!(about["Instructions"].is_string(), told, "{name}");
             for column in text.lines().next().unwrap().split('\t') {
                 assert!(about[column]["Description"].is_string(), "{name}: {column}");
             }

@@ -79,12 +79,13 @@ fn the_right_device_passes_and_is_marked_as_simulated() {
         (&true.into(), &true.into())
     );
     assert_eq!(record["kind"], "commission");
-    assert!(
-        step(&record, "weight")["seen"]
-            .as_str()
-            .unwrap()
-            .contains("gain 1.00")
-    );
+    let weight = step(&record, "weight");
+    for (key, said) in [
+        ("required", "balanced by 204 g within 10 %"),
+        ("seen", "gain 1.00"),
+    ] {
+        assert!(weight[key].as_str().unwrap().contains(said), "{weight}");
+    }
     assert_eq!(step(&record, "unpowered friction")["seen"], "0.4 N");
     for text in ["SIMULATED", "All steps passed", "by LW", "emergency stop"] {
         assert!(page.contains(text), "{text}: {page}");

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use study::plain::dialogue::Dialogue;
 use study_plan::protocol::Answer;
 use study_session::outcome::Author;
-use study_session::session::Input;
+use study_session::session::{Input, Screen};
 
 /// `study` with its lines.
 pub(crate) struct Lines {
@@ -344,8 +344,12 @@ fn lines_can_remark_correct_stop_pause_quit_and_resume() {
     assert_eq!(ratings.lines().count(), 6, "{ratings}");
     assert_eq!(ratings.matches(",ok,").count(), 5, "{ratings}");
     let attempts = fs::read_to_string(results.join("attempts.csv")).unwrap();
-    for word in ["motor hums", "somebody came in", "mistyped"] {
-        assert_eq!(attempts.matches(word).count(), 1, "{word}\n{attempts}");
+    for by in [
+        ",experimenter,motor hums,",
+        ",marked-bad,,somebody came in,",
+        ",experimenter,mistyped,",
+    ] {
+        assert_eq!(attempts.matches(by).count(), 1, "{by}\n{attempts}");
     }
 }
 
@@ -399,8 +403,8 @@ fn of_pasted_lines_only_the_first_answers() {
 /// By whom a remark and a correction are, what an Enter keeps, and how a correction is left.
 #[test]
 fn typed_lines_have_an_author_and_a_way_back() {
-    use crate::views::{TRIAL, comment, form, realism, view};
-    let mut view = view(form(vec![realism(), comment()]));
+    use crate::views::{TRIAL, comment, form, realism, view as shown};
+    let mut view = shown(form(vec![realism(), comment()]));
     let mut dialogue = Dialogue::new(false, false);
     dialogue.follow(&view);
     for (command, by) in [
@@ -432,6 +436,18 @@ fn typed_lines_have_an_author_and_a_way_back() {
         matches!(&inputs[..], [Input::Correct { by: Author::Experimenter, answer: Answer::Rating(7), reason, .. }] if reason == "mistyped"),
         "{inputs:?}"
     );
+    // Nobody remarks before it is known who takes part.
+    let who = shown(Screen::Who {
+        participant: String::new(),
+        operator: String::new(),
+        roster: None,
+        claiming: false,
+    });
+    let mut first = Dialogue::new(false, false);
+    first.follow(&who);
+    let said = first.line("/remark it hums", &who);
+    assert_eq!(said.0, []);
+    assert_eq!(said.1, ["That is possible once the session has begun."]);
     // Which answer Enter keeps after a step back.
     view.correctable[0].form = TRIAL;
     let said = Dialogue::new(false, false).follow(&view).lines.join(" ");

@@ -326,6 +326,8 @@ mod tests {
         for (columns, cut) in [(0, ""), (1, "…"), (3, "ab…"), (4, "abcd")] {
             assert_eq!(cut_end("abcd", columns), cut);
         }
+        let begun = [1, 2, 3].map(|most| beginning("日本", most));
+        assert_eq!(begun, ["日…", "日本", "日本"]);
     }
 
     #[test]

@@ -460,6 +460,10 @@ mod tests {
         // after trials 5 and 10, not after the last
         assert!((minutes(&protocol) - (240.0 + 15.0 * 56.0) / 60.0).abs() < 1e-9);
         assert_eq!(trials(&protocol), 15);
+        // practice takes as long as any trial
+        let before = minutes(&protocol);
+        protocol.design.practice = vec![protocol.models[0].id.clone()];
+        assert!((minutes(&protocol) - before - 56.0 / 60.0).abs() < 1e-9);
     }
 
     #[test]

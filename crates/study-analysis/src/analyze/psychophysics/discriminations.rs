@@ -258,6 +258,32 @@ mod tests {
     use super::*;
     use crate::analyze::record::Stat;
 
+    /// Tracks are compared, not tracks in a session.
+    #[test]
+    fn a_threshold_of_several_sessions_is_one_for_each_track() {
+        let measured = [
+            ("x", "first", 0.2),
+            ("y", "first", 0.5),
+            ("x", "second", 0.8),
+        ];
+        let measured = measured.map(|(condition, session, value)| Measured {
+            participant: "A".to_owned(),
+            group: None,
+            session: Some(session.to_owned()),
+            condition: condition.to_owned(),
+            value,
+        });
+        // geometric means of ratios, else means
+        for (ratios, of_x) in [(true, 0.4), (false, 0.5)] {
+            let found = over_sessions(&measured, ratios);
+            let found: Vec<_> = found.iter().map(|t| (t.condition, t.value)).collect();
+            assert!(
+                matches!(found[..], [("x", x), ("y", 0.5)] if (x - of_x).abs() < 1e-12),
+                "{found:?}"
+            );
+        }
+    }
+
     /// Half of the answers right is chance among two, and above it among three.
     #[test]
     fn chance_depends_on_the_number_of_answers() {

@@ -359,6 +359,22 @@ mod tests {
         }
     }
 
+    /// A protocol may declare its tracks in any order.
+    #[test]
+    fn a_contrast_is_that_of_its_names_whatever_comes_first() {
+        let mut thresholds = THRESHOLDS.map(|(participant, condition, value)| Threshold {
+            participant,
+            condition,
+            value,
+        });
+        thresholds.reverse();
+        let found = mixed(&thresholds, true).unwrap();
+        for (name, contrast) in &of(true).pairs {
+            let [found, expected] = [&found.pairs[name], contrast].map(|c| c.ratio.number());
+            assert!((found.unwrap() / expected.unwrap() - 1.0).abs() < 1e-9);
+        }
+    }
+
     #[test]
     fn levels_without_ratios_have_differences() {
         let model = of(false);
