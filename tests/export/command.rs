@@ -8,10 +8,17 @@ use serde_json::Value;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
+use study_analysis::export::{FORMATS, FormatInfo};
 use study_plan::protocol::Answer;
 use study_session::outcome::Event;
 
-const FORMATS: [&str; 6] = ["csv", "wide", "bids", "psych-ds", "frictionless", "r"];
+/// The option for telemetry, where the format has a place for it.
+fn with_telemetry(format: &FormatInfo) -> &'static [&'static str] {
+    match format.telemetry {
+        true => &["--with-telemetry"],
+        false => &[],
+    }
+}
 
 fn csv(path: &Path) -> (Vec<String>, Vec<csv::StringRecord>) {
     let mut reader = csv::Reader::from_path(path).unwrap();
@@ -97,12 +104,8 @@ fn hostile_texts_are_text_in_every_format() {
 fn a_study_gives_the_same_bytes_and_no_path_of_this_machine() {
     let home = tempfile::tempdir().unwrap();
     let folder = hostile(home.path());
-    for to in FORMATS {
-        let more: &[&str] = if to == "wide" {
-            &[]
-        } else {
-            &["--with-telemetry"]
-        };
+    for format in FORMATS {
+        let (to, more) = (format.name, with_telemetry(format));
         let (a, _) = export(&folder, to, home.path(), &format!("{to}-a"), more);
         let (b, _) = export(&folder, to, home.path(), &format!("{to}-b"), more);
         let (a, b) = (files(&a), files(&b));
@@ -132,7 +135,7 @@ fn real_pilot_and_simulated_data_are_never_together() {
     );
     assert_eq!(code, 1, "{err}");
     assert!(!home.path().join("x").exists());
-    for to in FORMATS {
+    for FormatInfo { name: to, .. } in FORMATS {
         let (out, err) = export(&simulated, to, home.path(), to, &["--include", "simulated"]);
         assert!(!err.contains("interim"), "{err}");
         let readme = fs::read_to_string(out.join("README.md")).unwrap();
@@ -161,7 +164,7 @@ fn comments_stay_away_if_asked() {
         said.contains("ratings: 0-x_ trial 1, comment: has"),
         "{said}"
     );
-    for to in FORMATS {
+    for FormatInfo { name: to, .. } in FORMATS {
         let (out, said) = export(&folder, to, home.path(), to, &["--without-comments"]);
         assert!(!said.contains("may identify"), "{said}");
         for (name, bytes) in files(&out) {
@@ -186,13 +189,9 @@ fn ids_and_times_are_replaced_and_left_out_if_asked() {
     );
     let ratings = |out: &Path| column(&out.join("ratings.csv"), "realism");
     let (plain, _) = export(&folder, "csv", home.path(), "plain", &[]);
-    for to in FORMATS {
+    for format in FORMATS {
+        let (to, telemetry) = (format.name, with_telemetry(format));
         let more = ["--redact", "ids,times", "--without-comments"];
-        let telemetry: &[&str] = if to == "wide" {
-            &[]
-        } else {
-            &["--with-telemetry"]
-        };
         let (out, _) = export(
             &folder,
             to,
@@ -360,7 +359,7 @@ fn who_withdrew_is_in_no_data_set_and_who_is_excluded_is() {
         let (code, _, err) = study(&arguments, home.path());
         assert_eq!(code, 0, "{err}");
     }
-    for to in FORMATS {
+    for FormatInfo { name: to, .. } in FORMATS {
         let (out, said) = export(&folder, to, home.path(), to, &[]);
         for (name, bytes) in files(&out) {
             let text = format!("{name} {}", String::from_utf8_lossy(&bytes));
@@ -382,7 +381,7 @@ fn who_withdrew_is_in_no_data_set_and_who_is_excluded_is() {
     let log = fs::read_to_string(folder.join("reveals.jsonl")).unwrap();
     assert_eq!(
         log.matches("study export of an unfinished study").count(),
-        6,
+        FORMATS.len(),
         "{log}"
     );
 }

@@ -154,8 +154,17 @@ impl<'d, 't> Section<'d, 't> {
         let Some((values, list)) = list.and_then(|list| Some((list.array()?, list))) else {
             return Vec::new();
         };
-        if matches!(self.key(name).kind, Kind::Texts(least) if values.len() < least) {
-            list.fault(Fault::error(format!("`{}` is empty", list.path())));
+        if let Kind::Texts(least) = self.key(name).kind
+            && values.len() < least
+        {
+            let wrong = match values.len() {
+                0 => format!("`{}` is empty", list.path()),
+                n => format!(
+                    "`{}` has too few entries: {n} of at least {least}",
+                    list.path()
+                ),
+            };
+            list.fault(Fault::error(wrong));
         }
         (values.into_iter())
             .filter_map(|value| {
