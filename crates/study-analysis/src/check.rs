@@ -186,7 +186,7 @@ fn certified(loaded: &Loaded) -> Vec<Certified<'_>> {
                 negative_damping: certificate.negative_damping,
                 stiffness_n_per_mm: certificate.stiffness_n_per_mm,
                 damping_n_s_per_mm: certificate.damping_n_s_per_mm,
-                danger: danger(realization).map(|danger| danger.to_string()),
+                danger: danger(realization).map(|danger| stated(realization, danger)),
                 certificate,
                 beyond: beyond(realization),
                 has_coverage: realization.provenance.coverage.is_some(),
@@ -208,6 +208,18 @@ fn danger(realization: &Realization) -> Option<Danger> {
     passes
         .then(|| safe_play::refusal(realization, &device).or_else(chatter))
         .flatten()
+}
+
+/// A danger; chatter with what a reversal draws at most.
+fn stated(realization: &Realization, danger: Danger) -> String {
+    let reversal = safe_play::reversal(realization, &safe_play::Device::default());
+    match (danger, reversal) {
+        (Danger::Chatter { .. }, Some(reversal)) => format!(
+            "{danger}; a reversal draws at most {:.3} mJ, and nothing above {:.0} mm/s",
+            reversal.most_mj, reversal.up_to_mm_s
+        ),
+        _ => danger.to_string(),
+    }
 }
 
 /// A hand moves a handle so fast, mm/s.

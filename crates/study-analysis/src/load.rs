@@ -43,7 +43,7 @@ const MAX_ORDERS_BYTES: usize = 64 * 1024 * 1024;
 const PERMIT: &str = "identify it with m, b >= 0, or permit it in [device]: uncertified = { play = true, force_n = ..., reason = \"...\" }";
 
 /// Hint for a realization that is not safe to play.
-const ANEW: &str = "its file is of an older version or from too little data: identify it anew, or permit it in [device]: uncertified = { play = true, force_n = ..., reason = \"...\" }";
+const ANEW: &str = "its file is of an older version, from too little data, or has friction by the sign of the velocity, for which --direction play is safer: identify it anew, or permit it in [device]: uncertified = { play = true, force_n = ..., reason = \"...\" }";
 
 /// File name of a protocol in its folder.
 pub const FILE_NAME: &str = "protocol.toml";

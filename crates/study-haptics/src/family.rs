@@ -234,13 +234,16 @@ fn blend(from: &Realization, to: &Realization, t: f64) -> Realization {
         ],
         v_mm_s: from.trained.v_mm_s.max(to.trained.v_mm_s),
     };
-    Realization {
+    let mut blend = Realization {
         trained,
         x_mm,
         positive,
         negative,
         ..from.clone()
-    }
+    };
+    // no recording is that of a blend
+    blend.provenance.coverage = None;
+    blend
 }
 
 /// The parameter at a position, interpolated; beyond the nodes that of the edge.

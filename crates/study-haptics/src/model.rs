@@ -15,7 +15,7 @@ pub use units::Units;
 
 use coverage::{Coverage, Determined};
 use std::collections::BTreeMap;
-use study_wire::certificate::{self, Certificate};
+use study_wire::certificate::{self, Certificate, windows};
 use study_wire::mechanism::{self, MechanismView, Scalars};
 use study_wire::predict::{BranchView, Direction, Lookup, TableView};
 
@@ -237,6 +237,22 @@ impl Realization {
     /// The passivity certificate over the trained range: whether the realization can
     /// supply energy to a hand.
     pub fn certificate(&self) -> Certificate {
+        let mut certificate = self.certificate_of_device();
+        if let (Direction::Play { delta_mm }, Lookup::Linear) = (self.direction, self.lookup)
+            && self.mechanism.is_none()
+            && !certificate.hysteresis.holds()
+        {
+            let mean = windows::least_mean_gap(&self.table(), delta_mm, self.trained.x_mm);
+            if mean.holds() {
+                certificate.hysteresis = mean;
+            }
+        }
+        certificate
+    }
+
+    /// The certificate as a device computes it, which judges each position and no windows of
+    /// play. What passes it passes [`Self::certificate`].
+    pub fn certificate_of_device(&self) -> Certificate {
         if let Some(mechanism) = &self.mechanism {
             return mechanism.view().certificate(self.trained.v_mm_s);
         }

@@ -3,11 +3,13 @@
 //! The certificate is about energy and takes the parameters as they are. This search plays a
 //! realization through the servo of a device ([`study_wire::servo`]: ramp, slew limit, clamp,
 //! period) behind an encoder with steps, over the whole range and up to twice the trained
-//! speed, and looks for three dangers:
+//! speed, and looks for dangers:
 //!
 //! * **Force**: at rest after a fast stroke, at an edge or elsewhere, a force that the
 //!   realization has in no slow motion: the stroke took it where no data were.
 //! * **Latching**: on the way back from there, another force than after a slow stroke.
+//! * **Reversals**: friction by the sign of the speed draws energy at every reversal. It is refused
+//!   where the damping of the device does not confine that to speeds below its velocity limit.
 //! * **Energy**: chatter around one position, and strokes back and forth, that draw energy
 //!   without end, beyond what the device's own damping takes.
 //!
@@ -17,9 +19,10 @@
 use crate::model::Realization;
 use std::f64::consts::TAU;
 use std::fmt;
-use study_wire::certificate::spring_damping_n_s_per_m;
-use study_wire::mechanism::FASTER_THAN_TRAINED;
-use study_wire::predict::Motion;
+use study_wire::certificate::reversal::{Renderer, Reversal};
+use study_wire::certificate::{Certificate, spring_damping_n_s_per_m};
+use study_wire::mechanism::{FASTER_THAN_TRAINED, MechanismView};
+use study_wire::predict::{Direction, Motion};
 use study_wire::servo::{Law, Rendering, Servo, ServoSettings};
 
 /// Speeds of the strokes, as shares of the highest.
@@ -60,15 +63,18 @@ pub struct Device {
     pub encoder_mm: f64,
     /// Largest stiffness that it renders, N/mm: its own damping is that which this takes.
     pub stiffness_n_per_mm: f64,
+    /// Coulomb friction of its own, N.
+    pub friction_n: f64,
 }
 
 impl Default for Device {
-    /// 4 kHz, 12 N, 5 µm and 100 N/mm, as the simulated device.
+    /// 4 kHz, 12 N, 5 µm and 100 N/mm without friction, as the simulated device.
     fn default() -> Self {
         Self {
             servo: ServoSettings::new(),
             encoder_mm: 0.005,
             stiffness_n_per_mm: 100.0,
+            friction_n: 0.0,
         }
     }
 }
@@ -97,6 +103,15 @@ pub enum Danger {
         to_mm: f64,
         /// Speed of the stroke before it, mm/s.
         by_mm_s: f64,
+    },
+    /// Reversals that draw energy at speeds that the device does not prevent.
+    Reversal {
+        /// Energy of a reversal, J, at most.
+        most_j: f64,
+        /// Speed up to which they draw energy, mm/s.
+        up_to_mm_s: f64,
+        /// The speed at which the device trips, mm/s.
+        trips_mm_s: f64,
     },
     /// Chatter that draws energy.
     Chatter {
@@ -136,6 +151,15 @@ impl fmt::Display for Danger {
             } => write!(
                 f,
                 "after a stroke of {by_mm_s:.0} mm/s to {to_mm:.2} mm the force stays {apart_n:.2} N off over {stays_mm:.1} mm of the way back"
+            ),
+            Self::Reversal {
+                most_j,
+                up_to_mm_s,
+                trips_mm_s,
+            } => write!(
+                f,
+                "friction by the sign of the velocity gives up to {:.3} mJ at each reversal, at speeds up to {up_to_mm_s:.0} mm/s; the device trips at {trips_mm_s:.0} mm/s",
+                1e3 * most_j
             ),
             Self::Chatter {
                 power_w,
@@ -201,7 +225,8 @@ impl<'a> Play<'a> {
     fn to(&mut self, x_mm: f64) {
         let hz = self.device.servo.servo_hz;
         let moved_mm = x_mm - self.x_mm;
-        self.energy_mj += (self.force_n + self.damping_n_s_per_mm * moved_mm * hz) * moved_mm;
+        self.energy_mj += (self.force_n + self.damping_n_s_per_mm * moved_mm * hz) * moved_mm
+            + self.device.friction_n * moved_mm.abs();
         self.x_mm = x_mm;
         let step = self.device.encoder_mm;
         let counted_mm = (x_mm / step).round() * step;
@@ -243,12 +268,39 @@ pub fn search(realization: &Realization, device: &Device) -> Vec<Danger> {
     })
 }
 
-/// The dangers for which a realization is refused: those of a mechanism whose state a stroke
-/// takes where no data were. A table has no such state. Takes a tenth of the whole search.
+/// The dangers for which a realization is refused: friction by the sign of the speed that the
+/// damping of the device does not confine, and a mechanism whose state a stroke takes where no
+/// data were. A table has no such state. Takes a tenth of the whole search.
 pub fn refusal(realization: &Realization, device: &Device) -> Option<Danger> {
+    let trips_mm_s = device.servo.velocity_mm_s;
+    if let Some(found) = reversal(realization, device).filter(|r| r.up_to_mm_s > trips_mm_s) {
+        return Some(Danger::Reversal {
+            most_j: 1e-3 * found.most_mj,
+            up_to_mm_s: found.up_to_mm_s,
+            trips_mm_s,
+        });
+    }
     realization.mechanism.as_ref()?;
     let found = with(realization, device, |search, slow| search.strokes(slow));
     found.first().copied()
+}
+
+/// What friction by the sign of the speed gives a hand at each reversal; `None` if the realization
+/// has none, or is too stiff for the device, which then refuses it.
+pub fn reversal(realization: &Realization, device: &Device) -> Option<Reversal> {
+    if realization.direction != Direction::Sign || realization.mechanism.is_some() {
+        return None;
+    }
+    let certificate = realization.certificate();
+    let servo = &device.servo;
+    let left = device.stiffness_n_per_mm - certificate.rendered_n_per_mm();
+    let renderer = Renderer {
+        servo_hz: servo.servo_hz,
+        encoder_mm: device.encoder_mm,
+        slew_n_s: servo.slew_n_s,
+        damping_n_s_per_mm: 1e-3 * spring_damping_n_s_per_m(left, servo.servo_hz, 0.0),
+    };
+    renderer.reversal(certificate.gap_n)
 }
 
 /// Chatter that draws energy: what friction by the sign of the speed does on any device,
@@ -263,28 +315,9 @@ fn with(
     device: &Device,
     look: impl FnOnce(&mut Search<'_>, &Slow),
 ) -> Vec<Danger> {
-    let mechanism = realization.mechanism.as_ref().map(|own| own.view());
-    let what = Rendering {
-        law: match mechanism {
-            Some(view) => Law::Mechanism(view),
-            None => Law::Table {
-                table: realization.table(),
-                rule: realization.direction,
-            },
-        },
-        range_mm: realization.trained.x_mm,
-        trained_mm_s: realization.trained.v_mm_s,
-    };
-    let certificate = realization.certificate();
-    let of = |n_per_mm: f64| 1e-3 * spring_damping_n_s_per_m(n_per_mm, device.servo.servo_hz, 0.0);
-    let asked = of(certificate.rendered_n_per_mm()) + certificate.damping_n_s_per_mm;
-    let own = of(device.stiffness_n_per_mm);
-    // a device that renders the realization has what it asks for
-    let damping = if asked.is_finite() {
-        own.max(asked)
-    } else {
-        own
-    };
+    let view = realization.mechanism.as_ref().map(|own| own.view());
+    let what = rendering(realization, view);
+    let damping = own_damping(&realization.certificate(), device);
     let mut search = Search {
         what: &what,
         device: *device,
@@ -294,6 +327,33 @@ fn with(
     let slow = search.slow();
     look(&mut search, &slow);
     search.found
+}
+
+/// A realization as a servo plays it; `view` is that of its mechanism.
+fn rendering<'a>(realization: &'a Realization, view: Option<MechanismView<'a>>) -> Rendering<'a> {
+    Rendering {
+        law: match view {
+            Some(view) => Law::Mechanism(view),
+            None => Law::Table {
+                table: realization.table(),
+                rule: realization.direction,
+            },
+        },
+        range_mm: realization.trained.x_mm,
+        trained_mm_s: realization.trained.v_mm_s,
+    }
+}
+
+/// The damping of a device, N·s/mm: one that renders the realization has what that asks for.
+fn own_damping(certificate: &Certificate, device: &Device) -> f64 {
+    let of = |n_per_mm: f64| 1e-3 * spring_damping_n_s_per_m(n_per_mm, device.servo.servo_hz, 0.0);
+    let asked = of(certificate.rendered_n_per_mm()) + certificate.damping_n_s_per_mm;
+    let own = of(device.stiffness_n_per_mm);
+    if asked.is_finite() {
+        own.max(asked)
+    } else {
+        own
+    }
 }
 
 struct Search<'a> {

@@ -10,7 +10,8 @@
 //!    state both branches contribute in either direction of motion, so the larger
 //!    slope of both signs counts, and the change of m with the state, |m⁺ − m⁻|/δ per
 //!    mm, is added;
-//! 3. S⁺(x) ≥ S⁻(x) with S = k x + F0, so a closed stroke does not gain energy.
+//! 3. S⁺(x) ≥ S⁻(x) with S = k x + F0, so a closed stroke does not gain energy. With the direction
+//!    rule play it is enough that this holds in the mean over its width: [`windows`].
 //!
 //! A negative k is allowed; it is the detent itself. Since m and b are linear between
 //! nodes, conditions 1 and 2 hold there if they hold at the nodes with the slopes on
@@ -21,6 +22,9 @@
 //! While a direction state changes from one branch to the other, the force changes by
 //! S⁺ − S⁻ over δ: a device renders this stiffness in addition to K.
 //!
+//! Without a direction state the force turns later than the hand, so that a reversal may draw
+//! energy: [`reversal`] bounds it.
+//!
 //! A sampled device needs additional damping: b_device > K T/2 + |B| (Colgate &
 //! Schenkel 1997), with n periods of delay K T (½ + n) + |B|, and 2 m/T for a mass
 //! unless the acceleration is low-pass filtered.
@@ -28,6 +32,9 @@
 //! Where parameters jump at nodes (look-ups `floor` and `nearest`), no damping can
 //! compensate a mass that grows along the motion: condition 2 then has the margin −∞,
 //! and K is infinite.
+
+pub mod reversal;
+pub mod windows;
 
 use super::predict::{BranchView, Direction, Lookup, TableView};
 use core::fmt;
@@ -115,6 +122,8 @@ pub struct Certificate {
     pub negative_damping: f64,
     /// K = max |dS/dx|, N/mm; infinite where S jumps.
     pub stiffness_n_per_mm: f64,
+    /// max |S⁺ − S⁻|, N.
+    pub gap_n: f64,
     /// max |S⁺ − S⁻|/δ, N/mm, by which a direction state changes the force in addition to
     /// K. `None` without a state: the force then jumps with the sign of v.
     pub state_n_per_mm: Option<f64>,
@@ -165,6 +174,7 @@ impl Certifier {
                 negative_mass: 0.0,
                 negative_damping: 0.0,
                 stiffness_n_per_mm: 0.0,
+                gap_n: 0.0,
                 state_n_per_mm: None,
                 damping_n_s_per_mm: 0.0,
                 mass_kg: 0.0,
@@ -343,6 +353,7 @@ impl Certificate {
     /// Includes S⁺ − S⁻ at a position. From z = −1 to 1 the force changes by it, over δ.
     fn include_gap(&mut self, gap_n: f64, at_mm: f64, delta_mm: Option<f64>) {
         self.hysteresis.include(gap_n, at_mm);
+        self.gap_n = self.gap_n.max(libm::fabs(gap_n));
         if let (Some(most), Some(delta_mm)) = (&mut self.state_n_per_mm, delta_mm) {
             let n_per_mm = libm::fabs(gap_n) / delta_mm;
             if n_per_mm > *most || n_per_mm.is_nan() {

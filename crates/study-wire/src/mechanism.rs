@@ -205,9 +205,10 @@ impl<'a> MechanismView<'a> {
         }
     }
 
-    /// The least F_c − ½ |F_c'| (s (1 + σ) + 2 T w) and its position, mm, at [`SLOWEST_S`]
-    /// and the speed w: not negative if the bristle takes more than a rising friction
-    /// adds to its energy.
+    /// By how much F_c at least exceeds what its rise ahead requires, and where, mm:
+    /// F_c ≥ ½ r s (1 + σ) + a T w in either direction, with the slope r ahead, the slope a behind
+    /// (0 if it does not rise), T = [`SLOWEST_S`] and the speed w. Not negative if the bristle
+    /// takes more than a rising friction adds to its energy.
     pub fn friction_margin_n(&self, top_mm_s: f64) -> (f64, f64) {
         let mut certifier = Certifier::new();
         while certifier.step(self, top_mm_s) {}
@@ -221,9 +222,9 @@ impl<'a> MechanismView<'a> {
         let mut certifier = Certifier::new();
         while certifier.step(self, FASTER_THAN_TRAINED * top_mm_s) {}
         let mut certificate = certifier.finish(self);
-        // F_c has a margin; any other flaw has none
-        if matches!(self.check(FASTER_THAN_TRAINED * top_mm_s), Err(flaw) if flaw != Flaw::Friction)
-        {
+        // a flaw that no margin shows has no number
+        let flaw = self.check(FASTER_THAN_TRAINED * top_mm_s).err();
+        if certificate.passes() && flaw.is_some_and(|flaw| flaw != Flaw::Friction) {
             certificate.hysteresis.value = f64::NEG_INFINITY;
         }
         certificate
@@ -317,19 +318,39 @@ impl Certifier {
             self.slopes_n_per_mm = [least.min(low), most.max(high)];
         } else {
             let left = self.judged - detents;
-            let Some([from, to]) = of.friction.n.get(left..left + 2) else {
+            if left + 1 >= of.friction.n.len() {
                 return false;
-            };
-            let p = &of.scalars;
-            let reach_mm = p.slip_mm * (1.0 + p.stribeck) + 2.0 * SLOWEST_S * top_mm_s;
-            let slope = libm::fabs(to - from) / of.friction.step_mm;
-            for (value, at) in [(from, left), (to, left + 1)] {
-                let at_mm = of.friction.first_mm + at as f64 * of.friction.step_mm;
-                self.friction.include(value - 0.5 * slope * reach_mm, at_mm);
+            }
+            self.judge_friction(of, left, top_mm_s);
+            if left + 2 == of.friction.n.len() {
+                self.judge_friction(of, left + 1, top_mm_s);
             }
         }
         self.judged += 1;
         true
+    }
+
+    fn judge_friction(&mut self, of: &MechanismView<'_>, node: usize, top_mm_s: f64) {
+        let (n, step_mm) = (of.friction.n, of.friction.step_mm);
+        let slope_to = |right: usize| match n.get(right) {
+            Some(to) if right > 0 => (to - n[right - 1]) / step_mm,
+            _ => 0.0,
+        };
+        let (behind, ahead) = (slope_to(node), slope_to(node + 1));
+        let bristle_mm = 0.5 * of.scalars.slip_mm * (1.0 + of.scalars.stribeck);
+        let way_mm = SLOWEST_S * top_mm_s;
+        let needed = if step_mm < way_mm {
+            // a step passes more than one value
+            (bristle_mm + way_mm) * libm::fabs(behind).max(libm::fabs(ahead))
+        } else {
+            let of = |ahead: f64, behind: f64| match ahead > 0.0 {
+                true => bristle_mm * ahead + way_mm * behind.max(0.0),
+                false => 0.0,
+            };
+            of(ahead, behind).max(of(-behind, -ahead))
+        };
+        let at_mm = of.friction.first_mm + node as f64 * step_mm;
+        self.friction.include(n[node] - needed, at_mm);
     }
 
     /// The certificate, after the last interval.
@@ -352,6 +373,7 @@ impl Certifier {
             hysteresis: self.friction,
             negative_mass: negative(mass_kg),
             negative_damping: negative(damping),
+            gap_n: 0.0,
             stiffness_n_per_mm: static_n_per_mm,
             state_n_per_mm: Some(of.stiffness_n_per_mm() - static_n_per_mm),
             damping_n_s_per_mm: of.damping_n_s_per_mm(),

@@ -9,6 +9,8 @@ use study_base::rng::Stream;
 use study_wire::mechanism::Scalars;
 use study_wire::predict::{Direction, Lookup};
 
+mod adversary;
+
 /// A switch of detents with friction, of any size: from a key of 4 mm and 0.5 N to a lever of
 /// 40 mm and 9 N.
 fn mechanism(draw: &mut Stream) -> Realization {

@@ -21,8 +21,6 @@ pub struct State<R = f64> {
     pub z: R,
     /// Deflection of the handle's bristle, in presliding lengths.
     pub z_handle: R,
-    /// F_c where the last step began, N: the energy of the bristle refers to it.
-    bristle_n: R,
 }
 
 impl<R: Real> State<R> {
@@ -34,7 +32,6 @@ impl<R: Real> State<R> {
             w_mm_s: Sum::of(R::ZERO),
             z: R::ZERO,
             z_handle: R::ZERO,
-            bristle_n: R::ZERO,
         }
     }
 
@@ -79,7 +76,6 @@ impl<R: Real> State<R> {
         .contact(p, motion.v_mm_s, dt_s);
 
         self.w_mm_s = self.w_mm_s.plus(faster_mm_s);
-        self.bristle_n = friction_n;
         self.z = (self.z + loading * self.w_mm_s.value) * kept;
         self.apart_mm = apart.plus(-dt_s * self.w_mm_s.value);
         let moved = moved_mm / p.handle_slip_mm;
@@ -104,7 +100,6 @@ impl State {
             let behind = 0.5 * p.gap_mm + libm::fabs(force_n) / p.contact_n_per_mm;
             state.apart_mm = Sum::of(if force_n < 0.0 { -behind } else { behind });
         }
-        state.bristle_n = mechanism.friction.linear_n(state.y_mm());
         Self {
             w_mm_s: Sum::of(motion.v_mm_s),
             z: sign,
@@ -113,14 +108,19 @@ impl State {
         }
     }
 
-    /// The energy that is stored beside that of the detents and of F_0, N·mm (mJ).
-    pub fn stored_n_mm(&self, mechanism: &MechanismView<'_>) -> f64 {
+    /// The energy that is stored beside that of the detents and of F_0, N·mm (mJ), for steps of
+    /// `dt_s`: of the bristle that which the next step leaves.
+    pub fn stored_n_mm(&self, mechanism: &MechanismView<'_>, dt_s: f64) -> f64 {
         let p = &mechanism.scalars;
+        let ratio = self.w_mm_s.value / p.stribeck_mm_s;
+        let g = 1.0 + p.stribeck * Real::exp(-ratio * ratio);
+        let slipping = dt_s * libm::fabs(self.w_mm_s.value) / (p.slip_mm * g);
+        let bristle_n = mechanism.friction.linear_n(self.y_mm()) / (1.0 + 2.0 * slipping);
         let deep = (libm::fabs(self.apart_mm.value) - 0.5 * p.gap_mm).max(0.0);
         let w_mm_s = self.w_mm_s.value;
         0.5e-3 * p.follower_kg * w_mm_s * w_mm_s
             + 0.5 * p.contact_n_per_mm * deep * deep
-            + 0.5 * self.bristle_n * p.slip_mm * self.z * self.z
+            + 0.5 * bristle_n * p.slip_mm * self.z * self.z
             + 0.5 * p.handle_n * p.handle_slip_mm * self.z_handle * self.z_handle
     }
 }
