@@ -2,7 +2,7 @@
 
 use study_base::rng::Stream;
 use study_plan::procedure::{Answer, Ladder, QuestPlus, Rule, Track};
-use study_stats::psychometric::{Core, Experiment, Level, maximum_likelihood, posterior};
+use study_stats::psychometric::{Core, Experiment, Level, Priors, maximum_likelihood, posterior};
 
 fn main() {
     divan::main();
@@ -71,11 +71,23 @@ fn fit_by_maximum_likelihood() {
 #[divan::bench]
 fn posterior_of_a_forced_choice() {
     let experiment = Experiment::ForcedChoice(0.5);
-    divan::black_box(posterior(Core::Norm, &levels(), experiment, None)).ok();
+    divan::black_box(posterior(
+        Core::Norm,
+        &levels(),
+        experiment,
+        &Priors::schuett(None),
+    ))
+    .ok();
 }
 
 /// With a guess rate of its own: five dimensions instead of four.
 #[divan::bench]
 fn posterior_of_yes_and_no() {
-    divan::black_box(posterior(Core::Norm, &levels(), Experiment::YesNo, None)).ok();
+    divan::black_box(posterior(
+        Core::Norm,
+        &levels(),
+        Experiment::YesNo,
+        &Priors::schuett(None),
+    ))
+    .ok();
 }

@@ -4,8 +4,10 @@
 //! `cargo bench --bench thresholds -- --tracks 2000` simulates a participant in a
 //! two-interval task whose function is a cumulative normal with mean 0.5 and standard
 //! deviation 0.2, on a ladder from 0 to 2. The seed is fixed: the same number of tracks
-//! prints the same tables for any number of threads. The last table is of a ladder whose levels
-//! are spaced by equal ratios, fitted over the level and over its logarithm.
+//! prints the same tables for any number of threads. The table after it is of a ladder whose levels
+//! are spaced by equal ratios, fitted over the level and over its logarithm (`--ratios`: only that).
+//! `--grid` prints bias and coverage over thresholds, lapses, trials and rules, with the priors of
+//! Schütt et al. and with those of tracks.
 #![allow(clippy::print_stdout)]
 
 use rayon::prelude::*;
@@ -16,7 +18,8 @@ use study_plan::procedure::{
 use study_stats::describe;
 use study_stats::distribution::normal_cdf;
 use study_stats::psychometric::{
-    Core, Curve, Experiment, Level, Posterior, Spacing, Support, maximum_likelihood, posterior,
+    Core, Curve, Experiment, Level, Posterior, Priors, Spacing, Support, WidthPrior,
+    maximum_likelihood, posterior,
 };
 
 const MEAN: f64 = 0.5;
@@ -25,7 +28,7 @@ const SD: f64 = 0.2;
 const WIDTH: f64 = 3.289_707_253_902_944;
 
 fn main() {
-    let (mut tracks, mut ratios_only) = (200, false);
+    let (mut tracks, mut ratios_only, mut grid_only) = (200, false, false);
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         if argument == "--tracks" {
@@ -33,8 +36,12 @@ fn main() {
             tracks = given.expect("--tracks takes a number");
         }
         ratios_only |= argument == "--ratios";
+        grid_only |= argument == "--grid";
     }
     println!("{tracks} tracks each\n");
+    if grid_only {
+        return grid(tracks);
+    }
     if !ratios_only {
         equal_differences(tracks);
     }
@@ -211,15 +218,13 @@ fn print_coverage(name: &str, rule: &Rule, lambda: f64, tracks: u64) {
     let curve = participant(lambda);
     let found = simulated(name, rule, &curve, tracks);
     let ladder = ladder();
-    let support = match rule {
-        Rule::Constant(_) => None,
-        _ => Support::of(ladder.levels().iter().copied()),
-    };
+    let support = Support::of(ladder.levels().iter().copied());
+    let priors = Priors::track(support, WidthPrior::FromOrigin(0.0));
     let within = |(low, high): (f64, f64), truth: f64| low <= truth && truth <= high;
     let bayes: Vec<(bool, bool)> = (found.par_iter())
         .filter_map(|(answers, _)| {
             let experiment = Experiment::ForcedChoice(0.5);
-            let p = posterior(Core::Norm, &levels(answers), experiment, support).ok()?;
+            let p = posterior(Core::Norm, &levels(answers), experiment, &priors).ok()?;
             Some((
                 within(p.threshold.ci95, curve.threshold),
                 within(p.width.ci95, curve.width),
@@ -361,15 +366,15 @@ fn print_ratios(participant: Grown, name: &str, rule: &Rule, tracks: u64) {
         ("logarithm, Weibull", Spacing::Log, Core::Gumbel),
     ] {
         let places = ladder.levels().iter().filter_map(|x| spacing.place(*x));
-        let support = Support::of(places);
+        let priors = Priors::track(Support::of(places), width_prior(spacing));
         let width = (spacing == Spacing::Log).then(|| participant.width());
         let one = |answers: &Vec<Answer>| {
             let placed = spacing.places(&levels(answers));
-            posterior(core, &placed, Experiment::ForcedChoice(0.5), support).ok()
+            posterior(core, &placed, Experiment::ForcedChoice(0.5), &priors).ok()
         };
         let fits: Vec<Posterior> = found.par_iter().filter_map(one).collect();
         let estimates: Vec<f64> = (fits.iter())
-            .map(|p| p.threshold_level(spacing).mean / RATIO_THRESHOLD)
+            .map(|p| p.threshold_level(spacing).median / RATIO_THRESHOLD)
             .collect();
         // Over the level, an estimate can be 0 or less.
         let positive: Vec<f64> = estimates
@@ -395,6 +400,146 @@ fn print_ratios(participant: Grown, name: &str, rule: &Rule, tracks: u64) {
             share(far),
             share(covered),
             widths.map_or_else(|| "–".to_owned(), |n| format!("{:.3}", share(n))),
+        );
+    }
+}
+
+/// As the analysis of a track whose standard is 0.
+fn width_prior(spacing: Spacing) -> WidthPrior {
+    match spacing {
+        Spacing::Lin => WidthPrior::FromOrigin(0.0),
+        Spacing::Log => WidthPrior::OfRatios,
+    }
+}
+
+/// The rules of the grid, on the ladder of ratios.
+fn grid_rules(trials: u32) -> Vec<(&'static str, Rule)> {
+    let [_, quest, ..] = &ratio_rules()[..] else {
+        return Vec::new();
+    };
+    let mut quest = quest.1.clone();
+    if let Rule::QuestPlus(quest) = &mut quest {
+        quest.trials = trials;
+    }
+    let mut staircase = ratio_rules().remove(0).1;
+    if let Rule::Staircase(staircase) = &mut staircase {
+        staircase.stop = Stop {
+            reversals: trials,
+            min_trials: trials,
+            max_trials: trials,
+        };
+    }
+    let ladder = ratio_ladder();
+    let constant = Rule::Constant(Constant {
+        levels: [1, 5, 9, 13, 17, 21, 25, 29]
+            .map(|i| ladder.level(i))
+            .to_vec(),
+        repetitions: trials / 8,
+    });
+    vec![
+        ("1-up-3-down", staircase),
+        ("QUEST+", quest),
+        ("constant", constant),
+    ]
+}
+
+/// Bias, root mean square and coverage for thresholds low, in the middle and high in the ladder,
+/// of functions inside and outside of the fitted family.
+fn grid(tracks: u64) {
+    println!(
+        "| participant | rule | trials | priors | ratio: least | mean | most | RMS of ln | coverage: least | mean | interval, factor |\n|---|---|---|---|---|---|---|---|---|---|---|"
+    );
+    let weibull = |slope: f64| move |x: f64| -(-std::f64::consts::LN_2 * x.powf(slope)).exp_m1();
+    let observers: [(&str, &(dyn Fn(f64) -> f64 + Sync)); 4] = [
+        ("Weibull, slope 2.5", &weibull(2.5)),
+        ("Weibull, slope 1.5", &weibull(1.5)),
+        ("Weibull, slope 4", &weibull(4.0)),
+        ("d′ in proportion", &|x| {
+            2.0 * normal_cdf(0.674_489_750_196_082 * x) - 1.0
+        }),
+    ];
+    for (participant, core) in observers {
+        for trials in [40, 80, 150] {
+            for (name, rule) in grid_rules(trials) {
+                print_grid(participant, core, name, &rule, trials, tracks);
+            }
+        }
+    }
+}
+
+/// What is found in one cell of the grid.
+struct Cell {
+    bias: f64,
+    square: f64,
+    coverage: f64,
+    span: f64,
+}
+
+fn print_grid(
+    participant: &str,
+    core: &(dyn Fn(f64) -> f64 + Sync),
+    name: &str,
+    rule: &Rule,
+    trials: u32,
+    tracks: u64,
+) {
+    let ladder = ratio_ladder();
+    let support = Support::of(ladder.levels().iter().map(|x| x.ln()));
+    let mut cells: [Vec<Cell>; 2] = [Vec::new(), Vec::new()];
+    for step in [8, 15, 22] {
+        for lapse in [0.0, 0.02, 0.05] {
+            let truth = ladder.level(step);
+            let correct = |level: f64| 0.5 + (0.5 - lapse) * core(level / truth);
+            let label = format!("{participant} {name} {trials} {step} {lapse}");
+            let found: Vec<Vec<Answer>> = (0..tracks)
+                .into_par_iter()
+                .map(|i| {
+                    let mut stream = Stream::new(i, &["grid", &label]);
+                    simulate(rule, &ladder, correct, &mut stream).0
+                })
+                .collect();
+            let all_priors = [
+                Priors::schuett(support),
+                Priors::track(support, WidthPrior::OfRatios),
+            ];
+            for (priors, cells) in all_priors.iter().zip(&mut cells) {
+                let fits: Vec<(f64, f64, f64)> = (found.par_iter())
+                    .filter_map(|answers| {
+                        let placed = Spacing::Log.places(&levels(answers));
+                        let experiment = Experiment::ForcedChoice(0.5);
+                        let p = posterior(Core::Gumbel, &placed, experiment, priors).ok()?;
+                        let (low, high) = p.threshold.ci95;
+                        let holds = low <= truth.ln() && truth.ln() <= high;
+                        let error = p.threshold.median - truth.ln();
+                        Some((error, f64::from(u8::from(holds)), high - low))
+                    })
+                    .collect();
+                let mean = |of: &dyn Fn(&(f64, f64, f64)) -> f64| {
+                    fits.iter().map(of).sum::<f64>() / fits.len() as f64
+                };
+                cells.push(Cell {
+                    bias: mean(&|f| f.0),
+                    square: mean(&|f| f.0 * f.0),
+                    coverage: mean(&|f| f.1),
+                    span: mean(&|f| f.2),
+                });
+            }
+        }
+    }
+    for (priors, cells) in ["Schütt et al.", "of tracks"].into_iter().zip(cells) {
+        let mean = |of: fn(&Cell) -> f64| cells.iter().map(of).sum::<f64>() / cells.len() as f64;
+        let end = |of: fn(f64, f64) -> f64, part: fn(&Cell) -> f64| {
+            cells.iter().map(part).reduce(of).unwrap_or_default()
+        };
+        println!(
+            "| {participant} | {name} | {trials} | {priors} | {:.3} | {:.3} | {:.3} | {:.3} | {:.3} | {:.3} | {:.2} |",
+            end(f64::min, |c| c.bias).exp(),
+            mean(|c| c.bias).exp(),
+            end(f64::max, |c| c.bias).exp(),
+            mean(|c| c.square).sqrt(),
+            end(f64::min, |c| c.coverage),
+            mean(|c| c.coverage),
+            mean(|c| c.span).exp(),
         );
     }
 }

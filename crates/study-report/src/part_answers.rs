@@ -247,7 +247,7 @@ pub(super) fn methods(part: &PartAnalysis) -> String {
     if !results.psy.is_empty() {
         text.push(format!(
             "The psychometric function of each participant and condition was {} with \
-             beta-binomial errors; thresholds are posterior means with equal-tailed 95 % intervals \
+             beta-binomial errors; thresholds are posterior medians with equal-tailed 95 % intervals \
              (Schütt et al., 2016), at half the height between guesses and lapses.",
             shapes(part)
         ));

@@ -20,7 +20,7 @@ mod simplex;
 mod spacing;
 
 pub use self::core::Core;
-pub use bayes::{Interval, Map, Posterior, Support, map, posterior};
+pub use bayes::{Interval, Map, Posterior, Priors, Support, WidthPrior, map, posterior};
 pub use group::{Group, group};
 pub use likelihood::{Fit, NoThreshold, deviance_p, free_lapse, maximum_likelihood};
 pub use spacing::Spacing;

@@ -8,7 +8,7 @@ use std::path::Path;
 use study_analysis::analyze::psychophysics::{TableKind, TrialSettings, analyze_table};
 use study_report::json;
 use study_report::text::{Page, trials};
-use study_stats::psychometric::{Core, Spacing, Support};
+use study_stats::psychometric::{Core, Priors, Spacing, Support, WidthPrior};
 
 /// Options of a table of trials.
 #[derive(Debug, clap::Args)]
@@ -120,12 +120,17 @@ pub(super) fn run(
             })
         })?),
     };
+    // Only over logarithms it is known what a width is likely to be.
+    let priors = match (support, spacing) {
+        (Some(support), Spacing::Log) => Priors::track(Some(support), WidthPrior::OfRatios),
+        (support, _) => Priors::schuett(support),
+    };
     let settings = TrialSettings {
         core,
         spacing,
         lambda: args.lapse,
         standard: args.standard,
-        support,
+        priors,
         repeats: args.bootstrap,
         seed: 2007,
     };

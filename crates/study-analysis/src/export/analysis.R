@@ -528,7 +528,7 @@ for (part in kept("pairs")) {
 
 #' ## Tracks
 #'
-#' The thresholds of `thresholds.csv` (posterior means of `study analyze`) are compared by the
+#' The thresholds of `thresholds.csv` (posterior medians of `study analyze`) are compared by the
 #' linear mixed model of their logarithms; whether two realizations are told apart, by a t test
 #' of what is 0 by chance. `sensitivities.csv` has the d' by which groups and sessions are compared.
 

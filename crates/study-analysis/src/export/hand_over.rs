@@ -57,7 +57,7 @@ impl Format for R {
             (
                 "thresholds.csv",
                 "threshold",
-                "the threshold of each participant on each track, a posterior mean of `study analyze`",
+                "the threshold of each participant on each track, a posterior median of `study analyze`",
             ),
             (
                 "sensitivities.csv",

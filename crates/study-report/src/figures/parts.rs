@@ -87,13 +87,15 @@ fn fitted<'a>(part: &'a PartAnalysis, cell: &LevelData) -> Option<&'a Function> 
     part.results.psy.get(&name)
 }
 
-/// The function of a cell, of posterior means, on its scale.
+/// The function of a cell, of the posterior, on its scale.
 fn curve(part: &PartAnalysis, cell: &LevelData) -> Option<Curve> {
     let means = &fitted(part, cell)?.posterior;
     let gamma = means.gamma.as_ref();
     Some(Curve {
         core: cell.core,
-        threshold: cell.spacing.place(means.threshold.mean.number()?)?,
+        threshold: cell
+            .spacing
+            .place(means.threshold.median.as_ref()?.number()?)?,
         width: means.width.mean.number()?,
         gamma: part.data.guess.or_else(|| gamma?.mean.number())?,
         lambda: means.lambda.mean.number()?,
@@ -171,7 +173,7 @@ fn psychometric(name: &str, part: &PartAnalysis) -> Option<Drawn> {
     };
     let caption = format!(
         "Psychometric functions. Points: {shares} by level, larger with more trials (up to 2, 7, more). \
-         Line: the function of the posterior means. Bar: threshold with its 95 % interval.{}",
+         Line: the function of the posterior medians of the threshold and means of the rest. Bar: threshold with its 95 % interval.{}",
         cut(cells.len())
     );
     let title = "Psychometric functions by participant and condition";
@@ -387,7 +389,7 @@ fn thresholds(name: &str, part: &PartAnalysis) -> Option<Drawn> {
         |function| {
             let found = &function.posterior.threshold;
             let ci95 = found.ci95.as_ref().and_then(Interval::ends);
-            (found.mean.number(), ci95)
+            (found.median.as_ref().and_then(|m| m.number()), ci95)
         },
         |condition| {
             let found = &part.results.over.psy_group.get(condition)?;
@@ -395,7 +397,7 @@ fn thresholds(name: &str, part: &PartAnalysis) -> Option<Drawn> {
             Some((found.geometric_mean.number(), found.ci95.ends()))
         },
     );
-    let caption = "Thresholds (posterior means) with 95 % intervals. Diamond: geometric mean over \
+    let caption = "Thresholds (posterior medians) with 95 % intervals. Diamond: geometric mean over \
                    participants with its t interval.";
     let label = format!("threshold, {}", level_label(part));
     let title = "Thresholds by participant";

@@ -75,7 +75,8 @@ fn thresholds(results: &PartResults) -> Table {
             &c.1.trials.n_trials
         })
         .field(column("threshold", "threshold"), plain, |c| {
-            &c.1.posterior.threshold.mean
+            let threshold = &c.1.posterior.threshold;
+            threshold.median.as_ref().unwrap_or(&threshold.mean)
         })
         .ends(interval("threshold_ci95"), plain, &|c| {
             c.1.posterior.threshold.ci95.as_ref()?.ends()
@@ -108,7 +109,7 @@ fn thresholds(results: &PartResults) -> Table {
         }
     }
     if !reasons.is_empty() {
-        let rests = "Without a maximum of the likelihood a posterior mean rests on its priors as much as on the answers; see its interval.";
+        let rests = "Without a maximum of the likelihood a posterior rests on its priors as much as on the answers; see its interval.";
         notes.push(rests.to_owned());
     }
     let of_reason = |(why, whose): (&str, Vec<String>)| {
@@ -148,7 +149,7 @@ fn threshold_note(logarithms: bool, staircases: bool) -> String {
     };
     format!(
         "Threshold: the level at which the function without guesses and lapses is ½. Width: from .05 to \
-         .95 of it. Both are posterior means{scale}.{reversals}"
+         .95 of it. The threshold is a posterior median, the width a posterior mean{scale}.{reversals}"
     )
 }
 

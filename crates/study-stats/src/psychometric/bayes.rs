@@ -1,5 +1,5 @@
 //! Maximum a posteriori and posterior of the beta-binomial model of Schütt, Harmeling,
-//! Macke & Wichmann (2016), with their priors.
+//! Macke & Wichmann (2016), with their priors or those of adaptive tracks ([`Priors`]).
 //!
 //! The positive answers of a level are beta-binomial with the mean ψ and ν = 1/η² − 1,
 //! so that η, between 0 and 1, is an overdispersion on the scale of a standard
@@ -79,9 +79,69 @@ impl Support {
     }
 }
 
-/// Logarithm of Beta(1, 10), up to a constant: of λ, of γ and of η.
-fn rate(x: f64) -> f64 {
-    9.0 * (1.0 - x).ln()
+/// The prior of a width.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum WidthPrior {
+    /// Even from twice the least distance of the levels to their range, with falls on both sides.
+    Even,
+    /// ln W is normal with the mean ln 1.63, which is the width of a Weibull function of exponent
+    /// 2.5 over logarithms, and the standard deviation 0.6.
+    OfRatios,
+    /// ln(W/(threshold − origin)) is normal with the mean ln 1.7 and the standard deviation 0.7;
+    /// thresholds are above the origin, where a stimulus equals the standard.
+    FromOrigin(f64),
+}
+
+impl WidthPrior {
+    /// Mean and standard deviation of the logarithm of a width over logarithms. 1.63 is
+    /// (ln(−ln .05) − ln(−ln .95))/2.5.
+    const OF_RATIOS: (f64, f64) = (0.486_664, 0.6);
+    /// The same, of a width in multiples of the distance of the threshold from the origin: 1.7 lies
+    /// between 1.4, of a Weibull function of exponent 2.5, and 2.8, of a d′ in proportion to the level.
+    const FROM_ORIGIN: (f64, f64) = (0.530_628, 0.7);
+}
+
+/// What is assumed of a function before the answers. The threshold is even over the support and
+/// falls over half a range on both sides; λ is Beta(1, `lapse`), and so is γ where it equals λ;
+/// γ of a yes–no experiment and η are Beta(1, 10).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Priors {
+    /// The range that the priors refer to; `None`: that of the levels presented.
+    pub support: Option<Support>,
+    /// The width.
+    pub width: WidthPrior,
+    /// b of λ ~ Beta(1, b), whose mean is 1/(1 + b).
+    pub lapse: f64,
+}
+
+impl Priors {
+    /// Those of Schütt et al. (2016), for data of any kind.
+    pub fn schuett(support: Option<Support>) -> Self {
+        Self {
+            support,
+            width: WidthPrior::Even,
+            lapse: 10.0,
+        }
+    }
+
+    /// Those of a track over a ladder. With the priors of Schütt et al. the thresholds of 40
+    /// to 150 trials near one level are 8 to 25 % too low: a share of lapses of 9 % on average
+    /// and widths of up to three ladders are taken to be plausible there (docs/calibration.md).
+    pub fn track(support: Option<Support>, width: WidthPrior) -> Self {
+        Self {
+            support,
+            width,
+            lapse: 30.0,
+        }
+    }
+}
+
+/// b of η and of γ as a parameter.
+const RATE: f64 = 10.0;
+
+/// Logarithm of Beta(1, b), up to a constant.
+fn rate(x: f64, b: f64) -> f64 {
+    (b - 1.0) * (1.0 - x).ln()
 }
 
 /// The mode of the posterior.
@@ -103,6 +163,8 @@ pub struct Interval {
     pub mean: f64,
     /// From 2.5 % to 97.5 %.
     pub ci95: (f64, f64),
+    /// The posterior median.
+    pub median: f64,
 }
 
 /// The posterior, with λ, η and, in a yes–no experiment, γ integrated out.
@@ -124,7 +186,7 @@ pub struct Posterior {
 
 impl Posterior {
     /// The threshold as a level: over logarithms too the mean is that of the level, not of its
-    /// logarithm, whose tail towards 0 is long.
+    /// logarithm, whose tail towards 0 is long. The median is the same on either scale.
     pub fn threshold_level(&self, spacing: Spacing) -> Interval {
         let mean = match spacing {
             Spacing::Lin => self.threshold.mean,
@@ -134,6 +196,7 @@ impl Posterior {
         Interval {
             mean,
             ci95: (spacing.level(low), spacing.level(high)),
+            median: spacing.level(self.threshold.median),
         }
     }
 }
@@ -144,6 +207,7 @@ struct Problem {
     levels: Vec<Level>,
     experiment: Experiment,
     support: Support,
+    priors: Priors,
 }
 
 impl Problem {
@@ -151,7 +215,7 @@ impl Problem {
         core: Core,
         levels: &[Level],
         experiment: Experiment,
-        support: Option<Support>,
+        priors: &Priors,
     ) -> Result<Self, NoThreshold> {
         let levels = pooled(levels);
         let good = |l: &Level| {
@@ -167,7 +231,7 @@ impl Problem {
             return Err(NoThreshold::Invalid);
         }
         let own = || Support::of(levels.iter().map(|l| l.level));
-        let support = support.or_else(own).ok_or(NoThreshold::OneLevel)?;
+        let support = priors.support.or_else(own).ok_or(NoThreshold::OneLevel)?;
         if levels.is_empty() {
             return Err(NoThreshold::OneLevel);
         }
@@ -177,24 +241,63 @@ impl Problem {
             levels,
             experiment,
             support,
+            priors: *priors,
         };
         valid.then_some(problem).ok_or(NoThreshold::Invalid)
     }
 
     /// Logarithm of the priors of the rates.
     fn rates(&self, lambda: f64, gamma: f64, eta: f64) -> f64 {
-        rate(lambda)
-            + rate(eta)
+        rate(lambda, self.priors.lapse)
+            + rate(eta, RATE)
             + match self.experiment {
                 Experiment::ForcedChoice(_) => 0.0,
-                Experiment::YesNo | Experiment::Comparison => rate(gamma),
+                Experiment::YesNo => rate(gamma, RATE),
+                Experiment::Comparison => rate(gamma, self.priors.lapse),
             }
+    }
+
+    /// Logarithm of the prior of a width, up to a constant.
+    fn width(&self, threshold: f64, width: f64) -> f64 {
+        let log_normal = |multiple: f64, (mean, sd): (f64, f64)| {
+            let z = (multiple.ln() - mean) / sd;
+            -0.5 * z * z - width.ln()
+        };
+        match self.priors.width {
+            WidthPrior::Even => self.support.width(width),
+            WidthPrior::OfRatios => log_normal(width, WidthPrior::OF_RATIOS),
+            WidthPrior::FromOrigin(origin) if threshold > origin => {
+                log_normal(width / (threshold - origin), WidthPrior::FROM_ORIGIN)
+            }
+            WidthPrior::FromOrigin(_) => f64::NEG_INFINITY,
+        }
+    }
+
+    /// Where ln W can be: the support of its prior, or all of it that counts.
+    fn log_widths(&self) -> (f64, f64) {
+        let (support, range) = (&self.support, self.support.range());
+        match self.priors.width {
+            WidthPrior::Even => (support.least.ln(), (3.0 * range).ln()),
+            WidthPrior::OfRatios => {
+                let (mean, sd) = WidthPrior::OF_RATIOS;
+                (mean - 5.0 * sd, mean + 5.0 * sd)
+            }
+            WidthPrior::FromOrigin(origin) => {
+                let (mean, sd) = WidthPrior::FROM_ORIGIN;
+                let farthest = support.high + range / 2.0 - origin;
+                let nearest = (support.low - origin).max(support.least / 2.0);
+                (
+                    nearest.ln() + mean - 5.0 * sd,
+                    farthest.max(support.least).ln() + mean + 5.0 * sd,
+                )
+            }
+        }
     }
 
     /// Logarithm of likelihood times prior.
     fn log_kernel(&self, curve: &Curve, eta: f64) -> f64 {
         let prior = self.support.threshold(curve.threshold)
-            + self.support.width(curve.width)
+            + self.width(curve.threshold, curve.width)
             + self.rates(curve.lambda, curve.gamma, eta);
         if prior == f64::NEG_INFINITY {
             return prior;
@@ -233,14 +336,18 @@ impl Problem {
 }
 
 /// The mode of the posterior; often at λ = 0 or η = 0. Equal levels are added up.
-/// Without `support` the priors refer to the levels.
 pub fn map(
     core: Core,
     levels: &[Level],
     experiment: Experiment,
-    support: Option<Support>,
+    priors: &Priors,
 ) -> Result<Map, NoThreshold> {
-    let problem = Problem::new(core, levels, experiment, support)?;
+    let problem = Problem::new(core, levels, experiment, priors)?;
+    mode(&problem).ok_or(NoThreshold::Invalid)
+}
+
+/// The highest of the maxima that are found from the best two of 150 starts.
+fn mode(problem: &Problem) -> Option<Map> {
     let size = problem.parameters();
     let kernel = |at: &[f64]| {
         let (curve, eta) = problem.curve(at);
@@ -260,10 +367,9 @@ pub fn map(
     let found = (starts.iter().take(2))
         .map(|(at, _)| simplex::maximize(kernel, at, &sizes[..size]))
         .max_by(|a, b| a.1.total_cmp(&b.1))
-        .filter(|found| found.1.is_finite())
-        .ok_or(NoThreshold::Invalid)?;
+        .filter(|found| found.1.is_finite())?;
     let (curve, eta) = problem.curve(&found.0);
-    Ok(Map {
+    Some(Map {
         curve,
         eta,
         log_kernel: found.1,
@@ -271,13 +377,13 @@ pub fn map(
 }
 
 /// Posterior means and intervals by quadrature over all parameters.
-/// Equal levels are added up. Without `support` the priors refer to the levels.
+/// Equal levels are added up.
 pub fn posterior(
     core: Core,
     levels: &[Level],
     experiment: Experiment,
-    support: Option<Support>,
+    priors: &Priors,
 ) -> Result<Posterior, NoThreshold> {
-    let problem = Problem::new(core, levels, experiment, support)?;
+    let problem = Problem::new(core, levels, experiment, priors)?;
     grid::integrate(&problem).ok_or(NoThreshold::Invalid)
 }

@@ -42,12 +42,12 @@ fn the_example_of_psignifit_agrees() {
     close(fit.deviance, 5.932_813_05, 1e-6);
     assert_eq!(fit.df, 11);
     let experiment = Experiment::ForcedChoice(0.5);
-    let mode = map(Core::Norm, &example(), experiment, None).unwrap();
+    let mode = map(Core::Norm, &example(), experiment, &Priors::schuett(None)).unwrap();
     close(mode.curve.threshold, 0.004_647_817, 5e-6);
     close(mode.curve.width, 0.004_659_072, 1.4e-5);
     assert!(mode.curve.lambda < 1e-4 && mode.eta < 1e-3);
     close(mode.log_kernel, -565.955_165, 1e-4);
-    let found = posterior(Core::Norm, &example(), experiment, None).unwrap();
+    let found = posterior(Core::Norm, &example(), experiment, &Priors::schuett(None)).unwrap();
     close(found.threshold.mean, 0.004_619_997, 7e-6);
     close(found.threshold.ci95.0, 0.004_279_277, 1e-5);
     close(found.threshold.ci95.1, 0.004_961_878, 1e-5);
@@ -146,7 +146,7 @@ fn data_without_a_maximum_are_refused() {
         Core::Norm,
         &levels(&rising),
         Experiment::ForcedChoice(0.5),
-        None,
+        &Priors::schuett(None),
     )
     .unwrap();
     let (low, high) = found.threshold.ci95;
@@ -223,8 +223,14 @@ fn the_support_can_be_given() {
     let narrow = levels(&[(1.0, 6.0, 10.0), (1.1, 9.0, 10.0)]);
     let experiment = Experiment::ForcedChoice(0.5);
     let ladder = Support::of((0..=20).map(|i| f64::from(i) / 10.0)).unwrap();
-    let own = posterior(Core::Norm, &narrow, experiment, None).unwrap();
-    let given = posterior(Core::Norm, &narrow, experiment, Some(ladder)).unwrap();
+    let own = posterior(Core::Norm, &narrow, experiment, &Priors::schuett(None)).unwrap();
+    let given = posterior(
+        Core::Norm,
+        &narrow,
+        experiment,
+        &Priors::schuett(Some(ladder)),
+    )
+    .unwrap();
     let width = |p: &Posterior| p.threshold.ci95.1 - p.threshold.ci95.0;
     assert!(width(&given) > 2.0 * width(&own));
     assert_eq!(Support::of([1.0, 1.0]), None);
@@ -254,7 +260,7 @@ fn logarithms_are_a_scale_of_their_own() {
     let experiment = Experiment::ForcedChoice(0.5);
     let of = |rows: &[Level]| {
         let rows = Spacing::Log.places(rows);
-        posterior(Core::Norm, &rows, experiment, None).unwrap()
+        posterior(Core::Norm, &rows, experiment, &Priors::schuett(None)).unwrap()
     };
     let (one, other) = (of(&rows), of(&thousandfold));
     let level = |p: &Posterior| p.threshold_level(Spacing::Log);
@@ -269,4 +275,36 @@ fn logarithms_are_a_scale_of_their_own() {
     close(Spacing::Log.level(fit.curve.threshold), 0.122_554_572, 1e-6);
     close(fit.curve.width, 1.736_495_7, 1e-5);
     close(fit.covariance.unwrap(), -0.050_302_6, 1e-5);
+}
+
+/// Many trials at few levels: the posterior is far narrower than the distance of the first nodes.
+/// Data: `menarche` of R's MASS. Reference: four chains of 40 000 steps of random-walk Metropolis in
+/// numpy.
+#[test]
+fn a_narrow_posterior_is_found() {
+    let ages = [
+        9.21, 10.21, 10.58, 10.83, 11.08, 11.33, 11.58, 11.83, 12.08, 12.33, 12.58, 12.83, 13.08,
+        13.33, 13.58, 13.83, 14.08, 14.33, 14.58, 14.83, 15.08, 15.33, 15.58, 15.83, 17.58,
+    ];
+    let girls = [
+        376, 200, 93, 120, 90, 88, 105, 111, 100, 93, 100, 108, 99, 106, 105, 117, 98, 97, 120,
+        102, 122, 111, 94, 114, 1049,
+    ];
+    let yes = [
+        0, 0, 0, 2, 2, 5, 10, 17, 16, 29, 39, 51, 47, 67, 81, 88, 79, 90, 113, 95, 117, 107, 92,
+        112, 1049,
+    ];
+    let rows: Vec<(f64, f64, f64)> = (ages.into_iter().zip(yes).zip(girls))
+        .map(|((age, yes), all)| (age, f64::from(yes), f64::from(all)))
+        .collect();
+    let priors = Priors::schuett(None);
+    let found = posterior(Core::Norm, &levels(&rows), Experiment::YesNo, &priors).unwrap();
+    close(found.threshold.mean, 13.0078, 3e-4);
+    close(found.threshold.median, 13.0083, 4e-4);
+    close(found.threshold.ci95.0, 12.9076, 1e-3);
+    close(found.threshold.ci95.1, 13.1032, 6e-4);
+    close(found.width.mean, 3.5606, 3e-3);
+    close(found.lambda, 0.004_338, 0.05);
+    close(found.gamma.unwrap(), 0.002_000, 0.08);
+    close(found.eta, 0.0574, 0.04);
 }

@@ -38,13 +38,15 @@ pub(crate) fn compared(chosen: &[Preference], tie: bool, alpha: f64) -> Compared
     }
 }
 
-/// The threshold of one participant on a track: the posterior mean. `None` if the answers
+/// The threshold of one participant on a track: the posterior median. `None` if the answers
 /// have none.
 pub(crate) fn threshold(asked: Asked, levels: &[Level], settings: &TrialSettings) -> Option<f64> {
     let (experiment, _) = asked.experiment()?;
     let levels = settings.spacing.places(levels);
-    let found = posterior(settings.core, &levels, experiment, settings.support);
-    found.ok().map(|p| p.threshold_level(settings.spacing).mean)
+    let found = posterior(settings.core, &levels, experiment, &settings.priors);
+    found
+        .ok()
+        .map(|p| p.threshold_level(settings.spacing).median)
 }
 
 /// The finding of thresholds of participants, by participant, track and value; `None` with

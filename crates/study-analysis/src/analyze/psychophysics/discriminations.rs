@@ -15,7 +15,7 @@ use study_plan::protocol::Protocol;
 use study_plan::protocol::parts::{Method, Part, TrackRules, Vary};
 use study_session::outcome::RatingRow;
 use study_stats::describe::mean;
-use study_stats::psychometric::{Core, Level, Spacing, Support, pooled};
+use study_stats::psychometric::{Core, Level, Priors, Spacing, Support, WidthPrior, pooled};
 
 /// Each track is fitted by itself; the priors refer to the range of its own ladder.
 pub(super) fn of_tracks(
@@ -55,7 +55,7 @@ pub(super) fn of_tracks(
         for participant in &people {
             let cell = CellName::of(participant, condition);
             let threshold = found.psy.get(&cell);
-            let threshold = threshold.and_then(|f| f.posterior.threshold.mean.number());
+            let threshold = threshold.and_then(|f| f.posterior.threshold.median.as_ref()?.number());
             let told_apart = sensitivity(asked, rules.method, found.sdt.get(&cell));
             if let Some(value) = threshold.or(told_apart.map(|t| t.0)) {
                 measured.push(Measured {
@@ -242,12 +242,23 @@ pub(crate) fn settings(protocol: &Protocol, track: &TrackRules) -> TrialSettings
     let places = |levels: &[f64]| -> Option<Vec<f64>> {
         levels.iter().map(|level| spacing.place(*level)).collect()
     };
+    let support = family.and_then(|f| Support::of(places(f.ladder.levels())?));
+    // Where a stimulus equals the standard, if all levels are above it.
+    let origin = track
+        .standard_level()
+        .and_then(|level| spacing.place(level));
+    let origin = origin.filter(|origin| support.is_some_and(|s| *origin <= s.low));
+    let width = match (origin, spacing) {
+        (Some(origin), _) => WidthPrior::FromOrigin(origin),
+        (None, Spacing::Log) => WidthPrior::OfRatios,
+        (None, Spacing::Lin) => WidthPrior::Even,
+    };
     TrialSettings {
         core,
         spacing,
         lambda: track.fit.lapse,
         standard: None,
-        support: family.and_then(|f| Support::of(places(f.ladder.levels())?)),
+        priors: Priors::track(support, width),
         repeats: 0,
         seed: protocol.study.seed,
     }

@@ -7,7 +7,7 @@ use crate::analyze::record::{Interval, Key as _, Number as _, Stat, statistics};
 use std::collections::BTreeMap;
 use study_stats::distribution::normal_quantile;
 use study_stats::psychometric::{
-    Core, Curve, Experiment, Fit, Level, NoThreshold, Spacing, Support, deviance_p, free_lapse,
+    Core, Curve, Experiment, Fit, Level, NoThreshold, Priors, Spacing, deviance_p, free_lapse,
     group, map, maximum_likelihood, pooled, posterior,
 };
 
@@ -96,9 +96,11 @@ statistics! {
     }
 
     /// A parameter in the posterior.
-    pub struct PosteriorMean {
+    pub struct Marginal {
         /// its mean
         mean: Stat,
+        /// its median, the same over levels and logarithms
+        median: Option<Stat>,
         /// equal-tailed
         ci95: Option<Interval>,
     }
@@ -106,15 +108,15 @@ statistics! {
     /// The posterior.
     pub struct Posterior {
         /// of the threshold, as a level
-        threshold: PosteriorMean,
+        threshold: Marginal,
         /// of the width
-        width: PosteriorMean,
+        width: Marginal,
         /// of the share of lapses
-        lambda: PosteriorMean,
+        lambda: Marginal,
         /// of the variation beyond the binomial one
-        eta: PosteriorMean,
+        eta: Marginal,
         /// of the share of guesses, in yes–no
-        gamma: Option<PosteriorMean>,
+        gamma: Option<Marginal>,
     }
 
     /// The psychometric function of a participant and condition.
@@ -161,7 +163,7 @@ statistics! {
     pub struct GroupThresholds {
         /// by maximum likelihood
         threshold: ThresholdSummary,
-        /// posterior means
+        /// posterior medians
         posterior_threshold: ThresholdSummary,
     }
 
@@ -204,8 +206,8 @@ pub struct FitSettings {
     pub lapse_most: Option<f64>,
     /// The standard of a comparison, for PSE, JND and Weber fraction.
     pub standard: Option<f64>,
-    /// The range that the priors refer to, on the scale; `None`: that of the levels.
-    pub support: Option<Support>,
+    /// What is assumed before the answers, on the scale.
+    pub priors: Priors,
     /// Simulated data sets for the p of the deviance; 0 for none, as in adaptive tracks.
     pub repeats: u32,
     /// Seed of those.
@@ -245,7 +247,13 @@ pub fn psychometric(cells: &[FitCell], settings: &FitSettings) -> Functions {
             };
             let group = GroupThresholds {
                 threshold: summary(|f| &f.ml.threshold),
-                posterior_threshold: summary(|f| &f.posterior.threshold.mean),
+                posterior_threshold: summary(|f| {
+                    f.posterior
+                        .threshold
+                        .median
+                        .as_ref()
+                        .unwrap_or(&f.posterior.threshold.mean)
+                }),
             };
             functions.psy_group.insert(condition.into(), group);
         }
@@ -407,7 +415,7 @@ fn comparison(fit: &Result<Fit, NoThreshold>, spacing: Spacing, standard: f64) -
 }
 
 fn mode(levels: &[Level], settings: &FitSettings) -> Mode {
-    let mode = map(settings.core, levels, settings.experiment, settings.support);
+    let mode = map(settings.core, levels, settings.experiment, &settings.priors);
     let found = mode.as_ref().ok();
     let stat = |x: Option<f64>| Stat::or(x, reason(&mode));
     Mode {
@@ -421,13 +429,15 @@ fn mode(levels: &[Level], settings: &FitSettings) -> Mode {
 }
 
 fn bayesian(levels: &[Level], settings: &FitSettings) -> Posterior {
-    let posterior = posterior(settings.core, levels, settings.experiment, settings.support);
+    let posterior = posterior(settings.core, levels, settings.experiment, &settings.priors);
     let found = posterior.as_ref().ok();
-    let mean = |mean: Option<f64>| PosteriorMean {
+    let mean = |mean: Option<f64>| Marginal {
         mean: Stat::or(mean, reason(&posterior)),
+        median: None,
         ci95: None,
     };
-    let with_interval = |of: Option<study_stats::psychometric::Interval>| PosteriorMean {
+    let with_interval = |of: Option<study_stats::psychometric::Interval>| Marginal {
+        median: Some(Stat::or(of.map(|i| i.median), reason(&posterior))),
         ci95: Some(Interval::or(of.map(|i| i.ci95), reason(&posterior))),
         ..mean(of.map(|i| i.mean))
     };

@@ -3,8 +3,8 @@
 pub use super::again::{Again, Groups, Profiles, Retest};
 pub use super::detection::Sensitivity;
 pub use super::fits::{
-    Fitted, FreeLapse, Function, Functions, GroupThresholds, MaximumLikelihood, Mode,
-    PooledFunction, Posterior, PosteriorMean, ThresholdSummary, WithStandard,
+    Fitted, FreeLapse, Function, Functions, GroupThresholds, Marginal, MaximumLikelihood, Mode,
+    PooledFunction, Posterior, ThresholdSummary, WithStandard,
 };
 pub use super::over_participants::{
     AboveChance, Center, ConditionModel, Contrast, FTest, GroupSensitivity, Sample,

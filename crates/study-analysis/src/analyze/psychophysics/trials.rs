@@ -6,7 +6,7 @@ use super::fits::{FitCell, FitSettings, psychometric};
 use super::results::PartResults;
 use std::collections::BTreeMap;
 use study_stats::detection::Answers;
-use study_stats::psychometric::{Core, Experiment, Level, Spacing, Support};
+use study_stats::psychometric::{Core, Experiment, Level, Priors, Spacing};
 
 /// How a trial is answered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -105,8 +105,8 @@ pub struct TrialSettings {
     pub lambda: f64,
     /// The standard of a comparison.
     pub standard: Option<f64>,
-    /// The range that the priors refer to, on the scale; `None`: that of the levels.
-    pub support: Option<Support>,
+    /// What is assumed before the answers, on the scale.
+    pub priors: Priors,
     /// Simulated data sets for the p of the deviance; 0 for adaptive tracks.
     pub repeats: u32,
     /// Seed of those.
@@ -148,7 +148,7 @@ pub fn discrimination(
             lambda: settings.lambda,
             lapse_most: Some(MOST_LAPSES),
             standard: settings.standard.filter(|_| asked == Asked::Comparison),
-            support: settings.support,
+            priors: settings.priors,
             repeats: settings.repeats,
             seed: settings.seed,
         };

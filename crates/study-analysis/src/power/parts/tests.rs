@@ -7,7 +7,7 @@ use study_plan::procedure::{Constant, Rule};
 use study_plan::protocol::parts::{Compared, FitRules};
 use study_stats::distribution::normal_upper;
 use study_stats::power::covariate::Spread;
-use study_stats::psychometric::{Core, Spacing, Support};
+use study_stats::psychometric::{Core, Priors, Spacing, Support};
 
 fn settings(part: PartWorld, tests: &[Test], studies: u64) -> Settings {
     Settings {
@@ -163,11 +163,11 @@ fn track(method: Method, compared: Compared, rule: Rule, truth: Truth) -> TrackW
             spacing: Spacing::Lin,
             lambda: 0.02,
             standard: None,
-            support: Some(Support {
+            priors: Priors::schuett(Some(Support {
                 low: 0.2,
                 high: 1.0,
                 least: 0.2,
-            }),
+            })),
             repeats: 0,
             seed: 1,
         },
@@ -247,7 +247,8 @@ fn thresholds_are_those_of_the_analysis() {
         .collect();
     let results = crate::analyze::psychophysics::discrimination(asked, &counts, &track.settings);
     let function = &results.psy[&CellName::of("P", "c")];
-    assert_eq!(function.posterior.threshold.mean.number(), Some(found));
+    let median = function.posterior.threshold.median.as_ref();
+    assert_eq!(median.and_then(|m| m.number()), Some(found));
     // A participant differs by a factor, or by a number of levels.
     assert_eq!(of_participant(typical, 0.1, false).threshold, 0.6);
     let doubled = of_participant(typical, libm::log(2.0), true);

@@ -1,15 +1,17 @@
 //! Quadrature over threshold, ln width, λ, η and γ.
 //!
-//! The box of integration starts as the support of the priors, and shrinks to where the
-//! density is above 10⁻⁷ of the highest one found. A coarse grid may miss the peak; the
-//! limit is then lower and the box larger, and the next grid is finer.
+//! The box of integration starts as the support of the priors, and shrinks around the mode to
+//! where the density is above 10⁻⁷ of the highest one. A coarse grid may miss a narrow peak
+//! altogether: the mode is searched for first, and a box has it and its neighbors always.
 
 use super::rows::{ETAS, Table, cubic};
-use super::{Experiment, Interval, MOST_ETA, MOST_RATE, Posterior, Problem};
+use super::{Experiment, Interval, MOST_ETA, MOST_RATE, Posterior, Problem, mode};
 use crate::quadrature::gauss_legendre;
 
 /// ln(10⁻⁷).
 const NEGLIGIBLE: f64 = -16.118;
+/// How often the box shrinks at most; it ends when no axis loses a tenth.
+const SHRINKS: usize = 12;
 /// A term so far below the highest one does not count in the sums.
 const NOTHING: f64 = -40.0;
 
@@ -41,6 +43,17 @@ struct Bounds {
     gamma: (f64, f64),
 }
 
+impl Bounds {
+    /// Whether an axis lost more than a tenth.
+    fn is_smaller_than(&self, before: &Self) -> bool {
+        let axes = |b: &Self| {
+            [b.threshold, b.log_width, b.lambda, b.eta, b.gamma].map(|(low, high)| high - low)
+        };
+        let pairs = axes(self).into_iter().zip(axes(before));
+        pairs.into_iter().any(|(now, before)| now < 0.9 * before)
+    }
+}
+
 /// An axis: nodes with weights, the highest density and the mass at each.
 struct Axis {
     nodes: Vec<(f64, f64)>,
@@ -63,16 +76,34 @@ impl Axis {
         Self::new((0..n).map(|i| (low + step * i as f64, step)).collect())
     }
 
-    fn gauss(n: usize, (low, high): (f64, f64)) -> Self {
-        Self::new(gauss_legendre(n, low, high))
+    /// A rate: nodes of Gauss and Legendre in its square root, so that they are dense near 0,
+    /// where the density of a rate is high and changes fast.
+    fn rate(n: usize, (low, high): (f64, f64)) -> Self {
+        let roots = gauss_legendre(n, low.sqrt(), high.sqrt());
+        let nodes = roots
+            .into_iter()
+            .map(|(u, weight)| (u * u, 2.0 * u * weight));
+        Self::new(nodes.collect())
     }
 
-    /// The part whose density counts, up to the next nodes.
-    fn shrunk(&self, top: f64, (low, high): (f64, f64)) -> (f64, f64) {
+    /// The part whose density counts, with the mode `peak`, up to the next nodes.
+    fn shrunk(&self, top: f64, peak: f64, (low, high): (f64, f64)) -> (f64, f64) {
         let counts = |h: &f64| *h > top + NEGLIGIBLE;
-        let first = self.highest.iter().position(counts).unwrap_or(0);
-        let last = self.highest.iter().rposition(counts);
-        let last = last.unwrap_or(self.nodes.len() - 1);
+        let end = self.nodes.len() - 1;
+        let below = self.nodes.iter().rposition(|n| n.0 <= peak).unwrap_or(0);
+        let above = self.nodes.iter().position(|n| n.0 >= peak).unwrap_or(end);
+        let first = self
+            .highest
+            .iter()
+            .position(counts)
+            .unwrap_or(end)
+            .min(below);
+        let last = self
+            .highest
+            .iter()
+            .rposition(counts)
+            .unwrap_or(0)
+            .max(above);
         (
             if first == 0 {
                 low
@@ -136,28 +167,36 @@ pub(super) fn integrate(problem: &Problem) -> Option<Posterior> {
     let range = support.high - support.low;
     let mut bounds = Bounds {
         threshold: (support.low - range / 2.0, support.high + range / 2.0),
-        log_width: (support.least.ln(), (3.0 * range).ln()),
+        log_width: problem.log_widths(),
         lambda: (0.0, MOST_RATE),
         eta: (0.0, MOST_ETA),
         gamma: (0.0, MOST_RATE),
     };
     let [coarse, fine] = Size::of(problem.experiment);
-    for _ in 0..4 {
+    let peak = mode(problem)?;
+    let log_width = peak.curve.width.ln();
+    for _ in 0..SHRINKS {
         let grid = evaluate(problem, &bounds, coarse)?;
-        let top = grid.threshold.highest.iter().copied();
-        let top = top.fold(f64::NEG_INFINITY, f64::max);
+        let found = grid.threshold.highest.iter().copied();
+        // The density of ln W is W times that of W.
+        let top = found.fold(peak.log_kernel + log_width, f64::max);
+        let before = bounds;
         bounds = Bounds {
-            threshold: grid.threshold.shrunk(top, bounds.threshold),
-            log_width: grid.log_width.shrunk(top, bounds.log_width),
-            lambda: grid.lambda.shrunk(top, bounds.lambda),
-            eta: grid.eta.shrunk(top, bounds.eta),
-            gamma: grid.gamma.shrunk(top, bounds.gamma),
+            threshold: (grid.threshold).shrunk(top, peak.curve.threshold, before.threshold),
+            log_width: grid.log_width.shrunk(top, log_width, before.log_width),
+            lambda: grid.lambda.shrunk(top, peak.curve.lambda, before.lambda),
+            eta: grid.eta.shrunk(top, peak.eta, before.eta),
+            gamma: grid.gamma.shrunk(top, peak.curve.gamma, before.gamma),
         };
+        if !bounds.is_smaller_than(&before) {
+            break;
+        }
     }
     let grid = evaluate(problem, &bounds, fine)?;
     let interval = |axis: &Axis, back: fn(f64) -> f64| Interval {
         mean: axis.mean(back),
         ci95: (back(axis.quantile(0.025)), back(axis.quantile(0.975))),
+        median: back(axis.quantile(0.5)),
     };
     Some(Posterior {
         threshold: interval(&grid.threshold, |t| t),
@@ -177,10 +216,10 @@ fn evaluate(problem: &Problem, bounds: &Bounds, size: Size) -> Option<Grid> {
     let n = size.curve;
     let mut threshold = Axis::even(n, bounds.threshold);
     let mut log_width = Axis::even(n, bounds.log_width);
-    let mut lambda = Axis::gauss(size.rate, bounds.lambda);
-    let mut eta = Axis::gauss(ETAS, bounds.eta);
+    let mut lambda = Axis::rate(size.rate, bounds.lambda);
+    let mut eta = Axis::rate(ETAS, bounds.eta);
     let mut gamma = match problem.experiment {
-        Experiment::YesNo => Axis::gauss(size.rate, bounds.gamma),
+        Experiment::YesNo => Axis::rate(size.rate, bounds.gamma),
         // One value: given, or that of λ.
         Experiment::ForcedChoice(_) | Experiment::Comparison => Axis::new(vec![(0.0, 1.0)]),
     };
@@ -196,7 +235,7 @@ fn evaluate(problem: &Problem, bounds: &Bounds, size: Size) -> Option<Grid> {
             let (log_w, _) = log_width.nodes[w];
             let width = log_w.exp();
             // The density of ln W is W times that of W.
-            let prior = prior_t + problem.support.width(width) + log_w;
+            let prior = prior_t + problem.width(at, width) + log_w;
             if prior == f64::NEG_INFINITY {
                 continue;
             }
