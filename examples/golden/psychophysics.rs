@@ -12,7 +12,7 @@ use study_plan::procedure::{Function, Parameter, Passes, QuestPlus, Scale, Stair
 use study_plan::procedure::{quest, staircase};
 use study_stats::detection::Answers;
 use study_stats::mushra::Screening;
-use study_stats::psychometric::{Core, Experiment, Level, Spacing};
+use study_stats::psychometric::{Core, Experiment, Level, Priors, Spacing};
 
 /// Seed of the bootstrap of the deviance.
 const SEED: u64 = 2007;
@@ -364,7 +364,7 @@ fn psychometric(input: &Settings) -> Result<Values, Error> {
         lambda: input.number("lambda")?,
         lapse_most: input.known("lapse_max"),
         standard: input.known("standard"),
-        support: None,
+        priors: Priors::schuett(None),
         repeats: 2_000,
         seed: SEED,
     };

@@ -357,6 +357,24 @@ fn a_table_that_fails_its_certificate_needs_a_permission() {
     }
 }
 
+/// Between nodes 1 mm apart the gap of 2 N between the branches falls to the gap at one node; the
+/// mean over the play of 0.5 mm is an eighth of the fall above it. The device judges each position.
+#[test]
+fn a_table_that_is_passive_over_its_play_needs_no_permission() {
+    for (gap_n, loads) in [(-0.1, true), (-0.5, false)] {
+        let mut table = ordinary();
+        let node = table.x_mm.len() / 2;
+        table.positive.f0_n[node] = table.negative.f0_n[node] + gap_n;
+        assert!(!table.certificate_of_device().passes());
+        assert_eq!(table.certificate().passes(), loads);
+        let mut device = VirtualDevice::new(Options::default());
+        let what = Stimulus::of_table(&table);
+        device.load(&what, limits(12.0), ms(0)).unwrap();
+        assert_eq!(device.poll(ms(100)) == [Report::Loaded], loads, "{gap_n}");
+        assert_eq!(device.start(ms(100)).is_ok(), loads);
+    }
+}
+
 #[test]
 fn each_injected_fault_has_its_effect() {
     let with = |fault| Options {
