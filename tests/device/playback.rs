@@ -368,7 +368,10 @@ fn a_table_that_is_passive_over_its_play_needs_no_permission() {
         assert!(!table.certificate_of_device().passes());
         assert_eq!(table.certificate().passes(), loads);
         let mut device = VirtualDevice::new(Options::default());
-        let what = Stimulus::of_table(&table);
+        let what = Stimulus {
+            allow_uncertified: false,
+            ..Stimulus::of_table(&table)
+        };
         device.load(&what, limits(12.0), ms(0)).unwrap();
         assert_eq!(device.poll(ms(100)) == [Report::Loaded], loads, "{gap_n}");
         assert_eq!(device.start(ms(100)).is_ok(), loads);
