@@ -103,7 +103,11 @@ fn questions_of_a_pilot(words: &Arc<Words>) -> Vec<(&'static str, View)> {
         examples.map(|kind| (known.word, kind))
     });
     let shown = |(name, mut kind): (&'static str, QuestionKind)| {
-        for (text, symbol) in kind.texts_mut().into_iter().zip(["◇", "◆", "○"].into_iter().cycle()) {
+        for (text, symbol) in kind
+            .texts_mut()
+            .into_iter()
+            .zip(["◇", "◆", "○"].into_iter().cycle())
+        {
             *text = symbol.to_owned();
         }
         let mut asked = question("asked", "？", kind);
