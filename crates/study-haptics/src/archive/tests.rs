@@ -179,7 +179,7 @@ fn every_wrong_bundle_is_refused_with_its_cause() {
         (first_header(|h| h[124..135].fill(b'7')), "bytes, more than"),
         (
             named("zzz"),
-            "`model.toml` does not follow the file before it",
+            "`model.toml` is not in the order of the names, or occurs twice",
         ),
         // files that are not there, or too many
         (

@@ -6,7 +6,7 @@
 //! and model files, which options apply to it, whether and how it is compared with the others).
 //! `friction.rs` is a short model.
 //!
-//! A [`Method`](super::Method) specifies a table up to the node spacing dx and the look-up, which a
+//! A [`Method`] specifies a table up to the node spacing dx and the look-up, which a
 //! grid varies. Its `Display` is the `provenance.method` of model files: the name followed by the
 //! options that differ from the default, so that a table can be reproduced.
 

@@ -175,21 +175,30 @@ pub(super) fn integrate(problem: &Problem) -> Option<Posterior> {
     let [coarse, fine] = Size::of(problem.experiment);
     let peak = mode(problem)?;
     let log_width = peak.curve.width.ln();
+    // Of the rates too little is known while the nodes of the curve are far from the mode.
+    let mut with_rates = false;
     for _ in 0..SHRINKS {
         let grid = evaluate(problem, &bounds, coarse)?;
         let found = grid.threshold.highest.iter().copied();
         // The density of ln W is W times that of W.
         let top = found.fold(peak.log_kernel + log_width, f64::max);
         let before = bounds;
+        let rate = |axis: &Axis, peak: f64, before: (f64, f64)| match with_rates {
+            true => axis.shrunk(top, peak, before),
+            false => before,
+        };
         bounds = Bounds {
             threshold: (grid.threshold).shrunk(top, peak.curve.threshold, before.threshold),
             log_width: grid.log_width.shrunk(top, log_width, before.log_width),
-            lambda: grid.lambda.shrunk(top, peak.curve.lambda, before.lambda),
-            eta: grid.eta.shrunk(top, peak.eta, before.eta),
-            gamma: grid.gamma.shrunk(top, peak.curve.gamma, before.gamma),
+            lambda: rate(&grid.lambda, peak.curve.lambda, before.lambda),
+            eta: rate(&grid.eta, peak.eta, before.eta),
+            gamma: rate(&grid.gamma, peak.curve.gamma, before.gamma),
         };
         if !bounds.is_smaller_than(&before) {
-            break;
+            if with_rates {
+                break;
+            }
+            with_rates = true;
         }
     }
     let grid = evaluate(problem, &bounds, fine)?;
