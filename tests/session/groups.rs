@@ -268,7 +268,7 @@ fn tracks_of_two_sessions_have_a_threshold_in_each_and_one_contrast() {
                 let trials = trials.iter().filter(of).count() as f64;
                 let id = format!("psy/{participant}/{track}@{session}");
                 assert_eq!(values[&format!("{id}/n_trials")], trials, "{id}");
-                let threshold = values[&format!("{id}/posterior/threshold/mean")].as_f64();
+                let threshold = values[&format!("{id}/posterior/threshold/median")].as_f64();
                 own.push(threshold.unwrap().ln());
             }
         }
