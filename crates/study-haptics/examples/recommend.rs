@@ -13,7 +13,8 @@ use study_haptics::recording::Names;
 fn main() -> Result<(), Box<dyn Error>> {
     let paths: Vec<String> = std::env::args().skip(1).collect();
     let [model, training, validation @ ..] = &paths[..] else {
-        return Err("MODEL TRAINING [VALIDATION…]".into());
+        println!("usage: recommend MODEL TRAINING [VALIDATION…]");
+        return Ok(());
     };
     let request = Request::default();
     let read = |path: &String| -> Result<Source, Box<dyn Error>> {

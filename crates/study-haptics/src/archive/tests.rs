@@ -217,7 +217,7 @@ fn every_wrong_bundle_is_refused_with_its_cause() {
         ),
         (
             manifest("2024-05-17", "2024-17-05"),
-            "`2024-17-05` is no day",
+            "`2024-17-05` is not a date",
         ),
         (
             manifest("measured by ThereminGoat", "measured by us"),
