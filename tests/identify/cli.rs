@@ -268,7 +268,7 @@ fn bad_arguments_and_bad_recordings_give_one_clear_error_each() {
         "--method",
         "magic",
         2,
-        "possible values: ewls, constrained, two-sided, hat, passive, mechanism, friction, static, segments, spring",
+        "possible values: ewls, constrained, two-sided, hat, passive, mechanism, elements, friction, static, segments, spring",
     );
     refused(&[TRAINING, "--method", "ewls"], 2, "--validate");
     refused(&[TRAINING, "--validate", "absent.csv"], 1, "absent.csv: ");

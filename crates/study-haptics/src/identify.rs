@@ -29,6 +29,7 @@ pub mod baseline;
 pub mod compare;
 pub mod constrained;
 pub mod delivery;
+mod elements;
 pub mod evidence;
 pub mod ewls;
 pub mod folds;
@@ -215,6 +216,7 @@ impl<'r> Training<'r> {
             Method::Hat(options) => self.hat(options, dx_mm, lookup),
             Method::Passive(options) => self.passive(options, dx_mm, lookup),
             Method::Mechanism(options) => self.mechanism(options, dx_mm, |_| ()),
+            Method::Elements(options) => self.elements(options, dx_mm),
             Method::Friction(options) => self.friction(options, lookup),
             Method::Static => self.static_profile(dx_mm, lookup),
             Method::Segments(options) => self.segments(options, lookup),
@@ -499,6 +501,7 @@ impl<'r> Training<'r> {
                 positive: branch(&positive.theta),
                 negative: branch(&negative.theta),
                 mechanism: None,
+                elements: None,
                 units: crate::model::Units::Linear,
             },
             warnings,

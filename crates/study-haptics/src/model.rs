@@ -7,9 +7,11 @@
 //! ([`study_wire::predict`]) and the passivity certificate ([`certificate`]) are shared
 //! with the firmware.
 
+mod elements;
 pub mod file;
 mod units;
 
+pub use elements::Elements;
 pub use units::Units;
 
 use std::collections::BTreeMap;
@@ -21,6 +23,8 @@ use study_wire::predict::{BranchView, Direction, Lookup, TableView};
 pub const FORMAT: &str = "study-model/1";
 /// The `format` of a model file with a mechanism.
 pub const FORMAT_2: &str = "study-model/2";
+/// The `format` of a model file with elements.
+pub const FORMAT_3: &str = "study-model/3";
 
 /// A haptic model's parameters and their origin: the contents of a model file.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,6 +53,9 @@ pub struct Realization {
     /// The mechanism that is rendered instead of the table. The table then has its mass,
     /// damping and static force: what it is at rest and in slow motion.
     pub mechanism: Option<Mechanism>,
+    /// The elements that are rendered instead of the table, which is then what they are in
+    /// slow motion.
+    pub elements: Option<Elements>,
 }
 
 /// The parameters of one direction, one value per node.
@@ -182,6 +189,7 @@ impl Realization {
             positive,
             negative,
             mechanism: Some(mechanism),
+            elements: None,
         }
     }
 
@@ -199,6 +207,9 @@ impl Realization {
             mechanism.detent.first_mm += by_mm;
             mechanism.friction.first_mm += by_mm;
         }
+        if let Some(elements) = &mut self.elements {
+            elements.shift(by_mm);
+        }
     }
 
     /// The same with a constant force added, N.
@@ -209,6 +220,9 @@ impl Realization {
         }
         if let Some(mechanism) = &mut self.mechanism {
             mechanism.scalars.offset_n += by_n;
+        }
+        if let Some(elements) = &mut self.elements {
+            elements.force_n.iter_mut().for_each(|n| *n += by_n);
         }
     }
 
@@ -227,6 +241,9 @@ impl Realization {
     pub fn certificate(&self) -> Certificate {
         if let Some(mechanism) = &self.mechanism {
             return mechanism.view().certificate(self.trained.v_mm_s);
+        }
+        if let Some(elements) = &self.elements {
+            return elements.view().certificate(self.trained.v_mm_s);
         }
         let range = certificate::Range {
             x_mm: self.trained.x_mm,

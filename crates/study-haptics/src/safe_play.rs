@@ -18,6 +18,7 @@ use crate::model::Realization;
 use std::f64::consts::TAU;
 use std::fmt;
 use study_wire::certificate::spring_damping_n_s_per_m;
+use study_wire::elements::Spring;
 use study_wire::mechanism::FASTER_THAN_TRAINED;
 use study_wire::predict::Motion;
 use study_wire::servo::{Law, Rendering, Servo, ServoSettings};
@@ -263,11 +264,11 @@ fn with(
     device: &Device,
     look: impl FnOnce(&mut Search<'_>, &Slow),
 ) -> Vec<Danger> {
-    let mechanism = realization.mechanism.as_ref().map(|own| own.view());
     let what = Rendering {
-        law: match mechanism {
-            Some(view) => Law::Mechanism(view),
-            None => Law::Table {
+        law: match (&realization.mechanism, &realization.elements) {
+            (Some(own), _) => Law::Mechanism(own.view()),
+            (None, Some(own)) => Law::Elements(own.view()),
+            (None, None) => Law::Table {
                 table: realization.table(),
                 rule: realization.direction,
             },
@@ -377,6 +378,13 @@ impl<'a> Search<'a> {
                 // what slow motion deflects the contact, to either side
                 let deflected_mm = 2.0 * slow.most_n / own.contact_n_per_mm;
                 own.gap_mm + 3.0 * own.slip_mm.max(own.handle_slip_mm) + deflected_mm
+            }
+            Law::Elements(view) => {
+                let memories = view.springs.iter().map(|spring| match *spring {
+                    Spring::Stop { slip_mm } | Spring::Maxwell { slip_mm, .. } => 2.0 * slip_mm,
+                    Spring::Latch { rearm_mm, break_mm } => break_mm - rearm_mm,
+                });
+                memories.fold(0.0, f64::max)
             }
         }
     }

@@ -239,6 +239,8 @@ pub(super) enum MethodName {
     Passive,
     /// A virtual mechanism with backlash, two masses and friction, fitted by simulation
     Mechanism,
+    /// A potential with dampers and springs that slip, relax or break: passive by construction
+    Elements,
     /// Mass, damping and friction that do not depend on the position
     Friction,
     /// Baseline: mean force by position and direction

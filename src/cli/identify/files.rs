@@ -38,6 +38,7 @@ pub(super) fn models(
             MethodName::Passive if several => "passive-delta-{delta}-dx-{dx}",
             MethodName::Passive => "passive-dx-{dx}",
             MethodName::Mechanism => "mechanism-dx-{dx}",
+            MethodName::Elements => "elements-dx-{dx}",
             MethodName::Friction if several => "friction-delta-{delta}",
             MethodName::Friction => "friction",
             MethodName::Static => "static-dx-{dx}",

@@ -56,6 +56,7 @@ impl Args {
             MethodName::Mechanism => vec![Method::Mechanism(method::Mechanism {
                 recorded_hz: self.filter,
             })],
+            MethodName::Elements => vec![Method::Elements(method::Elements { terms: self.kept() })],
             MethodName::Friction => {
                 let rule = self.direction.unwrap_or(DirectionRule::Dahl);
                 each_delta(&|delta| {
@@ -79,7 +80,7 @@ impl Args {
     /// The increments without `--dx`, in a recording of this scale.
     pub(super) fn default_dx_mm(&self, scale_mm: f64) -> Vec<f64> {
         let of_switch: &[f64] = match self.method() {
-            MethodName::Mechanism => &DEFAULT_DX[..1],
+            MethodName::Mechanism | MethodName::Elements => &DEFAULT_DX[..1],
             _ if self.figures.is_some() => &FIGURE_DX,
             _ => &DEFAULT_DX,
         };
@@ -141,7 +142,8 @@ impl Args {
     /// accepted at their defaults, so that one script can identify baselines as well.
     fn check_options_apply(&self) -> Result<(), Failure> {
         use MethodName::{
-            Constrained, Ewls, Friction, Hat, Mechanism, Passive, Segments, Static, TwoSided,
+            Constrained, Elements, Ewls, Friction, Hat, Mechanism, Passive, Segments, Static,
+            TwoSided,
         };
         let (lambda, dx) = (!self.lambda.is_empty(), !self.dx.is_empty());
         if !self.terms.is_empty() && !self.terms.contains(&Term::F0) {
@@ -166,7 +168,16 @@ impl Args {
             (
                 "--dx",
                 dx,
-                &[Ewls, Constrained, TwoSided, Hat, Passive, Mechanism, Static],
+                &[
+                    Ewls,
+                    Constrained,
+                    TwoSided,
+                    Hat,
+                    Passive,
+                    Mechanism,
+                    Elements,
+                    Static,
+                ],
             ),
             (
                 "--start warm",
@@ -184,7 +195,15 @@ impl Args {
             (
                 "--terms",
                 !self.terms.is_empty(),
-                &[Ewls, Constrained, TwoSided, Hat, Passive, Friction],
+                &[
+                    Ewls,
+                    Constrained,
+                    TwoSided,
+                    Hat,
+                    Passive,
+                    Elements,
+                    Friction,
+                ],
             ),
             ("--huber", self.huber, &[Passive]),
             ("--ridge", !self.ridge.is_empty(), &[Hat, Passive]),

@@ -9,7 +9,7 @@
 use super::folds::{FOLDS, Folds, LeftOut};
 use super::grid::{self, Cell, Plan};
 use super::mechanism::{self, Progress};
-use super::method::{Delta, Ewls, Friction, Hat, Passive, Start, State, Terms};
+use super::method::{Delta, Elements, Ewls, Friction, Hat, Passive, Start, State, Terms};
 use super::resample::Resample;
 use super::{IdentifyError, Method, Training, evidence, hat_table};
 use crate::recording::Recording;
@@ -72,7 +72,7 @@ pub enum Failure {
 pub fn failure(cell: &Cell) -> Option<Failure> {
     let claims = matches!(
         cell.method,
-        Method::Passive(_) | Method::Friction(_) | Method::Mechanism(_)
+        Method::Passive(_) | Method::Friction(_) | Method::Mechanism(_) | Method::Elements(_)
     );
     if cell.scores.iter().any(|score| score.vaf < 0.0) {
         return Some(Failure::Constant);
@@ -145,8 +145,11 @@ pub fn run(
             left_out: trials.left_out(method, dx_mm),
         })
     };
+    // a slow loop has neither speeds nor partial strokes
+    let elements = (folds.whole_strokes).then(|| (Method::Elements(Elements::default()), dx_mm));
     let mut candidates = plans
         .into_iter()
+        .chain(elements)
         .map(candidate)
         .collect::<Result<Vec<_>, _>>()?;
     let not_tried = match trials.mechanism(recordings, &step) {

@@ -233,7 +233,11 @@ fn one_method(
         Method::Mechanism(options) => (tables.iter())
             .map(|nodes| training.mechanism(options, nodes.dx_mm, step))
             .collect(),
-        Method::TwoSided(_) | Method::Hat(_) | Method::Passive(_) | Method::Static => tables
+        Method::TwoSided(_)
+        | Method::Hat(_)
+        | Method::Passive(_)
+        | Method::Elements(_)
+        | Method::Static => tables
             .par_iter()
             .map(|nodes| training.identify(method, nodes.dx_mm, lookup))
             .collect::<Vec<_>>()

@@ -24,6 +24,8 @@ pub enum Method {
     Passive(Passive),
     /// A virtual mechanism, by the simulation error of the force.
     Mechanism(Mechanism),
+    /// A potential with dampers and springs that slip, relax or break.
+    Elements(Elements),
     /// Mass, damping and friction that do not depend on the position.
     Friction(Friction),
     /// Baseline: mean force by position and direction.
@@ -44,6 +46,7 @@ impl Method {
             Self::Hat(_) => "hat",
             Self::Passive(_) => "passive",
             Self::Mechanism(_) => "mechanism",
+            Self::Elements(_) => "elements",
             Self::Friction(_) => "friction",
             Self::Static => "static",
             Self::Segments(_) => "segments",
@@ -75,6 +78,7 @@ impl Method {
             | Self::TwoSided(TwoSided { terms, .. })
             | Self::Hat(Hat { terms, .. })
             | Self::Passive(Passive { terms, .. })
+            | Self::Elements(Elements { terms })
             | Self::Friction(Friction { terms, .. }) => Some(terms),
             Self::Mechanism(_) | Self::Static | Self::Segments(_) | Self::Spring => None,
         }
@@ -91,7 +95,7 @@ impl Method {
             return Err(IdentifyError::Lambda(lambda));
         }
         match self {
-            Self::Ewls(_) | Self::Static | Self::Spring => Ok(()),
+            Self::Ewls(_) | Self::Elements(_) | Self::Static | Self::Spring => Ok(()),
             Self::TwoSided(options) => match options.width {
                 Width::Mm(mm) => positive("the width of two-sided weights", mm),
                 // without forgetting there would be a single θ for all positions
@@ -257,6 +261,13 @@ impl Default for Hat {
 pub struct Mechanism {
     /// The corner of the low-pass that the recorded forces have passed, Hz; `None`: found.
     pub recorded_hz: Option<f64>,
+}
+
+/// Options of passive elements.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Elements {
+    /// Which of m and b they have.
+    pub terms: Terms,
 }
 
 /// Options of the friction model.
@@ -452,6 +463,7 @@ impl fmt::Display for Method {
                 scanned(f, options.state)?;
                 without_k(f, options.terms)
             }
+            Self::Elements(options) => without_k(f, options.terms),
             Self::Mechanism(options) => match options.recorded_hz {
                 Some(hz) => write!(f, " recorded={hz}"),
                 None => Ok(()),

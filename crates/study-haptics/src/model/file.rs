@@ -1,20 +1,22 @@
 //! Reading and writing model files.
 //!
 //! A model file is TOML with `format = "study-model/1"`, or `"study-model/2"` with a `kind`: a
-//! `table`, whose other keys are those of version 1, or a `mechanism`, and with `units` of a
+//! `table`, whose other keys are those of version 1, or a `mechanism`, or `"study-model/3"` with
+//! `elements` as well, and with `units` of a
 //! straight or a turning handle, which the names of the keys then have. Reading is strict and reports
 //! every fault with its line: unknown keys, numbers that are not finite, positions that
 //! do not ascend, lists of different lengths, reversed ranges. Writing is reproducible:
 //! the same realization gives the same bytes, numbers have the fewest digits that read
 //! back as the same number, and `parse(write(r)) == r` for every valid `r`.
 
+mod elements;
 mod write;
 
 pub(crate) use write::quoted;
 pub use write::write;
 
 use super::{
-    Branch, FORMAT, FORMAT_2, Mechanism, Profile, Provenance, Realization, Trained, Units,
+    Branch, FORMAT, FORMAT_2, FORMAT_3, Mechanism, Profile, Provenance, Realization, Trained, Units,
 };
 use std::collections::BTreeMap;
 use study_base::diagnostic::table::{self, Table, Value};
@@ -36,15 +38,31 @@ pub fn parse(path: &str, text: &str) -> (Option<Realization>, Findings) {
     table::parse(path, text, read)
 }
 
+/// What a model file has parameters of.
+#[derive(Clone, Copy)]
+enum Kind {
+    Table,
+    Mechanism,
+    Elements,
+}
+
 fn read(mut root: Table<'_, '_>) -> Option<Realization> {
-    let second = root.value("format").and_then(|v| v.text()).as_deref() == Some(FORMAT_2);
+    let format = root.value("format").and_then(|v| v.text());
+    let third = format.as_deref() == Some(FORMAT_3);
     let mut own = Units::Linear;
-    if second {
-        let kinds = [("table", false), ("mechanism", true)];
-        let kind = root.required("kind").and_then(|v| v.word(&kinds));
+    if third || format.as_deref() == Some(FORMAT_2) {
+        let kinds = [
+            ("table", Kind::Table),
+            ("mechanism", Kind::Mechanism),
+            ("elements", Kind::Elements),
+        ];
+        let of_version = if third { &kinds[..] } else { &kinds[..2] };
+        let kind = root.required("kind").and_then(|v| v.word(of_version));
         own = root.value("units").map_or(Some(Units::Linear), units)?;
-        if kind? {
-            return read_mechanism(root, own);
+        match kind? {
+            Kind::Table => {}
+            Kind::Mechanism => return read_mechanism(root, own),
+            Kind::Elements => return read_elements(root, own),
         }
     } else if !root.has_format(FORMAT, "a model file") {
         return None;
@@ -88,6 +106,7 @@ fn read(mut root: Table<'_, '_>) -> Option<Realization> {
         positive: positive?,
         negative: negative?,
         mechanism: None,
+        elements: None,
     })
 }
 
@@ -105,6 +124,20 @@ fn read_mechanism(mut root: Table<'_, '_>, own: Units) -> Option<Realization> {
     Some(Realization {
         units: own,
         ..Realization::of_mechanism(id?, provenance?, vaf?, trained, mechanism)
+    })
+}
+
+/// Elements of version 3.
+fn read_elements(mut root: Table<'_, '_>, own: Units) -> Option<Realization> {
+    let id = id(&mut root);
+    let trained = root.required("trained").and_then(|v| trained(v, own));
+    let provenance = root.required("provenance").and_then(|v| provenance(v, own));
+    let vaf = root.value("vaf").map_or(Some(BTreeMap::new()), vaf);
+    let elements = (root.required("elements")).and_then(|v| elements::read(v, own));
+    root.finish();
+    Some(Realization {
+        units: own,
+        ..Realization::of_elements(id?, provenance?, vaf?, trained?, elements?)
     })
 }
 

@@ -77,6 +77,7 @@ fn table(of: &Realization, direction: Direction) -> Realization {
     };
     Realization {
         mechanism: None,
+        elements: None,
         direction,
         lookup: Lookup::Linear,
         units: Units::Linear,

@@ -4,6 +4,7 @@
 //! invalid table with its own code.
 
 use super::bytes::{Field, Reader, Writer, fields};
+use super::elements::ElementsBegin;
 use super::mechanism::MechanismBegin;
 use super::probe::PathBegin;
 use super::{FixedVec, WireError};
@@ -141,6 +142,11 @@ impl UploadCrc {
 
     /// Starts with MECHANISM_BEGIN.
     pub fn of_mechanism(begin: &MechanismBegin) -> Self {
+        Self::default().with(begin)
+    }
+
+    /// Starts with ELEMENTS_BEGIN.
+    pub fn of_elements(begin: &ElementsBegin) -> Self {
         Self::default().with(begin)
     }
 

@@ -1,6 +1,6 @@
 //! The text of a model file.
 
-use super::{FORMAT, FORMAT_2, PARAMETERS, SCALAR_KEYS};
+use super::{FORMAT, FORMAT_2, FORMAT_3, PARAMETERS, SCALAR_KEYS, elements};
 use crate::model::{Realization, Units};
 use std::fmt::Write as _;
 /// Numbers of a list per line.
@@ -12,13 +12,22 @@ pub fn write(realization: &Realization) -> String {
     let key = |key: &str| r.units.key(key);
     let mut out = Text::default();
     let turns = r.units != Units::Linear;
-    if turns || r.mechanism.is_some() {
-        out.text("format", FORMAT_2);
+    let own_states = r.mechanism.is_some() || r.elements.is_some();
+    if turns || own_states {
+        out.text(
+            "format",
+            if r.elements.is_some() {
+                FORMAT_3
+            } else {
+                FORMAT_2
+            },
+        );
         out.text(
             "kind",
-            match r.mechanism {
-                Some(_) => "mechanism",
-                None => "table",
+            match (&r.mechanism, &r.elements) {
+                (Some(_), _) => "mechanism",
+                (None, Some(_)) => "elements",
+                (None, None) => "table",
             },
         );
     } else {
@@ -29,7 +38,7 @@ pub fn write(realization: &Realization) -> String {
         out.raw("units", &format!("{{ x = \"{x}\", f = \"{f}\" }}"));
     }
     out.text("id", &r.id);
-    if r.mechanism.is_none() {
+    if !own_states {
         out.text("lookup", r.lookup.as_str());
         let rule = r.direction.as_str();
         let direction = match r.direction.delta_mm() {
@@ -48,7 +57,7 @@ pub fn write(realization: &Realization) -> String {
             r.trained.v_mm_s
         ),
     );
-    if r.mechanism.is_none() {
+    if !own_states {
         out.list(&key("x_mm"), &r.x_mm);
     }
 
@@ -85,7 +94,11 @@ pub fn write(realization: &Realization) -> String {
             out.number(&bare(name), *vaf);
         }
     }
+    if let Some(own) = &r.elements {
+        elements::write(&mut out, own, r.units);
+    }
     match &r.mechanism {
+        None if own_states => {}
         None => {
             for (name, branch) in [("positive", &r.positive), ("negative", &r.negative)] {
                 out.table(name);
@@ -123,10 +136,10 @@ pub fn write(realization: &Realization) -> String {
 }
 
 #[derive(Default)]
-struct Text(String);
+pub(super) struct Text(String);
 
 impl Text {
-    fn raw(&mut self, key: &str, value: &str) {
+    pub(super) fn raw(&mut self, key: &str, value: &str) {
         // writing to a String cannot fail
         let _ = writeln!(self.0, "{key} = {value}");
     }
@@ -135,12 +148,12 @@ impl Text {
         self.raw(key, &quoted(value));
     }
 
-    fn number(&mut self, key: &str, value: f64) {
+    pub(super) fn number(&mut self, key: &str, value: f64) {
         // {:?} gives the fewest digits that read back, and a point or an exponent
         self.raw(key, &format!("{value:?}"));
     }
 
-    fn list(&mut self, key: &str, values: &[f64]) {
+    pub(super) fn list(&mut self, key: &str, values: &[f64]) {
         let lines: Vec<String> = values
             .chunks(PER_LINE)
             .map(|line| {
@@ -151,7 +164,7 @@ impl Text {
         self.raw(key, &format!("[\n{}]", lines.concat()));
     }
 
-    fn table(&mut self, name: &str) {
+    pub(super) fn table(&mut self, name: &str) {
         let _ = writeln!(self.0, "\n[{name}]");
     }
 }
