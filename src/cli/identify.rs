@@ -374,11 +374,10 @@ fn read(
         && !args.active
         && !recording.warnings.iter().any(swapped)
     {
-        let spikes = |w: &recording::Warning| matches!(w, recording::Warning::Spikes { .. });
-        let hint = match !args.robust && recording.warnings.iter().any(spikes) {
+        let hint = match !args.robust && recording.spikes_make_it_active() {
             true => "the spikes may be the cause: --robust replaces them",
             false => {
-                "F is the force that the probe applies to the target, positive with +x: change its sign. For a target with a motor: --active"
+                "F is the force that the probe applies to the target, positive with +x: change the sign of F, or that of x if the position is counted the other way round. For a target with a motor: --active"
             }
         };
         return Err(Failure::input(format!(
@@ -389,14 +388,10 @@ fn read(
         ))
         .hint(hint));
     }
-    if let Some((even, most_s)) = signal::without_jitter(&recording)
+    if let Some((even, how)) = signal::evened(&recording)
         && args.needs_even_samples()
     {
-        console.say(format!(
-            "{}: intervals deviate by up to {:.1} µs: resampled at even intervals by cubics",
-            path.display(),
-            1e6 * most_s
-        ));
+        console.say(format!("{}: {how}", path.display()));
         recording = even;
     }
     signal::prepare(&recording, args.signals())

@@ -1,8 +1,10 @@
 //! From trajectories and recordings to model files.
 
 mod bad_input;
+mod bounds;
 mod cli;
 mod compare;
+mod doubtful;
 mod estimators_switches;
 mod estimators_tables;
 mod evidence;

@@ -32,6 +32,7 @@ pub mod delivery;
 pub mod evidence;
 pub mod ewls;
 pub mod folds;
+pub mod forecast;
 mod friction;
 pub mod grid;
 mod hat;

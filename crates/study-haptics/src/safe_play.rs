@@ -258,15 +258,27 @@ pub fn chatter(realization: &Realization, device: &Device) -> Option<Danger> {
     found.first().copied()
 }
 
-fn with(
+/// Position, mm, and force, N, in each servo period of a straight press from one position to another and of
+/// the release, as a device plays it.
+pub fn press(
     realization: &Realization,
     device: &Device,
-    look: impl FnOnce(&mut Search<'_>, &Slow),
-) -> Vec<Danger> {
-    let mechanism = realization.mechanism.as_ref().map(|own| own.view());
-    let what = Rendering {
-        law: match mechanism {
-            Some(view) => Law::Mechanism(view),
+    [from_mm, to_mm]: [f64; 2],
+    mm_s: f64,
+) -> Vec<(f64, f64)> {
+    let what = rendering(realization);
+    let mut play = Play::new(&what, *device, 0.0, from_mm);
+    let mut played = Vec::new();
+    for end_mm in [to_mm, from_mm] {
+        play.stroke(end_mm, mm_s, |x_mm, force_n| played.push((x_mm, force_n)));
+    }
+    played
+}
+
+fn rendering(realization: &Realization) -> Rendering<'_> {
+    Rendering {
+        law: match &realization.mechanism {
+            Some(mechanism) => Law::Mechanism(mechanism.view()),
             None => Law::Table {
                 table: realization.table(),
                 rule: realization.direction,
@@ -274,7 +286,15 @@ fn with(
         },
         range_mm: realization.trained.x_mm,
         trained_mm_s: realization.trained.v_mm_s,
-    };
+    }
+}
+
+fn with(
+    realization: &Realization,
+    device: &Device,
+    look: impl FnOnce(&mut Search<'_>, &Slow),
+) -> Vec<Danger> {
+    let what = rendering(realization);
     let certificate = realization.certificate();
     let of = |n_per_mm: f64| 1e-3 * spring_damping_n_s_per_m(n_per_mm, device.servo.servo_hz, 0.0);
     let asked = of(certificate.rendered_n_per_mm()) + certificate.damping_n_s_per_mm;
