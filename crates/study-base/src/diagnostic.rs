@@ -227,7 +227,7 @@ fn floor_char_boundary(text: &str, byte: usize) -> usize {
 /// # use study_base::diagnostic::did_you_mean;
 /// let keys = ["repetitions", "seed"];
 /// assert_eq!(did_you_mean("repetition", keys), Some("repetitions"));
-/// assert_eq!(did_you_mean("colour", keys), None);
+/// assert_eq!(did_you_mean("width", keys), None);
 /// ```
 pub fn did_you_mean<'a>(
     given: &str,

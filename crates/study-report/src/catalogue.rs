@@ -24,7 +24,7 @@ const TACTILE: f64 = 0.05;
 type Sorting = (&'static str, &'static str, fn(&Feel) -> f64);
 
 /// The pages. The first one goes by names alone.
-const SORTINGS: [Sorting; 4] = [
+const SORT_ORDERS: [Sorting; 4] = [
     ("index.html", "name", |_| 0.0),
     ("by-force.html", "peak force", |feel| feel.peak),
     ("by-travel.html", "travel", |feel| feel.travel),
@@ -88,7 +88,7 @@ pub fn files(bundles: &[Bundle]) -> Vec<(String, String)> {
     let mut files: Vec<(String, String)> = (all.iter())
         .map(|(address, _, bundle)| (picture_path(address), figure(bundle).picture().to_svg()))
         .collect();
-    for sorting in &SORTINGS {
+    for sorting in &SORT_ORDERS {
         let mut sorted: Vec<&(String, Feel, &Bundle)> = all.iter().collect();
         // stable: equal ones stay in the order of names
         sorted.sort_by(|(_, a, x), (_, b, y)| {
@@ -161,7 +161,7 @@ fn page(sorting: &Sorting, all: &[&(String, Feel, &Bundle)]) -> String {
                     p { (counted(all.len(), "stimulus", "stimuli")) ", each with its recordings, model and certificate in one file." }
                     nav aria-label="Order" {
                         "Order by "
-                        @for (other, name, _) in &SORTINGS {
+                        @for (other, name, _) in &SORT_ORDERS {
                             a href=(other) aria-current=[(other == file).then_some("page")] { (name) } " "
                         }
                     }

@@ -31,11 +31,11 @@ const MIN_RATIO: f64 = 4.0;
 /// Distance of the center of a range from zero, in half ranges: a column above the first
 /// is one-sided, a column below the second is centered.
 const ONE_SIDED: f64 = 0.9;
-const CENTRED: f64 = 0.4;
+const CENTERED: f64 = 0.4;
 
 /// A warning with its evidence.
 pub(super) fn swapped(t_s: &[f64], x_mm: &[f64], f_n: &[f64]) -> Option<Warning> {
-    if t_s.len() < MIN_SAMPLES || offset(f_n) < ONE_SIDED || offset(x_mm) > CENTRED {
+    if t_s.len() < MIN_SAMPLES || offset(f_n) < ONE_SIDED || offset(x_mm) > CENTERED {
         return None;
     }
     let step_s = (t_s[t_s.len() - 1] - t_s[0]) / (t_s.len() - 1) as f64;

@@ -5,7 +5,7 @@ use crate::chart::{Axis, ColorBar, Figure, Look, Mark, Note, PALETTE, Panel, Sca
 use std::fmt::Write as _;
 
 /// Largest number of cells that are labeled.
-const MAX_LABELLED: usize = 160;
+const MAX_LABELED: usize = 160;
 /// VAF this far below the highest have the color of the lowest: a few very low values must
 /// not take up the colors of all others.
 const SPREAD: f64 = 0.5;
@@ -91,7 +91,7 @@ pub fn surface(
         false => "VAF".to_owned(),
     };
     panel.color_bar = Some(ColorBar { label, scale });
-    if grid.len() <= MAX_LABELLED {
+    if grid.len() <= MAX_LABELED {
         for p in grid {
             let text = short(p.vaf);
             let note = Note::new(position(p), &text).moved(0.0, 4.0);

@@ -9,7 +9,7 @@ mod parts;
 
 const HZ: f64 = 4000.0;
 /// Position about which the hand moves, amplitude, mm, and frequency, Hz.
-const CENTRE_MM: f64 = 15.0;
+const CENTER_MM: f64 = 15.0;
 const AMPLITUDE_MM: f64 = 10.0;
 const STROKES_HZ: f64 = 1.0;
 const LIMIT_N: f64 = 9.0;
@@ -86,7 +86,7 @@ fn played_at(
     for tick in 0..(seconds * HZ) as u32 {
         let t_s = f64::from(tick) / HZ;
         let motion = Motion {
-            x_mm: CENTRE_MM - amplitude_mm * (w * t_s).cos(),
+            x_mm: CENTER_MM - amplitude_mm * (w * t_s).cos(),
             v_mm_s: speed(tick, amplitude_mm * w * (w * t_s).sin()),
             a_m_s2: 1e-3 * amplitude_mm * w * w * (w * t_s).cos(),
         };
