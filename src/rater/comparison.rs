@@ -8,6 +8,7 @@
 
 use super::{Effect, Impression, MIDPOINT, Rater, Reference};
 use std::collections::BTreeMap;
+use study_base::perception::FORCE_JND_N;
 use study_base::rng::Stream;
 use study_base::text::{ModelId, PartId};
 use study_haptics::model::Realization;
@@ -15,7 +16,7 @@ use study_plan::protocol::{Answer, Method, Protocol, Question, Role, Stimuli, Ta
 
 /// Median standard deviation of the noise of an interval of a track, N: the just
 /// noticeable difference of a force.
-const NOISE_N: f64 = 0.1;
+const NOISE_N: f64 = FORCE_JND_N;
 /// Criterion of "different", in standard deviations of the noise of one interval.
 const DIFFERENT: f64 = 1.8;
 /// Criterion of "yes", in the same unit.

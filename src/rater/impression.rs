@@ -8,6 +8,7 @@
 //! that the study's own best realization stands for.
 
 use std::f64::consts::TAU;
+use study_base::perception::{FORCE_JND_N, force_jnd_n};
 use study_haptics::model::Realization;
 use study_haptics::plant::{DT_S, HandParameters, Parameters, Target};
 use study_wire::mechanism::State;
@@ -16,9 +17,10 @@ use study_wire::predict::{DirectionState, Motion, force_n};
 /// Comparison of a realization with the target. Deterministic.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Impression {
-    /// Root mean square difference from the target's force, N.
+    /// Root mean square difference from the target's force, N; of a target that is weaker than
+    /// 1 N it is larger in proportion, as it is felt.
     pub force_error_n: f64,
-    /// The same within 3 mm of the ends of the exploration, N.
+    /// The same at the ends of the exploration, N.
     pub end_error_n: f64,
     /// Mean over nodes and directions of the negative part of m relative to the slider's
     /// mass plus that of b relative to the hand's damping. 0 for no negative parameters,
@@ -30,12 +32,16 @@ pub struct Impression {
     pub crispness: f64,
 }
 
+/// Nothing below is felt, however weak the target, N.
+const LEAST_JND_N: f64 = 0.001;
+
 const SECONDS: f64 = 6.0;
 /// Center and amplitude of the exploration of switch B, mm.
 const OF_B_MM: [f64; 2] = [17.5, 15.0];
 /// Amplitude of another exploration, as a share of the trained range.
 const SHARE: f64 = 0.45;
-const END_MM: f64 = 3.0;
+/// Share of an exploration's amplitude that is its end.
+const END: f64 = 0.2;
 /// Interval of the samples, s.
 const SAMPLE_S: f64 = 1e-3;
 /// Simulation steps per sample, for 1 kHz.
@@ -86,6 +92,12 @@ impl Reference {
         Self::new(around, motion, force_n)
     }
 
+    /// A difference of force in the units of one that is felt at 1 N or more.
+    fn felt_n(&self, difference_n: f64) -> f64 {
+        let least_n = force_jnd_n(self.largest_n).max(LEAST_JND_N);
+        difference_n * (FORCE_JND_N / least_n)
+    }
+
     fn new([center_mm, amplitude_mm]: [f64; 2], motion: Vec<Motion>, force_n: Vec<f64>) -> Self {
         Self {
             center_mm,
@@ -125,12 +137,12 @@ impl Impression {
                 .filter(|(motion, _)| keep(motion))
                 .map(|(_, (target, model))| (target - model).powi(2))
                 .collect();
-            (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+            reference.felt_n((squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
         };
         Self {
             force_error_n: difference(&|_| true),
             end_error_n: difference(&|motion| {
-                (motion.x_mm - reference.center_mm).abs() > reference.amplitude_mm - END_MM
+                (motion.x_mm - reference.center_mm).abs() > (1.0 - END) * reference.amplitude_mm
             }),
             activeness: activeness(realization),
             detent: largest(&predicted) / reference.largest_n,
@@ -138,11 +150,12 @@ impl Impression {
         }
     }
 
-    /// Root mean square difference of the forces of two realizations in the exploration, N.
+    /// Root mean square difference of the forces of two realizations in the exploration, N,
+    /// enlarged as [`Impression::force_error_n`].
     pub(super) fn distance_n(a: &Realization, b: &Realization, reference: &Reference) -> f64 {
         let [a, b] = [a, b].map(|of| predicted(of, &reference.motion));
         let squares: f64 = a.iter().zip(&b).map(|(a, b)| (a - b).powi(2)).sum();
-        (squares / a.len() as f64).sqrt()
+        reference.felt_n((squares / a.len() as f64).sqrt())
     }
 
     /// Opinion of a rater without bias and noise, on a scale from 1 to 7.
@@ -324,6 +337,13 @@ mod tests {
         );
         let half = Impression::of(&table(0.5, 0.0), &target);
         assert!(half.force_error_n > 1.0 && half.detent < 0.6, "{half:?}");
+        // Of a target as weak as a key, the same shares of its force are felt: at 1 N and more a
+        // difference by its newtons, below by its part of the greatest force.
+        let weak = Reference::of(&table(0.05, 0.0));
+        assert!(weak.largest_n < 0.5);
+        let weak = Impression::of(&table(0.025, 0.0), &weak);
+        let expected = half.force_error_n / target.largest_n;
+        assert!((weak.force_error_n - expected).abs() < 1e-9, "{weak:?}");
     }
 
     #[test]

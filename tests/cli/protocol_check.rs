@@ -599,3 +599,34 @@ fn a_study_of_pairs_has_no_power_of_a_correlation() {
     assert_eq!(code, 2);
     assert!(err.contains("has no closed form"), "{err}");
 }
+
+/// The residual force of a realization is σ_F √(1 − VAF), and a tenth of a newton is noticed;
+/// of realizations as weak as a key, a tenth of their force.
+#[test]
+fn realizations_that_differ_by_less_than_is_felt_give_a_warning() {
+    let dir = turn_signal();
+    let close = |warnings: &[String]| -> Vec<String> {
+        let about = warnings.iter().filter(|w| w.contains("differ too little"));
+        about.cloned().collect()
+    };
+    let (code, _, warnings) = report(dir.path());
+    assert_eq!((code, close(&warnings)), (0, Vec::new()), "{warnings:?}");
+    let model = |vaf: &str| dir.path().join(format!("models/lambda-{vaf}.toml"));
+    for vaf in ["0.9991", "0.9993", "0.9997", "0.9999"] {
+        fs::copy(model("0.9995"), model(vaf)).unwrap();
+        edit(
+            dir.path(),
+            &format!("models/lambda-{vaf}.toml"),
+            "0.9995",
+            vaf,
+        );
+    }
+    let (code, errors, warnings) = report(dir.path());
+    assert_eq!(code, 0, "{errors:?}");
+    let found = close(&warnings);
+    assert_eq!(found.len(), 1, "{warnings:?}");
+    assert!(
+        found[0].ends_with("and 0.10 N is just noticeable"),
+        "{found:?}"
+    );
+}

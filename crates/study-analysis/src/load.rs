@@ -266,6 +266,7 @@ fn open(path: &Path, purpose: Purpose<'_>) -> (Option<Loaded>, Vec<Findings>) {
     others.assign(&protocol);
     others.turn(protocol.device.lever_mm);
     join::vaf(&mut protocol, &others, &spans, &mut findings);
+    join::too_close(&protocol, &others, &mut findings);
     if purpose != Purpose::Data {
         join::certificates(&protocol, &others, &spans, &mut findings);
     }

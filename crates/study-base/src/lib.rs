@@ -8,6 +8,7 @@
 //!   reader that reports every fault rather than the first.
 //! * [`hex`]: bytes and SHA-256 digests as text.
 //! * [`license`]: terms of use as archives write them.
+//! * [`perception`]: the least difference in force that people feel.
 //! * [`rng`]: random streams that are named, independent and the same on every
 //!   machine.
 //!
@@ -23,5 +24,6 @@ pub mod hex;
 pub mod license;
 pub mod limits;
 mod named;
+pub mod perception;
 pub mod rng;
 pub mod text;

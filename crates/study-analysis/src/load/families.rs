@@ -3,10 +3,11 @@
 use super::{OtherFiles, PERMIT};
 use std::collections::BTreeMap;
 use study_base::diagnostic::{Fault, Findings};
+use study_base::perception::force_jnd_n;
 use study_base::text::ModelId;
 use study_haptics::family::{self, Family, Passing};
 use study_haptics::model::Realization;
-use study_plan::protocol::check::{FORCE_JND_N, Spans};
+use study_plan::protocol::check::Spans;
 use study_plan::protocol::fingerprint::family_file;
 use study_plan::protocol::{FamilyRules, Protocol, TrackRules, Vary};
 use study_wire::predict::{Motion, force_n};
@@ -144,16 +145,17 @@ fn doubtful(protocol: &Protocol, rules: &FamilyRules, family: &Family) -> Option
     };
     let span = difference(0.0).max(difference(fast)).max(difference(-fast));
     // A mass is felt in accelerations, of which nothing is known here.
-    (span < FORCE_JND_N && rules.vary != Vary::Mass).then(|| {
+    let noticeable = force_jnd_n(peak);
+    (span < noticeable && rules.vary != Vary::Mass).then(|| {
         Fault::warning(format!(
-            "the levels of the family `{id}` differ by at most {span:.2} N, and {FORCE_JND_N} N is just noticeable"
+            "the levels of the family `{id}` differ by at most {span:.2} N, and {noticeable:.2} N is just noticeable"
         ))
         .hint("take a larger range")
     })
 }
 
 /// Forces of a table at the nodes of another, in both directions, at a speed.
-fn forces(table: &Realization, nodes: &Realization, v_mm_s: f64) -> Vec<f64> {
+pub(super) fn forces(table: &Realization, nodes: &Realization, v_mm_s: f64) -> Vec<f64> {
     let [from, to] = nodes.trained.x_mm;
     let inside = nodes.x_mm.iter().filter(|x| (from..=to).contains(*x));
     inside

@@ -1,10 +1,12 @@
 //! Checks that need the protocol, the model files and the orders together.
 
-use super::OtherFiles;
+use super::{OtherFiles, families};
 use study_base::diagnostic::{Fault, Findings, Severity, did_you_mean};
+use study_base::perception::force_jnd_n;
 use study_base::text::Untrusted;
+use study_haptics::model::Realization;
 use study_haptics::safe_play;
-use study_plan::protocol::check::Spans;
+use study_plan::protocol::check::{self, Spans};
 use study_plan::protocol::{Assigned, DeviceKind, FileOrders, Order, Protocol, Role};
 use study_plan::schedule::balance::balances;
 use study_plan::schedule::{Planner, ScheduleError};
@@ -96,6 +98,42 @@ pub(super) fn vaf(
                 names_used.join(", ")
             ))
             .hint("select one with `analysis.vaf`"),
+        );
+    }
+}
+
+/// Warns of test realizations whose accuracies differ by less than can be felt: by their residual
+/// forces, σ_F √(1 − VAF), with the standard deviation σ_F of the force at rest over the nodes.
+pub(super) fn too_close(protocol: &Protocol, others: &OtherFiles<'_>, findings: &mut Findings) {
+    if !check::is_about_realizations(protocol) || !others.unread(protocol).is_empty() {
+        return;
+    }
+    let tests = protocol.models.iter().filter(|m| m.role == Role::Test);
+    let known: Vec<(f64, &Realization)> = tests
+        .filter_map(|m| Some((m.vaf?, others.realization(&m.id)?)))
+        .collect();
+    if known.len() < 2 {
+        return;
+    }
+    let (best_vaf, best) =
+        (known.iter().copied()).fold(
+            known[0],
+            |best, one| if one.0 > best.0 { one } else { best },
+        );
+    let least_vaf = known.iter().map(|(vaf, _)| *vaf).fold(best_vaf, f64::min);
+    let forces_n = families::forces(best, best, 0.0);
+    let greatest_n = forces_n.iter().fold(0.0, |most: f64, f| most.max(f.abs()));
+    let mean_n = forces_n.iter().sum::<f64>() / forces_n.len() as f64;
+    let squares: f64 = forces_n.iter().map(|f| (f - mean_n).powi(2)).sum();
+    let sd_n = (squares / forces_n.len() as f64).sqrt();
+    let span_n = sd_n * ((1.0 - least_vaf).sqrt() - (1.0 - best_vaf).sqrt());
+    let noticeable_n = force_jnd_n(greatest_n);
+    if span_n < noticeable_n {
+        findings.faults.push(
+            Fault::warning(format!(
+                "the test realizations differ too little: VAF {least_vaf:.4} to {best_vaf:.4} is {span_n:.3} N of residual force at {sd_n:.2} N rms, and {noticeable_n:.2} N is just noticeable"
+            ))
+            .hint("take realizations that are further apart"),
         );
     }
 }

@@ -2,8 +2,8 @@
 //! model can reach.
 //!
 //! VAF ignores a constant error. NRMSE = rms(F̂ − F) / σ_F includes it, and the residual
-//! force σ_F √(1 − VAF) can be compared with the just noticeable difference in force,
-//! about 0.1 N (Doerrer & Werthschützky 2002).
+//! force σ_F √(1 − VAF) can be compared with the just noticeable difference in force
+//! ([`force_jnd_n`]).
 //!
 //! No model explains what is not repeatable: if the same trajectory was recorded twice,
 //! F₁ − F₂ contains the noise of both, so the ceiling of VAF is
@@ -17,14 +17,11 @@
 use super::vaf;
 use crate::model::Realization;
 use crate::recording::{Recording, mean_and_variance, range};
+use study_base::perception::force_jnd_n;
 
-/// The just noticeable difference in force, N.
-pub const JUST_NOTICEABLE_N: f64 = 0.1;
-
-/// The force of a crest or valley has to exceed this, N, and this share of its range: above the
+/// The force of a crest or valley has to exceed this share of the range of force: above the
 /// noise of friction, far below a detent.
-const CROSSING_N: f64 = 0.3;
-const CROSSING: f64 = 0.01;
+const CROSSING: f64 = 0.015;
 
 /// Recordings whose positions differ by more than this rms, in units of
 /// [`Recording::scale_mm`], are not of the same trajectory.
@@ -49,6 +46,8 @@ pub struct Accuracy {
 /// samples, or in which the force does not vary, is `None`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Validation {
+    /// The just noticeable difference in force at the forces of the recording, N.
+    pub noticeable_n: f64,
     /// All samples.
     pub whole: Accuracy,
     /// Samples with v > 0.
@@ -60,11 +59,6 @@ pub struct Validation {
 }
 
 impl Accuracy {
-    /// The residual in just noticeable differences.
-    pub fn in_noticeable_differences(&self) -> f64 {
-        self.residual_n / JUST_NOTICEABLE_N
-    }
-
     /// `None` without samples or if the force does not vary.
     fn new(errors: &[f64], forces: &[f64]) -> Option<Self> {
         let (_, variance) = mean_and_variance(forces);
@@ -101,7 +95,9 @@ pub fn validate(
     };
     let (x, v) = (&recording.x_mm, &recording.v_mm_s);
     let inside = |[low, high]: [f64; 2]| part(&move |i| x[i] >= low && x[i] < high);
+    let [least_n, most_n] = range(&recording.f_n);
     Some(Validation {
+        noticeable_n: force_jnd_n(least_n.abs().max(most_n.abs())),
         whole: Accuracy::new(&errors, &recording.f_n)?,
         positive: part(&|i| v[i] > 0.0),
         negative: part(&|i| v[i] < 0.0),
@@ -115,7 +111,7 @@ pub fn detents(recording: &Recording) -> Vec<[f64; 2]> {
     let [low, high] = recording.range_mm();
     let profile_mm = recording.scale_mm();
     let [least_n, most_n] = range(&recording.f_n);
-    let crossing_n = CROSSING_N.max(CROSSING * (most_n - least_n));
+    let crossing_n = CROSSING * (most_n - least_n);
     let bins = ((high - low) / profile_mm).ceil().min(1e6) as usize;
     // Σ F and number of samples, for each direction
     let mut sums = vec![[(0.0, 0.0); 2]; bins.max(1)];

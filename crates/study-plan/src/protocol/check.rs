@@ -5,6 +5,8 @@
 
 mod parts;
 
+pub use parts::is_about_realizations;
+
 use super::phrases::{self, Phrase};
 use super::{Design, DeviceKind, ModelEntry, Protocol, Question, Role};
 use std::collections::BTreeMap;
@@ -22,14 +24,6 @@ const TRIALS_WITHOUT_BREAK: u32 = 15;
 /// Duration of a session, min, that needs no warning.
 const LONG_SESSION_MIN: f64 = 60.0;
 
-/// Just noticeable difference of a force, N (Doerrer & Werthschützky 2002).
-pub const FORCE_JND_N: f64 = 0.1;
-
-/// Standard deviation of the force of a turn-signal switch operated by hand, N. It
-/// converts a VAF to a residual force if there is no recording. The simulated switch
-/// at 1.5 Hz has 5.3 N.
-const FORCE_SD_N: f64 = 5.0;
-
 /// Path of a value → its bytes in the file, as in `file::Parsed`.
 pub type Spans = BTreeMap<String, Range<usize>>;
 
@@ -40,7 +34,7 @@ pub fn warnings(protocol: &Protocol, spans: &Spans, unread: &[&ModelId]) -> Vec<
     language(protocol, spans, &mut faults);
     untranslated(protocol, spans, &mut faults);
     birth_dates(protocol, spans, &mut faults);
-    if parts::is_about_realizations(protocol) {
+    if is_about_realizations(protocol) {
         realizations(protocol, spans, &mut faults);
         vaf(protocol, spans, unread, &mut faults);
     }
@@ -287,22 +281,6 @@ fn vaf(protocol: &Protocol, spans: &Spans, unread: &[&ModelId], faults: &mut Vec
             .at(spans.get("analysis.vaf").cloned()),
         );
     }
-    // Realizations that could not be read may differ enough.
-    if known.len() < 2 || !unread.is_empty() {
-        return;
-    }
-    let low = known.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = known.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    // residual force: σ_F √(1 − VAF)
-    let span_n = FORCE_SD_N * ((1.0 - low).sqrt() - (1.0 - high).sqrt());
-    if span_n < FORCE_JND_N {
-        faults.push(
-            Fault::warning(format!(
-                "the test realizations differ too little: VAF {low:.4} to {high:.4} is {span_n:.2} N of residual force at {FORCE_SD_N} N rms, and {FORCE_JND_N} N is just noticeable"
-            ))
-            .hint("take realizations that are further apart"),
-        );
-    }
 }
 
 fn practice(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
@@ -436,16 +414,6 @@ mod tests {
             messages(&protocol),
             ["5 test realizations: |r| with VAF has to exceed 0.959 for p < .01"]
         );
-    }
-
-    #[test]
-    fn vafs_below_the_just_noticeable_difference_give_a_warning() {
-        let mut protocol = example::protocol(8, 1);
-        for (i, model) in protocol.models.iter_mut().enumerate() {
-            model.vaf = Some(0.75 + 0.001 * i as f64);
-        }
-        let found = messages(&protocol);
-        assert!(found[0].contains("differ too little"), "{found:?}");
     }
 
     #[test]

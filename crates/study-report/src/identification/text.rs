@@ -7,7 +7,7 @@ use study_base::text::Untrusted;
 use study_haptics::identify::grid::Cell;
 use study_haptics::identify::identification::Identification;
 use study_haptics::identify::mechanism::{Filter, Fitted, PARAMETERS};
-use study_haptics::identify::validation::{Accuracy, JUST_NOTICEABLE_N};
+use study_haptics::identify::validation::{Accuracy, Validation};
 use study_haptics::model::{Realization, Units};
 use study_haptics::safe_play::{self, Danger};
 use study_wire::certificate::{Certificate, SERVO_RATES_HZ};
@@ -211,7 +211,7 @@ fn best_in_detail(results: &Identification) -> String {
                     format!("{:.3}", accuracy.nrmse),
                     format!("{:+.*}", decimals, p.force(accuracy.bias_n)),
                     format!("{:.*}", decimals, p.force(accuracy.residual_n)),
-                    format!("{:.1}", accuracy.in_noticeable_differences()),
+                    format!("{:.1}", accuracy.residual_n / v.noticeable_n),
                 ]);
             }
         };
@@ -241,7 +241,7 @@ fn best_in_detail(results: &Identification) -> String {
     let (noticeable, accuracy) = match rows.len() {
         1 => (String::new(), String::new()),
         _ => (
-            format!("; JND: just noticeable difference, {JUST_NOTICEABLE_N} N"),
+            noticeable(results.accuracies.iter().flatten()),
             align(&rows),
         ),
     };
@@ -258,6 +258,20 @@ fn best_in_detail(results: &Identification) -> String {
         100.0 * cell.certificate.negative_damping,
         dangers(&cell.realization),
     )
+}
+
+/// What a column of just noticeable differences is a multiple of.
+fn noticeable<'a>(validations: impl Iterator<Item = &'a Validation>) -> String {
+    let each: Vec<f64> = validations.map(|v| v.noticeable_n).collect();
+    let least = each.iter().copied().fold(f64::INFINITY, f64::min);
+    let most = each.iter().copied().fold(0.0, f64::max);
+    let digits = |n: f64| (n * 1e3).round() / 1e3;
+    let range = if digits(least) < digits(most) {
+        format!("{} to {}", digits(least), digits(most))
+    } else {
+        digits(most).to_string()
+    };
+    format!("; JND: just noticeable difference, {range} N")
 }
 
 /// The settings that all cells share.

@@ -31,6 +31,9 @@ fn detents_lie_between_crests() {
     for (range, [low, high]) in found.iter().zip([[0.0, 10.0], [10.0, 20.0], [20.0, 30.0]]) {
         assert!((range[0] - low).abs() < 0.6 && (range[1] - high).abs() < 0.6);
     }
+    // The same switch as weak as a key has the same detents.
+    let weak = recording("w", |_, x, v| 0.05 * switch(x, v));
+    assert_eq!(detents(&weak), found);
     // a spring has none
     assert!(detents(&recording("s", |_, x, _| 0.4 * x - 6.0)).is_empty());
 }
@@ -46,6 +49,15 @@ fn parts_add_up_and_a_constant_error_is_in_the_nrmse_only() {
     let plain = validate(&found.realization, &r, &detents(&r)).unwrap();
     let off = validate(&found.realization, &shifted, &detents(&r)).unwrap();
     assert!((off.whole.vaf - plain.whole.vaf).abs() < 1e-9);
+    // 0.1 N, and a tenth of the greatest force of a recording as weak as a key (0.45 N)
+    let weak = recording("w", |_, x, v| 0.1 * switch(x, v));
+    let weak = validate(&found.realization, &weak, &[]).unwrap();
+    assert_eq!(plain.noticeable_n, 0.1);
+    assert!(
+        (weak.noticeable_n - 0.045).abs() < 1e-6,
+        "{}",
+        weak.noticeable_n
+    );
     assert!((off.whole.bias_n - plain.whole.bias_n - 1.5).abs() < 1e-9);
     let sd = mean_and_variance(&shifted.f_n).1.sqrt();
     let expected = (off.whole.residual_n.powi(2) + off.whole.bias_n.powi(2)).sqrt() / sd;

@@ -124,7 +124,7 @@ fn presented(protocol: &Protocol, model: &ModelId) -> bool {
 }
 
 /// Whether realizations are rated or compared, so that their number matters.
-pub(super) fn is_about_realizations(protocol: &Protocol) -> bool {
+pub fn is_about_realizations(protocol: &Protocol) -> bool {
     let about = |part: &Part| match &part.task {
         Task::Discrimination { .. } => false,
         Task::Magnitude(own) => own.models.iter().all(|m| protocol.level_of(m).is_none()),
