@@ -2,7 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that fails says where")]
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use study_haptics::identify::compare;
 use study_haptics::identify::evidence::Term;
 use study_haptics::identify::repetition::{Curve, Loops, WITHIN};
 use study_haptics::identify::{Method, Passive, Training, Warning, vaf};
@@ -96,19 +97,37 @@ fn check(name: &str, quality: &Quality) {
     assert_eq!(terms, [Term::Mass, Term::Damping], "{name}");
 }
 
-/// A tactile, a clicky and a tactile switch with a strong click.
+/// The eight switches of the protocol `keyboard`.
 #[test]
 fn measured_switches_are_played_with_their_own_force() {
-    for name in ["Cherry_MX_Purple_1", "Akko_Blue_V2", "Clickiez_75g_Tactile"] {
-        let path = format!("tests/data/switches/{name}.csv");
-        let quality = quality(&read(Path::new(&path)));
+    let files = files("tests/data/switches");
+    assert_eq!(files.len(), 8);
+    for path in files {
+        let recording = read(&path);
+        let quality = quality(&recording);
+        let name = &recording.name;
         check(name, &quality);
+        // of a table of a fixed increment, and of what is recommended: a linear switch has no use for such short increments
+        let training = Training::new(&recording).unwrap();
+        let compared = compare::run(&training, Lookup::Linear, &[], |_| ()).unwrap();
+        let recommended = compared.best().unwrap().left_out.unwrap().vaf;
+        let vaf = quality.left_out_vaf;
         assert!(
-            quality.left_out_vaf > 0.95,
-            "{name} {}",
-            quality.left_out_vaf
+            vaf >= 0.97 && recommended >= 0.98,
+            "{name} {vaf} {recommended}"
         );
     }
+}
+
+/// The force curves of a folder.
+fn files(folder: &str) -> Vec<PathBuf> {
+    let mut files: Vec<PathBuf> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|e| e == "csv"))
+        .collect();
+    files.sort();
+    files
 }
 
 /// A report over every file of the folder SWITCHES:
@@ -117,12 +136,7 @@ fn measured_switches_are_played_with_their_own_force() {
 #[ignore = "needs a folder of force curves"]
 fn every_switch_of_a_folder() {
     let folder = std::env::var("SWITCHES").unwrap_or("tests/data/switches".into());
-    let mut files: Vec<_> = std::fs::read_dir(folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().path())
-        .filter(|path| path.extension().is_some_and(|e| e == "csv"))
-        .collect();
-    files.sort();
+    let files = files(&folder);
     println!(
         "file | SD played/measured | rms difference, gf | VAF left out | mass, g | damping, N·s/m"
     );

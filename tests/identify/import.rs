@@ -180,3 +180,47 @@ fn the_keyboard_switches_are_reproduced() {
     }
     assert_eq!(switches, 8);
 }
+
+/// Three loops of 1 mm at three speeds with a measured time, of which each is .05 N wider than the one before.
+#[test]
+fn loops_of_several_speeds_say_whether_the_force_depends_on_it() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("speeds.csv");
+    let mut text = String::from("# measured force curve: a test\nt_s,x_mm,f_n\n");
+    let mut t = 0.0;
+    for decade in 0..3 {
+        for i in (0..200).chain((0..200).rev().map(|i| i + 1000)) {
+            let (x, press) = (f64::from(i % 1000) / 199.0, i < 1000);
+            let width = if press {
+                0.2 + 0.05 * f64::from(decade)
+            } else {
+                0.0
+            };
+            let _ = writeln!(text, "{t},{x},{}", x + width);
+            t += 0.05 / 10_f64.powi(decade);
+        }
+    }
+    fs::write(&path, text).unwrap();
+    let identify = [
+        "identify",
+        path.to_str().unwrap(),
+        "--method",
+        "passive",
+        "--dx",
+        "0.1",
+    ];
+    let with = |more: &[&str]| {
+        let output = study(&[&identify[..], more].concat()).success();
+        String::from_utf8_lossy(&output.get_output().stdout).into_owned()
+    };
+    let said = with(&[]);
+    assert!(said.contains("the loop is wider by 0.0500 ± "), "{said}");
+    assert!(said.contains("the force depends on the speed"), "{said}");
+    let json: serde_json::Value = serde_json::from_str(&with(&["--json"])).unwrap();
+    let rate = &json["force_curve"]["rate_dependence"];
+    assert_eq!(rate["depends"], true);
+    assert!(
+        (rate["per_decade_n"].as_f64().unwrap() - 0.05).abs() < 1e-3,
+        "{rate}"
+    );
+}

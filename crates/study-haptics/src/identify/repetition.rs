@@ -107,16 +107,77 @@ pub struct Loops {
     /// The same between the shares [`WITHIN`].
     pub within_mm: [f64; 2],
     loops: Vec<(Vec<f64>, Vec<f64>)>,
+    /// Of the press of each loop, mm/s; `None` where the time was made up.
+    speeds_mm_s: Vec<Option<f64>>,
+}
+
+/// How the width of a loop, press minus release, depends on the speed of the press.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RateDependence {
+    /// Speed, mm/s, and mean width, N, of each loop.
+    pub loops: Vec<[f64; 2]>,
+    /// Change of the width with ten times the speed, N.
+    pub per_decade_n: f64,
+    /// Half of its confidence interval of 95 %, N; `None` with two loops, which leave no error.
+    pub error_n: Option<f64>,
+}
+
+/// Speeds that differ by less than this factor are the same.
+const OTHER_SPEED: f64 = 1.5;
+/// Quantiles .975 of Student's t for 1, 2, … degrees of freedom; with more than these it is 2.2 or less.
+const STUDENT: [f64; 10] = [
+    12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228,
+];
+
+impl RateDependence {
+    /// Least squares of the width on the logarithm of the speed; `None` if the speeds hardly differ.
+    fn of(loops: Vec<[f64; 2]>) -> Option<Self> {
+        let [slowest, fastest] = range(&loops.iter().map(|of| of[0]).collect::<Vec<_>>());
+        // false without loops
+        let differ = slowest > 0.0 && fastest >= OTHER_SPEED * slowest && fastest.is_finite();
+        if !differ {
+            return None;
+        }
+        let n = loops.len() as f64;
+        let points: Vec<[f64; 2]> = (loops.iter()).map(|of| [of[0].log10(), of[1]]).collect();
+        let mean = |k: usize| points.iter().map(|p| p[k]).sum::<f64>() / n;
+        let (x, y) = (mean(0), mean(1));
+        let information: f64 = points.iter().map(|p| (p[0] - x).powi(2)).sum();
+        let product: f64 = points.iter().map(|p| (p[0] - x) * (p[1] - y)).sum();
+        let per_decade_n = product / information;
+        let left = |p: &[f64; 2]| (p[1] - y - per_decade_n * (p[0] - x)).powi(2);
+        let freedom = loops.len().saturating_sub(2);
+        let error_n = (freedom > 0).then(|| {
+            let variance = points.iter().map(left).sum::<f64>() / freedom as f64;
+            let student = STUDENT[freedom.min(STUDENT.len()) - 1];
+            student * (variance / information).sqrt()
+        });
+        Some(Self {
+            loops,
+            per_decade_n,
+            error_n,
+        })
+    }
+
+    /// Whether the width depends on the speed; `None` without an error to compare with.
+    pub fn depends(&self) -> Option<bool> {
+        self.error_n
+            .map(|error_n| self.per_decade_n.abs() > error_n)
+    }
 }
 
 impl Loops {
     /// The loops of those recordings that are force curves; `None` without one.
     pub fn of(recordings: &[&Recording]) -> Option<Self> {
-        let mut found = Vec::new();
+        let (mut found, mut speeds_mm_s) = (Vec::new(), Vec::new());
         for recording in recordings.iter().filter(|r| r.is_force_curve()) {
+            let timed = recording.quasi_static().is_none();
             for rows in loops(&recording.x_mm) {
                 let of = |column: &[f64]| column[rows.clone()].to_vec();
-                found.push((of(&recording.x_mm), of(&recording.f_n)));
+                let x_mm = of(&recording.x_mm);
+                let speed = press_mm_s(&of(&recording.t_s), &x_mm);
+                speeds_mm_s.push(speed.filter(|_| timed));
+                found.push((x_mm, of(&recording.f_n)));
             }
         }
         let ranges = found.iter().map(|(x, _)| range(x));
@@ -126,6 +187,7 @@ impl Loops {
             range_mm,
             within_mm: WITHIN.map(at),
             loops: found,
+            speeds_mm_s,
         })
     }
 
@@ -168,6 +230,17 @@ impl Loops {
         }
     }
 
+    /// How the width depends on the speed; `None` unless loops of several speeds have a measured time.
+    pub fn rate_dependence(&self) -> Option<RateDependence> {
+        let width = |((x, f), speed): (&(Vec<f64>, Vec<f64>), &Option<f64>)| {
+            let Curve([press, release]) = Curve::of(x, f, self.within_mm)?;
+            let differences = press.iter().zip(&release).map(|(p, r)| p - r);
+            Some([(*speed)?, differences.sum::<f64>() / BINS as f64])
+        };
+        let loops = self.loops.iter().zip(&self.speeds_mm_s);
+        RateDependence::of(loops.filter_map(width).collect())
+    }
+
     /// The curve of a realization that is moved as in the first loop.
     pub fn played(&self, realization: &Realization, range_mm: [f64; 2]) -> Option<Curve> {
         let (x_mm, f_n) = self.loops.first()?;
@@ -187,6 +260,15 @@ impl Loops {
         let forces: Vec<f64> = vaf::predict(realization, &motion).collect();
         Curve::of(x_mm, &forces, range_mm)
     }
+}
+
+/// The mean speed of a press between the shares [`WITHIN`] of its travel, mm/s.
+fn press_mm_s(t_s: &[f64], x_mm: &[f64]) -> Option<f64> {
+    let [low, high] = range(x_mm);
+    let reached = |share: f64| x_mm.iter().position(|x| *x >= low + share * (high - low));
+    let (from, to) = (reached(WITHIN[0])?, reached(WITHIN[1])?);
+    let speed = (x_mm[to] - x_mm[from]) / (t_s[to] - t_s[from]);
+    (speed.is_finite() && speed > 0.0).then_some(speed)
 }
 
 /// Hardly any speed, in the direction of the press until the deepest row and of the release then.
@@ -253,6 +335,36 @@ mod tests {
                 .1
                 .is_none()
         );
+    }
+
+    /// Presses of 1 mm in 10 s, 10 s, 1 s, 1 s and .1 s, with widths of .2 N and .05 N more with each decade.
+    #[test]
+    fn a_width_that_depends_on_the_speed_is_told_from_one_that_does_not() {
+        let recording = |more: f64, header: &str| {
+            let mut text = format!("# measured force curve: a test\n{header}t_s,x_mm,f_n\n");
+            let mut t = 0.0;
+            for (k, decade) in [0, 0, 1, 1, 2].into_iter().enumerate() {
+                let width = 0.2 + more * f64::from(decade) + [0.002, -0.002][k % 2];
+                for i in (0..200).chain((0..200).rev().map(|i| i + 1000)) {
+                    let (x, press) = (f64::from(i % 1000) / 199.0, i < 1000);
+                    text += &format!("{t},{x},{}\n", x + if press { width } else { 0.0 });
+                    t += 0.05 / 10_f64.powi(decade);
+                }
+            }
+            crate::recording::read("r", text.as_bytes()).unwrap()
+        };
+        let of = |recording: &Recording| Loops::of(&[recording]).unwrap().rate_dependence();
+        let found = of(&recording(0.05, "")).unwrap();
+        assert!((found.loops[0][0] - 0.1).abs() < 2e-3, "{found:?}");
+        assert!((found.loops[4][0] - 10.0).abs() < 0.2, "{found:?}");
+        assert!((found.per_decade_n - 0.05).abs() < 0.003, "{found:?}");
+        assert_eq!(found.depends(), Some(true));
+        let found = of(&recording(0.0, "")).unwrap();
+        assert_eq!(found.depends(), Some(false), "{found:?}");
+        // t(.975, 3) √(Σ e²/3 / Σ (x − x̄)²) of y = ±.002 on x = 0, 0, 1, 1, 2, computed apart in Python
+        let error_n = found.error_n.unwrap();
+        assert!((error_n - 0.004_546).abs() < 2e-5, "{error_n}");
+        assert_eq!(of(&recording(0.05, "# quasi-static: made up\n")), None);
     }
 
     #[test]

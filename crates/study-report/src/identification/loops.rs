@@ -70,6 +70,23 @@ pub(super) fn text(results: &Identification) -> String {
     let Some(difference) = &found.difference else {
         return out;
     };
+    if let Some(rate) = found.loops.rate_dependence() {
+        let change = shown(rate.per_decade_n);
+        let _ = match (rate.error_n.map(shown), rate.depends()) {
+            (Some(error), Some(true)) => writeln!(
+                out,
+                "the loop is wider by {change} ± {error} {f} at ten times the speed (95 %): the force depends on the speed, and this model, of slow loops, does not",
+            ),
+            (Some(error), _) => writeln!(
+                out,
+                "the loop is wider by {change} ± {error} {f} at ten times the speed (95 %): no dependence on the speed is seen",
+            ),
+            (None, _) => writeln!(
+                out,
+                "the loop is wider by {change} {f} at ten times the speed; two loops do not say with what error",
+            ),
+        };
+    }
     let _ = writeln!(
         out,
         "{} loops differ by {} {f} rms there, so that the highest VAF on another loop is about {:.4}; by position:",
@@ -109,6 +126,13 @@ pub(super) fn json(results: &Identification) -> Value {
         "played_difference_n": found.played.as_ref().map(|p| p.difference_n(&found.measured)),
         "repetition_difference_n": found.difference.as_ref().map(whole),
         "ceiling_vaf": found.difference.as_ref().map(|d| ceiling(&found.measured, d)),
+        "rate_dependence": found.loops.rate_dependence().map(|rate| json!({
+            "speeds_mm_s": rate.loops.iter().map(|of| of[0]).collect::<Vec<_>>(),
+            "widths_n": rate.loops.iter().map(|of| of[1]).collect::<Vec<_>>(),
+            "per_decade_n": rate.per_decade_n,
+            "error_n": rate.error_n,
+            "depends": rate.depends(),
+        })),
         "by_position": found.difference.as_ref().map(|d| json!({
             "x_mm": Loops::positions(found.loops.within_mm),
             "press_n": d.0[0],
