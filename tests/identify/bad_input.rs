@@ -105,7 +105,7 @@ fn a_force_of_the_wrong_sign_is_refused_by_its_energy_unless_the_target_is_activ
     flipped.iter_mut().for_each(|row| row[4] = -row[4]);
     let flipped = text(NAMES, &flipped);
     refused(&flipped, "training.csv: the target supplies energy: ");
-    refused(&flipped, "change its sign");
+    refused(&flipped, "change the sign of F");
     let (code, out, err) = identify(&flipped, &["--active"]);
     assert_eq!(code, 0, "{err}");
     assert!(out.contains("VAF"), "{out}");

@@ -3,6 +3,7 @@
 mod bad_input;
 mod cli;
 mod compare;
+mod doubtful;
 mod estimators_switches;
 mod estimators_tables;
 mod evidence;

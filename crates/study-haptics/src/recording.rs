@@ -12,10 +12,13 @@
 mod column;
 mod differences;
 mod doubts;
+mod drift;
 pub mod force_curve;
 mod motion;
 mod names;
 mod rows;
+mod saturation;
+mod spikes;
 mod swapped;
 mod write;
 
@@ -179,6 +182,9 @@ pub enum Warning {
     },
     #[error("columns are separated by {0}")]
     Separated(&'static str),
+    /// Rows whose values are all those of the row before.
+    #[error("{count} row{} the one before {} and {} left out, the first at line {line}", if *.count == 1 { " repeats" } else { "s repeat" }, if *.count == 1 { "it" } else { "them" }, if *.count == 1 { "is" } else { "are" })]
+    Repeated { count: usize, line: u64 },
     /// Intervals longer than 1.75 median ones, which jitter does not explain.
     #[error("{count} gap{} in time, the longest {longest_s:.4} s at {at_s:.4} s", if *.count == 1 { "" } else { "s" })]
     Gaps {
@@ -198,6 +204,31 @@ pub enum Warning {
         "f_n stays at exactly {force_n} N for {count} samples: the sensor seems to be saturated"
     )]
     Saturated { count: usize, force_n: f64 },
+    /// The force rises to it and falls from it steeply.
+    #[error(
+        "f_n stays within its noise of {force_n:.3} N for {count} samples in {runs} runs, and leaves it steeply: as a saturated sensor with noise does, or dry friction alone; compare with the range of the sensor"
+    )]
+    Plateau {
+        count: usize,
+        runs: usize,
+        force_n: f64,
+    },
+    /// Jumps of the force that recur at a position, or after which it stays elsewhere.
+    #[error(
+        "f_n jumps {count} time{} within a few samples, first at {at_s:.4} s and {at_mm:.2} mm, {why}: the target's own snap, no spike, and --robust leaves it as it is",
+        if *.count == 1 { "" } else { "s" }
+    )]
+    Snap {
+        count: usize,
+        at_s: f64,
+        at_mm: f64,
+        why: &'static str,
+    },
+    /// At the same positions, in both directions of travel.
+    #[error(
+        "at the same positions f_n changes by {by_n:.3} N from the beginning to the end: the sensor drifts; tare it, or subtract the drift"
+    )]
+    Drift { by_n: f64 },
     #[error("the target moves in one direction only")]
     OneDirection,
     #[error("the differences of x_mm are {ratio:.3e} times {column}: check its unit and sign")]
@@ -478,7 +509,12 @@ mod tests {
             let (w, x) = (60.0, (60.0 * t).sin());
             // v in m/s instead of mm/s
             let v = w * (w * t).cos() / 1000.0;
-            text += &format!("{t},{},{v},{},{}\n", 10.0 * x, -w * w * x / 100.0, t.sin());
+            text += &format!(
+                "{t},{},{v},{},{}\n",
+                10.0 * x,
+                -w * w * x / 100.0,
+                (w * t).cos()
+            );
         }
         let r = read_text(&text).unwrap();
         let messages: Vec<_> = r.warnings.iter().map(ToString::to_string).collect();

@@ -158,7 +158,7 @@ impl IdentificationError {
                 Some("the spikes may be the cause: --robust replaces them")
             }
             Self::Active { .. } => Some(
-                "F is the force that the probe applies to the target, positive with +x: change its sign. For a target with a motor: --active",
+                "F is the force that the probe applies to the target, positive with +x: change the sign of F, or that of x if the position is counted the other way round. For a target with a motor: --active",
             ),
             Self::Same(..) => {
                 Some("identify from one recording, select on a second and report a third")
@@ -211,29 +211,25 @@ impl Source {
             let plural = if replaced == 1 { "" } else { "s" };
             say(format!("{path}: {replaced} spike{plural} replaced"));
         }
-        let warns = |of: fn(&recording::Warning) -> bool| recording.warnings.iter().any(of);
         // swapped columns, which are warned of, have the opposite energy as well
-        let swapped = warns(|w| matches!(w, recording::Warning::Swapped { .. }));
+        let swapped = |w: &recording::Warning| matches!(w, recording::Warning::Swapped { .. });
+        let swapped = recording.warnings.iter().any(swapped);
         if let Some(energy) = recording.energy()
             && energy.negative
             && !request.active
             && !swapped
         {
-            let spikes =
-                !request.robust && warns(|w| matches!(w, recording::Warning::Spikes { .. }));
+            let spikes = !request.robust && recording.spikes_make_it_active();
             return Err(IdentificationError::Active {
                 path,
                 energy,
                 spikes,
             });
         }
-        if let Some((even, most_s)) = signal::without_jitter(&recording)
+        if let Some((even, how)) = signal::evened(&recording)
             && request.needs_even_samples()
         {
-            say(format!(
-                "{path}: intervals deviate by up to {:.1} µs: resampled at even intervals by cubics",
-                1e6 * most_s
-            ));
+            say(format!("{path}: {how}"));
             recording = even;
         }
         match signal::prepare(recording, request.signals) {

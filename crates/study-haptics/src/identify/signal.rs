@@ -20,9 +20,14 @@ pub use filter::LowPass;
 pub use thin::thin;
 
 use crate::recording::{JITTER, Recording};
+use std::fmt;
 
 /// A sampling interval may differ from the mean one by this share.
 const INTERVAL_TOLERANCE: f64 = 0.1;
+/// So many samples that are missing in a row are interpolated …
+pub const LOST_IN_A_ROW: f64 = 5.0;
+/// … if no more than this share is missing in all.
+pub const LOST_SHARE: f64 = 0.1;
 
 study_base::named! {
     /// The source of the acceleration.
@@ -52,7 +57,7 @@ pub enum SignalError {
     )]
     Corner { corner_hz: f64, rate_hz: f64 },
     #[error(
-        "{recording}: the sampling interval at {at_s} s is {interval_s} s instead of {mean_s} s: a filter or a simulation needs a recording without gaps: divide it there, several are accepted"
+        "{recording}: the sampling interval at {at_s} s is {interval_s} s instead of {mean_s} s: a filter or a simulation needs a recording without gaps of more than {most} samples: divide it there, several are accepted", most = LOST_IN_A_ROW
     )]
     Uneven {
         recording: String,
@@ -83,31 +88,81 @@ pub fn sampling_interval_s(recording: &Recording) -> Result<f64, SignalError> {
     Ok(mean_s)
 }
 
-/// A recording with jitter, interpolated at even intervals by cubics through the samples,
-/// and the largest deviation of an interval from the mean one, s. `None` if it is even, or
-/// so uneven ([`JITTER`]) that samples are missing.
-pub fn without_jitter(recording: &Recording) -> Option<(Recording, f64)> {
-    let (t, n) = (&recording.t_s, recording.len());
+/// How a recording was brought to even intervals.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Evened {
+    /// The largest deviation of a sample from its even time, s.
+    pub jitter_s: f64,
+    /// Samples that were missing.
+    pub lost: usize,
+}
+
+impl fmt::Display for Evened {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.lost {
+            0 => {
+                let microseconds = 1e6 * self.jitter_s;
+                write!(f, "intervals deviate by up to {microseconds:.1} µs: ")?;
+            }
+            1 => write!(f, "1 sample is missing: ")?,
+            lost => write!(
+                f,
+                "{lost} samples are missing, at most {LOST_IN_A_ROW} in a row: "
+            )?,
+        }
+        write!(f, "resampled at even intervals by cubics")
+    }
+}
+
+/// A recording with jitter or with lost samples, interpolated at even intervals by cubics through the
+/// samples. `None` if it is even, or so uneven that it has to be divided: if a sample is later than [`JITTER`]
+/// allows, if more than [`LOST_IN_A_ROW`] samples are missing at a place, or more than [`LOST_SHARE`] of all.
+pub fn evened(recording: &Recording) -> Option<(Recording, Evened)> {
+    let (t, given) = (&recording.t_s, recording.len());
+    let mut intervals: Vec<f64> = t.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let middle = intervals.len() / 2;
+    let median_s = *intervals.select_nth_unstable_by(middle, f64::total_cmp).1;
+    // of the median interval; what jitter explains is one
+    let steps = |pair: &[f64]| {
+        let ratio = (pair[1] - pair[0]) / median_s;
+        if ratio > 1.0 + JITTER {
+            ratio.round()
+        } else {
+            1.0
+        }
+    };
+    let most = t.windows(2).map(steps).fold(1.0, f64::max);
+    let n = 1 + t.windows(2).map(steps).sum::<f64>() as usize;
+    let lost = n - given;
+    if most > 1.0 + LOST_IN_A_ROW || lost as f64 > LOST_SHARE * n as f64 {
+        return None;
+    }
     let mean_s = recording.duration_s() / (n - 1) as f64;
-    let deviations = t.windows(2).map(|pair| (pair[1] - pair[0] - mean_s).abs());
-    let most_s = deviations.fold(0.0, f64::max);
-    if most_s <= INTERVAL_TOLERANCE * mean_s || most_s > JITTER * mean_s {
+    let deviation = |pair: &[f64]| (pair[1] - pair[0] - steps(pair) * mean_s).abs();
+    let jitter_s = t.windows(2).map(deviation).fold(0.0, f64::max);
+    if lost == 0 && jitter_s <= INTERVAL_TOLERANCE * mean_s || jitter_s > JITTER * mean_s {
         return None;
     }
     let even: Vec<f64> = (0..n).map(|i| t[0] + i as f64 * mean_s).collect();
     let mut left = 0;
     let places: Vec<usize> = (even.iter())
         .map(|at| {
-            while left + 2 < n && t[left + 1] <= *at {
+            while left + 2 < given && t[left + 1] <= *at {
                 left += 1;
             }
             left
         })
         .collect();
     let resampled = |y: &[f64]| -> Vec<f64> {
-        let slope = |i: usize| {
-            let (a, b) = (i.saturating_sub(1), (i + 1).min(n - 1));
-            (y[b] - y[a]) / (t[b] - t[a])
+        let chord = |i: usize| (y[i + 1] - y[i]) / (t[i + 1] - t[i]);
+        // of the parabola through a sample and its neighbors
+        let slope = |i: usize| match i {
+            0 => chord(0),
+            _ if i + 1 == given => chord(i - 1),
+            _ => {
+                let (before, after) = (t[i] - t[i - 1], t[i + 1] - t[i]);
+                (after * chord(i - 1) + before * chord(i)) / (before + after)
+            }
         };
         (even.iter().zip(&places))
             .map(|(at, i)| {
@@ -129,7 +184,7 @@ pub fn without_jitter(recording: &Recording) -> Option<(Recording, f64)> {
         t_s: even,
         ..recording.clone()
     };
-    Some((even, most_s))
+    Some((even, Evened { jitter_s, lost }))
 }
 
 /// The recording with its signals filtered and its velocity and acceleration computed
@@ -243,10 +298,9 @@ mod tests {
     }
 
     #[test]
-    fn jitter_is_resampled_and_a_gap_is_not() {
+    fn jitter_is_resampled() {
         let even = recording(2000, None);
-        assert_eq!(without_jitter(&even), None);
-        assert_eq!(without_jitter(&recording(300, Some(100))), None);
+        assert_eq!(evened(&even), None);
         // the same motion at times that deviate by up to 0.3 ms
         let mut text = String::from("t_s,x_mm,f_n\n");
         let w = TAU * 2.0;
@@ -256,12 +310,33 @@ mod tests {
         }
         let rough = crate::recording::read("r", text.as_bytes()).unwrap();
         assert!(sampling_interval_s(&rough).is_err());
-        let (smooth, most_s) = without_jitter(&rough).unwrap();
-        assert!(most_s > 1e-4 && most_s < 5e-4, "{most_s}");
+        let (smooth, how) = evened(&rough).unwrap();
+        assert!(how.jitter_s > 1e-4 && how.jitter_s < 6.5e-4, "{how:?}");
+        assert_eq!(how.lost, 0);
         assert!(sampling_interval_s(&smooth).is_ok());
         for (t, x) in smooth.t_s.iter().zip(&smooth.x_mm) {
             assert!((x - 5.0 * (w * t).sin()).abs() < 1e-4, "{t}");
         }
+    }
+
+    /// Two in a hundred samples, and twice three in a row.
+    #[test]
+    fn lost_samples_are_interpolated_and_a_pause_is_not() {
+        let whole = recording(2000, None);
+        let kept: Vec<usize> = (0..2000)
+            .filter(|i| i % 53 != 7 && !(400..403).contains(i) && !(900..903).contains(i))
+            .collect();
+        let (filled, how) = evened(&whole.select(&kept)).unwrap();
+        assert_eq!(how.lost, 2000 - kept.len());
+        assert_eq!(filled.len(), 2000);
+        for (a, b) in filled.x_mm.iter().zip(&whole.x_mm) {
+            // 0.01 % of the amplitude of 5 mm
+            assert!((a - b).abs() < 5e-4, "{a} {b}");
+        }
+        let pause: Vec<usize> = (0..2000).filter(|i| !(400..406).contains(i)).collect();
+        assert_eq!(evened(&whole.select(&pause)), None);
+        let every_ninth: Vec<usize> = (0..2000).filter(|i| i % 9 != 4).collect();
+        assert_eq!(evened(&whole.select(&every_ninth)), None);
     }
 
     #[test]

@@ -2,83 +2,20 @@
 //! of the wrong sign.
 
 use super::differences::{acceleration, velocity};
-use super::{Recording, Warning, range};
+use super::spikes::{jumps, spikes};
+use super::{Recording, Warning, range, saturation};
 
-/// A sample is a spike if it differs from the median of its neighborhood by more than this
-/// share of the range that most samples cover …
-const SPIKE_SHARE: f64 = 0.2;
-/// … and by this many times what is usual.
-const SPIKE_RATIO: f64 = 50.0;
-/// Samples on either side of a sample in its neighborhood.
-const REACH: usize = 3;
-/// So many samples in a row at the highest or lowest value are saturation; a smooth peak has
-/// fewer that are equal.
-const FLAT_RUN: usize = 5;
 /// A position that moves by more than this share of its range from sample to sample says
 /// nothing of cycles.
 const COARSE: f64 = 0.2;
 /// Less energy per path than this share of the range of the force may be noise.
 const ENERGY_SHARE: f64 = 0.005;
 
-/// The samples of a column that differ from all their neighbors as no motion does.
-pub(super) fn spikes(values: &[f64]) -> Vec<usize> {
-    if values.len() < 20 * REACH {
-        return Vec::new();
-    }
-    let mut around = Vec::with_capacity(2 * REACH + 1);
-    let away: Vec<f64> = (0..values.len())
-        .map(|i| {
-            let (from, to) = (i.saturating_sub(REACH), (i + REACH + 1).min(values.len()));
-            around.clear();
-            around.extend_from_slice(&values[from..to]);
-            (values[i] - median(&mut around)).abs()
-        })
-        .collect();
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let at = |share: f64| sorted[((sorted.len() - 1) as f64 * share) as usize];
-    let reach = at(0.99) - at(0.01);
-    let mut usual = away.clone();
-    usual.sort_by(f64::total_cmp);
-    // of the larger ones, because most samples of a slow signal are their own median
-    let usual = usual[(usual.len() - 1) * 9 / 10];
-    let least = (SPIKE_SHARE * reach).max(SPIKE_RATIO * usual);
-    (0..values.len()).filter(|i| away[*i] > least).collect()
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
-}
-
-/// The number of samples in runs at the highest or lowest value, and that value. Spikes
-/// are no part of the range.
-fn saturated(values: &[f64], spikes: &[usize]) -> Option<(usize, f64)> {
-    let mut usual = values.to_vec();
-    for at in spikes {
-        usual[*at] = f64::NAN;
-    }
-    let [low, high] = range(&usual);
-    let tolerance = 1e-9 * (high - low);
-    [high, low].into_iter().find_map(|end| {
-        let (mut run, mut count) = (0, 0);
-        for value in values.iter().chain([&f64::NAN]) {
-            if (value - end).abs() <= tolerance {
-                run += 1;
-            } else {
-                count += if run >= FLAT_RUN { run } else { 0 };
-                run = 0;
-            }
-        }
-        (count > 0).then_some((count, end))
-    })
-}
-
-/// Warnings about spikes and saturation.
+/// Warnings about spikes, snaps and saturation.
 pub(super) fn warnings(x_mm: &[f64], f_n: &[f64], t_s: &[f64]) -> Vec<Warning> {
     let mut warnings = Vec::new();
-    let of_force = spikes(f_n);
-    for (column, values, found) in [("x_mm", x_mm, &spikes(x_mm)), ("f_n", f_n, &of_force)] {
+    let jumps = jumps(x_mm, f_n);
+    for (column, values, found) in [("x_mm", x_mm, &spikes(x_mm)), ("f_n", f_n, &jumps.spikes)] {
         let largest = |a: &&usize, b: &&usize| values[**a].abs().total_cmp(&values[**b].abs());
         if let Some(at) = found.iter().max_by(largest) {
             warnings.push(Warning::Spikes {
@@ -89,8 +26,22 @@ pub(super) fn warnings(x_mm: &[f64], f_n: &[f64], t_s: &[f64]) -> Vec<Warning> {
             });
         }
     }
-    if let Some((count, force_n)) = saturated(f_n, &of_force) {
+    if let Some((count, first, why)) = jumps.snaps {
+        warnings.push(Warning::Snap {
+            count,
+            at_s: t_s[first],
+            at_mm: x_mm[first],
+            why,
+        });
+    }
+    if let Some((count, force_n)) = saturation::exact(f_n, &jumps.spikes) {
         warnings.push(Warning::Saturated { count, force_n });
+    } else if let Some((count, runs, force_n)) = saturation::noisy(f_n) {
+        warnings.push(Warning::Plateau {
+            count,
+            runs,
+            force_n,
+        });
     }
     warnings
 }
@@ -140,10 +91,17 @@ impl Recording {
         })
     }
 
+    /// Whether its energy is negative because of spikes: without them it is not.
+    pub fn spikes_make_it_active(&self) -> bool {
+        let negative = |recording: &Self| recording.energy().is_some_and(|e| e.negative);
+        let mut without = self.clone();
+        negative(self) && without.without_spikes() > 0 && !negative(&without)
+    }
+
     /// Replaces spikes of x and F by the line between the samples before and after; their
-    /// number. Differences of x that were computed from a spike are computed anew.
+    /// number. Snaps of the force stay as they are. Differences of x that were computed from a spike are computed anew.
     pub fn without_spikes(&mut self) -> usize {
-        let (in_x, in_f) = (spikes(&self.x_mm), spikes(&self.f_n));
+        let (in_x, in_f) = (spikes(&self.x_mm), jumps(&self.x_mm, &self.f_n).spikes);
         bridge(&self.t_s, &mut self.x_mm, &in_x);
         bridge(&self.t_s, &mut self.f_n, &in_f);
         let derived = |column| {
@@ -247,21 +205,5 @@ mod tests {
             assert!((bad.f_n[i] - good.f_n[i]).abs() < 0.05, "{i}");
         }
         assert!((bad.x_mm[900] - good.x_mm[900]).abs() < 0.01);
-    }
-
-    #[test]
-    fn a_clipped_force_is_saturated() {
-        let mut clipped = recording(1.0);
-        assert_eq!(saturated(&clipped.f_n, &[]), None);
-        clipped.f_n.iter_mut().for_each(|f| *f = f.clamp(-9.0, 3.0));
-        let (count, force_n) = saturated(&clipped.f_n, &[]).unwrap();
-        assert_eq!(force_n, 3.0);
-        assert!(count > 400, "{count}");
-        // a spike neither hides it nor makes a smooth peak look flat
-        clipped.f_n[700] = 1e8;
-        assert_eq!(saturated(&clipped.f_n, &[700]).unwrap().1, 3.0);
-        let mut smooth = recording(1.0);
-        smooth.f_n[700] = -1e9;
-        assert_eq!(saturated(&smooth.f_n, &[700]), None);
     }
 }

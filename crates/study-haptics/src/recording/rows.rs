@@ -39,6 +39,8 @@ pub(super) struct Rows {
     pub(super) sha256: String,
     /// What separates fields, unless it is a comma.
     pub(super) separator: Option<&'static str>,
+    /// Rows that repeat the one before in all columns and are left out: their number and the first line.
+    pub(super) repeated: Option<(usize, u64)>,
 }
 
 type Fault = (u64, RecordingFault);
@@ -64,7 +66,7 @@ pub(super) fn read(input: impl BufRead, names: &Names) -> Result<Rows, Fault> {
     };
     let header_line = lines.number;
     let mut columns: [Vec<f64>; 5] = Default::default();
-    let mut rows = 0;
+    let (mut rows, mut repeated) = (0, None);
     while let Some(line) = lines.next()? {
         if line.starts_with(b"#") {
             continue;
@@ -72,8 +74,22 @@ pub(super) fn read(input: impl BufRead, names: &Names) -> Result<Rows, Fault> {
         if rows == MAX_ROWS {
             return Err((lines.number, RecordingFault::TooLong));
         }
-        row(line, separator, &fields, names, &mut columns)
-            .map_err(|fault| (lines.number, fault))?;
+        let values = row(line, separator, &fields, names).map_err(|fault| (lines.number, fault))?;
+        let last = |column: &Vec<f64>| column.last().copied();
+        if let Some(before) = last(&columns[0])
+            && values[0] <= Some(before)
+        {
+            if values == [0, 1, 2, 3, 4].map(|k| last(&columns[k])) {
+                let (count, first) = repeated.unwrap_or((0, lines.number));
+                repeated = Some((count + 1, first));
+                continue;
+            }
+            let now = values[0].unwrap_or(before);
+            return Err((lines.number, RecordingFault::Time { before, now }));
+        }
+        for (column, value) in columns.iter_mut().zip(values) {
+            column.extend(value);
+        }
         rows += 1;
     }
     if rows < MIN_ROWS {
@@ -95,6 +111,7 @@ pub(super) fn read(input: impl BufRead, names: &Names) -> Result<Rows, Fault> {
             b'\t' => Some("tabs"),
             _ => None,
         },
+        repeated,
     })
 }
 
@@ -128,14 +145,14 @@ fn columns(line: &[u8], separator: u8, own: &Names) -> Result<Vec<Option<usize>>
     Ok(fields)
 }
 
-/// Appends one row.
+/// The values of one row, `None` for columns that the file does not have.
 fn row(
     line: &[u8],
     separator: u8,
     fields: &[Option<usize>],
     names: &Names,
-    columns: &mut [Vec<f64>; 5],
-) -> Result<(), RecordingFault> {
+) -> Result<[Option<f64>; 5], RecordingFault> {
+    let mut values = [None; 5];
     let found = line.iter().filter(|byte| **byte == separator).count() + 1;
     if found != fields.len() {
         return Err(RecordingFault::Ragged {
@@ -160,18 +177,9 @@ fn row(
                 value,
             });
         }
-        if column == 0
-            && let Some(before) = columns[0].last()
-            && value <= *before
-        {
-            return Err(RecordingFault::Time {
-                before: *before,
-                now: value,
-            });
-        }
-        columns[column].push(value);
+        values[column] = Some(value);
     }
-    Ok(())
+    Ok(values)
 }
 
 /// A number, with a decimal comma unless the comma separates fields.
