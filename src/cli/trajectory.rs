@@ -7,6 +7,8 @@ use std::fs;
 use std::io::{BufWriter, Read as _, Write};
 use std::path::{Path, PathBuf};
 use study_base::text::Untrusted;
+use study_haptics::identify::evidence::Term;
+use study_haptics::identify::forecast::{self, Sensors};
 use study_haptics::plant::{self, MAX_RATE_HZ, MIN_RATE_HZ, Parameters, Probe};
 use study_haptics::trajectory::{Trajectory, check, file, spectrum};
 use study_wire::predict::Motion;
@@ -31,9 +33,17 @@ pub(super) struct Args {
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 
-    /// Sampling rate of the CSV
+    /// Sampling rate, of the CSV and of the recording that is foretold
     #[arg(long, value_name = "HZ", default_value_t = 1000.0, value_parser = rate)]
     rate: f64,
+
+    /// Resolution of the encoder
+    #[arg(long, value_name = "MM", default_value_t = Probe::default().encoder_mm, value_parser = not_negative)]
+    encoder: f64,
+
+    /// Noise of the force sensor, rms
+    #[arg(long, value_name = "N", default_value_t = Probe::default().force_noise_n, value_parser = not_negative)]
+    noise: f64,
 
     /// The target, whose limits apply: a, b or a plant file
     #[arg(long, value_name = "a|b|FILE", default_value = "a")]
@@ -62,12 +72,25 @@ pub(super) fn rate(given: &str) -> Result<f64, RateError> {
     }
 }
 
-/// Draws a trajectory, checks it and writes it as CSV.
+fn not_negative(given: &str) -> Result<f64, String> {
+    let value = given.trim().parse().ok();
+    value
+        .filter(|value: &f64| *value >= 0.0 && value.is_finite())
+        .ok_or_else(|| "0 or a number above it is expected".to_owned())
+}
+
+/// Draws a trajectory, says what it identifies, checks it and writes it as CSV.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let trajectory = read_trajectory(&args.spec, console)?;
     let (_, target) = read_plant(&args.plant, console)?;
     refuse_to_overwrite(args.out.as_deref(), args.force)?;
     console.out(page(&trajectory, console.width))?;
+    let sensors = Sensors {
+        encoder_mm: args.encoder,
+        force_noise_n: args.noise,
+        rate_hz: args.rate,
+    };
+    console.out(identifiable(&trajectory, sensors))?;
     if let Err(violations) = Probe::default().check(&trajectory, &target) {
         let violations: Vec<String> = violations.iter().map(ToString::to_string).collect();
         return Err(Failure::input(format!(
@@ -128,6 +151,42 @@ fn page(trajectory: &Trajectory, width: usize) -> String {
     let bands = spectrum::bands(trajectory, to_hz, columns);
     let heading = "spectrum of the position, mm (logarithmic, four decades)";
     out + &picture::columns(heading, "Hz", [0.0, to_hz], &bands, 1e-4, SPECTRUM_ROWS)
+}
+
+/// What a recording of the trajectory will identify, at best.
+fn identifiable(trajectory: &Trajectory, sensors: Sensors) -> String {
+    let Sensors {
+        encoder_mm,
+        force_noise_n,
+        rate_hz,
+    } = sensors;
+    let mut out = format!(
+        "\nidentifiable, at {rate_hz} Hz with an encoder of {encoder_mm} mm and {force_noise_n} N of noise:\n"
+    );
+    let Some(found) = forecast::of(|t_s| trajectory.at(t_s), trajectory.total_s(), sensors) else {
+        return out + "  nothing: the motion does not go forth and back\n";
+    };
+    for (term, least) in [Term::Mass, Term::Damping].into_iter().zip(found.least) {
+        let name = term.as_str();
+        out += &match least {
+            Some(least) => format!("  {name}: from {} on\n", term.shown(least)),
+            None => format!(
+                "  {name}: no, its {} is that of the position and direction, or below the steps of the encoder\n",
+                term.regressor()
+            ),
+        };
+    }
+    let share = 100.0 * found.both_directions;
+    let friction_n = found.friction_n;
+    out += &format!(
+        "  friction: from {friction_n:.4} N on, in {share:.0} % of the travel, which is passed in both directions\n"
+    );
+    let (detent_mm, scale_mm) = (found.detent_mm, found.scale_mm);
+    out += &format!(
+        "  detents: from {detent_mm:.3} mm on by the samples; those narrower than {:.3} mm need --dx\n",
+        2.0 * scale_mm
+    );
+    out
 }
 
 /// Reads a small text file.

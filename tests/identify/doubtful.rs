@@ -6,6 +6,7 @@ use assert_cmd::Command;
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use study_base::rng::Stream;
+use study_haptics::identify::evidence::lag;
 use study_haptics::identify::signal;
 use study_haptics::recording::{self, Recording};
 
@@ -60,6 +61,10 @@ fn warnings(rows: &[[f64; 3]]) -> Vec<String> {
         .collect()
 }
 
+fn lag_ms(rows: &[[f64; 3]]) -> Option<f64> {
+    lag::of(&read(rows)).map(|lag| 1e3 * lag.lag_s)
+}
+
 /// Output and errors of `study identify`, with its exit code.
 fn identify(rows: &[[f64; 3]], more: &[&str]) -> (i32, String, String) {
     let dir = tempfile::tempdir().unwrap();
@@ -85,6 +90,28 @@ fn a_sound_recording_gives_rise_to_no_doubt() {
     for seed in 1..4 {
         let rows = rows(seed);
         assert_eq!(warnings(&rows), [""; 0], "{seed}");
+        assert_eq!(lag_ms(&rows), None, "{seed}");
+    }
+}
+
+/// Force that is 5 to 20 ms late, or early.
+#[test]
+fn a_lag_of_the_force_is_estimated() {
+    for ms in [5_usize, 10, 20] {
+        let sound = rows(ms as u64);
+        let late: Vec<[f64; 3]> = (ms..sound.len())
+            .map(|i| [sound[i][0], sound[i][1], sound[i - ms][2]])
+            .collect();
+        let found = lag_ms(&late).unwrap();
+        assert!((found - ms as f64).abs() < 1.0, "{ms} {found}");
+        let early: Vec<[f64; 3]> = (0..sound.len() - ms)
+            .map(|i| [sound[i][0], sound[i][1], sound[i + ms][2]])
+            .collect();
+        let found = lag_ms(&early).unwrap();
+        assert!((found + ms as f64).abs() < 1.0, "-{ms} {found}");
+        let (code, _, err) = identify(&late, &["--method", "static", "--dx", "0.5"]);
+        assert_eq!(code, 0, "{err}");
+        assert!(err.contains("ms later than the position"), "{err}");
     }
 }
 

@@ -36,6 +36,41 @@ fn the_papers_trajectories_are_drawn_and_pass() {
     }
 }
 
+/// Before anything moves: a better force sensor shows a smaller mass, and the mass in the summary is that of the
+/// library.
+#[test]
+fn what_a_recording_will_identify_is_said_before_it() {
+    let least_mass = |noise: &str| -> f64 {
+        let output = study()
+            .arg("trajectory")
+            .arg(shipped("training.toml"))
+            .args(["--noise", noise, "--rate", "500"])
+            .output()
+            .unwrap();
+        let text = String::from_utf8(output.stdout).unwrap();
+        assert!(
+            text.contains("identifiable, at 500 Hz with an encoder of 0.005 mm"),
+            "{text}"
+        );
+        assert!(text.contains("in 100 % of the travel"), "{text}");
+        let words = text
+            .split("mass: from ")
+            .nth(1)
+            .unwrap_or_else(|| panic!("{text}"));
+        let mut words = words.split(' ');
+        let value: f64 = words.next().unwrap().parse().unwrap();
+        value * if words.next() == Some("kg") { 1e3 } else { 1.0 }
+    };
+    let [fine, coarse] = ["0.01", "1"].map(least_mass);
+    assert!(fine > 0.0 && coarse > 50.0 * fine, "{fine} {coarse}");
+    study()
+        .arg("trajectory")
+        .arg(shipped("validation-1.5hz.toml"))
+        .args(["--noise=-1"])
+        .assert()
+        .code(2);
+}
+
 #[test]
 fn the_csv_has_a_row_for_every_sample_and_is_overwritten_only_with_force() {
     let dir = tempfile::tempdir().unwrap();

@@ -33,6 +33,7 @@ mod direction_state;
 pub mod evidence;
 mod features;
 pub mod folds;
+pub mod forecast;
 pub mod grid;
 pub mod identification;
 pub mod lanes;

@@ -30,6 +30,8 @@
 //! Reference for κ: Fuller, Measurement Error Models, 1987, section 1.1; for the standard
 //! errors: Liang & Zeger 1986, Biometrika 73:13.
 
+pub mod lag;
+
 use super::banded::Banded;
 use super::vaf::motion;
 use crate::recording::{Recording, acceleration, velocity};
@@ -87,8 +89,16 @@ impl Term {
         }
     }
 
+    /// What it is multiplied by.
+    pub fn regressor(self) -> &'static str {
+        match self {
+            Self::Mass => "acceleration",
+            Self::Damping => "velocity",
+        }
+    }
+
     /// `value` in kg or N·s/mm, as a person would write it.
-    fn shown(self, value: f64) -> String {
+    pub fn shown(self, value: f64) -> String {
         match self {
             Self::Mass if value < 1.0 => format!("{:.2} g", 1e3 * value),
             Self::Mass => format!("{value:.2} kg"),
@@ -147,10 +157,7 @@ impl fmt::Display for Evidence {
             None => write!(
                 f,
                 "{term}: not identified by the recordings, which do not show the {} above its noise",
-                match self.term {
-                    Term::Mass => "acceleration",
-                    Term::Damping => "velocity",
-                }
+                self.term.regressor()
             ),
         }
     }
@@ -210,13 +217,7 @@ fn at_scale(recordings: &[&Recording], range_mm: [f64; 2]) -> Option<[Evidence; 
     if samples < BLOCKS * (PER_NODE + 2) {
         return None;
     }
-    let travel_mm = range_mm[1] - range_mm[0];
-    let rules = DELTAS.iter().flat_map(|share| {
-        let delta_mm = share * travel_mm;
-        [Direction::Play { delta_mm }, Direction::Dahl { delta_mm }]
-    });
-    let reference = rules
-        .chain([Direction::Sign])
+    let reference = rules(range_mm)
         .filter_map(|rule| {
             let equations = Equations::of(recordings, &nodes, rule);
             let error = equations.squared_error([true; 2])?;
@@ -244,6 +245,15 @@ fn at_scale(recordings: &[&Recording], range_mm: [f64; 2]) -> Option<[Evidence; 
             Some(found)
         }
     }
+}
+
+/// The rules for the direction state that are tried.
+fn rules([low, high]: [f64; 2]) -> impl Iterator<Item = Direction> {
+    let of = move |share: &f64| {
+        let delta_mm = share * (high - low);
+        [Direction::Play { delta_mm }, Direction::Dahl { delta_mm }]
+    };
+    DELTAS.iter().flat_map(of).chain([Direction::Sign])
 }
 
 /// Equally spaced nodes at the scale on which detents are looked for.

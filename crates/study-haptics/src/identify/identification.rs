@@ -7,6 +7,7 @@
 
 use super::compare::{self, Candidate, Comparison, Failure};
 use super::coverage;
+use super::evidence::lag;
 use super::features;
 use super::grid::{self, Cell};
 use super::method::{Claim, Options, Progress};
@@ -348,6 +349,9 @@ pub fn run(
         }
         if let Some(warning) = Excitation::of(recording).warning() {
             say(format!("warning: {path}: {warning}"));
+        }
+        if let Some(lag) = lag::of(recording) {
+            say(format!("warning: {path}: {lag}"));
         }
     }
     let ceilings = ceilings(&recordings, &repeat)?;
