@@ -45,6 +45,7 @@ fn realization() -> Realization {
         negative: branch(-1.0),
         x_mm,
         mechanism: None,
+        elements: None,
         units: study_haptics::model::Units::Linear,
     }
 }

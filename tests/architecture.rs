@@ -78,10 +78,12 @@ main: cli
 certificate: predict
 predict: real
 estimate: predict real
-message: frame mechanism predict real
-servo: mechanism predict real
-mechanism: certificate predict real
-handler: certificate frame mechanism message predict real servo
+message: elements frame mechanism predict real
+servo: elements mechanism predict real
+mechanism: certificate predict real sum
+elements: certificate mechanism predict real sum
+sum: real
+handler: certificate elements frame mechanism message predict real servo
 stats:
 ";
 

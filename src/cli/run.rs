@@ -380,6 +380,11 @@ fn refuse_unrendered(
             ))
             .hint("a serial device needs minor version 2 of docs/wire.md, a program `\"mechanisms\": true` in its hello; or take the realization out of the protocol"));
         }
+        if table.elements.is_some() && !device.elements {
+            let (id, device) = (&model.id, &device.id);
+            return Err(Failure::device(format!("realization `{id}` is made of elements, which the device `{device}` does not play"))
+                .hint("a serial device needs the feature `elements` of docs/wire.md, minor version 2; or identify it as a table: --method passive"));
+        }
         let certificate = table.certificate();
         // as the device judges it: from minor version 1 on with the direction state
         let asked = match device.servo {

@@ -11,6 +11,7 @@ use std::f64::consts::TAU;
 use study_base::perception::{FORCE_JND_N, force_jnd_n};
 use study_haptics::model::Realization;
 use study_haptics::plant::{DT_S, HandParameters, Parameters, Target};
+use study_wire::elements;
 use study_wire::mechanism::State;
 use study_wire::predict::{DirectionState, Motion, force_n};
 
@@ -187,12 +188,18 @@ fn predicted(realization: &Realization, exploration: &[Motion]) -> Vec<f64> {
     let trained = realization.trained.v_mm_s;
     let mechanism = realization.mechanism.as_ref().map(|own| own.view());
     let mut own = State::at_rest(exploration.first().map_or(low, |motion| motion.x_mm));
+    let elements = realization.elements.as_ref().map(|own| own.view());
+    let mut own_elements = (elements.as_ref().zip(exploration.first()))
+        .map(|(view, first)| elements::State::at_rest(view, first.x_mm));
     let mut state = DirectionState::default();
     let forces: Vec<f64> = (exploration.iter())
         .map(|motion| {
             if let Some(view) = &mechanism {
                 let without_mass_n = own.step(view, *motion, SAMPLE_S);
                 return without_mass_n + view.scalars.handle_kg * motion.a_m_s2;
+            }
+            if let (Some(view), Some(own)) = (&elements, &mut own_elements) {
+                return own.step(view, *motion, SAMPLE_S) + view.mass_kg * motion.a_m_s2;
             }
             let z = state.step(realization.direction, *motion);
             // Limited to the trained range, as on the device.
@@ -294,6 +301,7 @@ mod tests {
             positive: branch(1.0),
             negative: branch(-1.0),
             mechanism: None,
+            elements: None,
             units: study_haptics::model::Units::Linear,
         }
     }

@@ -80,7 +80,7 @@ fn the_simulated_device_passes_in_time() {
         assert!(
             found
                 .summary()
-                .starts_with("27 of 27 tests passed; round trip"),
+                .starts_with("28 of 28 tests passed; round trip"),
             "{}",
             found.summary()
         );

@@ -1,8 +1,9 @@
 //! The servo in single precision against the one in double precision.
 
 use study_base::rng::Stream;
-use study_haptics::model::Realization;
+use study_haptics::model::{Elements, Realization};
 use study_haptics::plant::{Hand, HandParameters};
+use study_wire::elements::{ElementsView, MAX_SPRINGS};
 use study_wire::predict::{BranchView, Motion, TableView};
 use study_wire::servo::{Law, Rendering, Servo, ServoSettings, ServoState};
 
@@ -33,6 +34,33 @@ impl Single {
         }
     }
 
+    fn of_elements(own: &Elements) -> Self {
+        let single = |values: &Vec<f64>| values.iter().map(|value| *value as f32).collect();
+        let [forwards, backwards] = &own.damping_n_s_per_mm;
+        let profiles = [&own.force_n, forwards, backwards];
+        Self {
+            x_mm: single(&own.x_mm),
+            parameters: (profiles.into_iter().chain(&own.spring_n))
+                .map(single)
+                .collect(),
+        }
+    }
+
+    fn elements<'a>(&'a self, own: &'a Elements) -> ElementsView<'a, f32> {
+        let mut spring_n: [&[f32]; MAX_SPRINGS] = [&[]; MAX_SPRINGS];
+        for (slice, profile) in spring_n.iter_mut().zip(&self.parameters[3..]) {
+            *slice = profile;
+        }
+        ElementsView {
+            x_mm: &self.x_mm,
+            mass_kg: own.mass_kg as f32,
+            force_n: &self.parameters[0],
+            damping_n_s_per_mm: [&self.parameters[1], &self.parameters[2]],
+            springs: &own.springs,
+            spring_n,
+        }
+    }
+
     fn branch(&self, first: usize) -> BranchView<'_, f32> {
         BranchView {
             m_kg: &self.parameters[first],
@@ -58,18 +86,22 @@ fn difference_n(realization: &Realization, seed: u64, servo_hz: f64) -> f64 {
     // The damping of the wall sets in at once at an edge, which both have at the same place.
     let range_mm = (realization.trained.x_mm).map(|x_mm| f64::from(x_mm as f32));
     let mechanism = realization.mechanism.as_ref().map(|own| own.view());
+    let elements = realization.elements.as_ref();
+    let narrow = elements.map(Single::of_elements);
     let double = Rendering {
-        law: match &mechanism {
-            Some(view) => Law::Mechanism(*view),
-            None => Law::Table { table, rule },
+        law: match (&mechanism, elements) {
+            (Some(view), _) => Law::Mechanism(*view),
+            (None, Some(own)) => Law::Elements(own.view()),
+            (None, None) => Law::Table { table, rule },
         },
         range_mm,
         trained_mm_s: realization.trained.v_mm_s,
     };
     let single = Rendering {
-        law: match &mechanism {
-            Some(view) => Law::Mechanism(view.of()),
-            None => Law::Table {
+        law: match (&mechanism, elements.zip(narrow.as_ref())) {
+            (Some(view), _) => Law::Mechanism(view.of()),
+            (None, Some((own, narrow))) => Law::Elements(narrow.elements(own)),
+            (None, None) => Law::Table {
                 table: TableView {
                     x_mm: &copy.x_mm,
                     positive: copy.branch(0),
@@ -152,4 +184,23 @@ fn single_precision_renders_every_shipped_realization_within_1_mn() {
         }
     }
     eprintln!("largest difference {:.4} mN: {}", 1e3 * worst.0, worst.1);
+}
+
+#[test]
+fn single_precision_renders_elements_within_1_mn() {
+    let (realization, mut worst_n) = (crate::tables::elements(), 0.0_f64);
+    assert!(
+        realization.certificate().passes(),
+        "{}",
+        realization.certificate()
+    );
+    for (seed, servo_hz) in (1..=12).zip([4000.0, 1000.0, 10_000.0].into_iter().cycle()) {
+        let error_n = difference_n(&realization, seed, servo_hz);
+        assert!(
+            error_n < MOST_N,
+            "at {servo_hz} Hz, motion {seed}: {error_n} N"
+        );
+        worst_n = worst_n.max(error_n);
+    }
+    eprintln!("largest difference {:.4} mN", 1e3 * worst_n);
 }

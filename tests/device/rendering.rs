@@ -13,10 +13,11 @@ use study_base::text::ModelId;
 use study_device::firmware::{Wrong, WrongLoads};
 use study_device::virtual_device::{Options, VirtualDevice};
 use study_device::{Device, Report, Stimulus, rendering_of};
-use study_haptics::model::{Mechanism, Realization};
+use study_haptics::model::{Elements, Mechanism, Realization};
 use study_plan::protocol::RenderingRules;
 use study_session::outcome::{Fidelity, Playback, Sample, Verdict};
 use study_session::rendering::{Played, judge};
+use study_wire::elements::Spring;
 use study_wire::predict::Direction;
 use study_wire::servo::ServoSettings;
 
@@ -229,6 +230,48 @@ fn a_wrong_part_of_a_mechanism_is_found() {
     for (part, change) in parts {
         let mut wrong = right.clone();
         change(wrong.mechanism.as_mut().unwrap());
+        let found = said(&wrong);
+        assert!(
+            matches!(found.verdict, Verdict::Flag | Verdict::Fault),
+            "{part}: {found:?}"
+        );
+    }
+}
+
+/// The same of elements.
+#[test]
+fn a_wrong_part_of_elements_is_found() {
+    let (id, right) = (ModelId::new("e").unwrap(), tables::elements());
+    let limits = Limits::new(12.0, 1000.0).unwrap();
+    type Change = fn(&mut Elements);
+    let parts: [(&str, Change); 7] = [
+        ("potential", |e| {
+            e.force_n.iter_mut().for_each(|n| *n *= 0.7)
+        }),
+        ("nodes moved", |e| e.x_mm.iter_mut().for_each(|x| *x += 2.0)),
+        ("damping", |e| {
+            let all = e.damping_n_s_per_mm.iter_mut().flatten();
+            all.for_each(|b| *b += 0.02);
+        }),
+        ("friction", |e| {
+            e.spring_n[0].iter_mut().for_each(|n| *n = 0.0)
+        }),
+        ("relaxation", |e| {
+            e.springs[2] = Spring::Stop { slip_mm: 30.0 };
+            e.springs[1] = Spring::Stop { slip_mm: 8.0 };
+        }),
+        ("latch", |e| e.spring_n[3].iter_mut().for_each(|n| *n = 0.0)),
+        ("mass", |e| e.mass_kg *= 8.0),
+    ];
+    let said = |played: &Realization| {
+        let heard = play(Options::seeded(5), &[(played, limits)], 6.0);
+        judged(&id, &right, limits, &heard, &[])
+    };
+    let found = said(&right);
+    assert_eq!(found.verdict, Verdict::Ok, "{found:?}");
+    for (part, change) in parts {
+        let mut wrong = right.clone();
+        change(wrong.elements.as_mut().unwrap());
         let found = said(&wrong);
         assert!(
             matches!(found.verdict, Verdict::Flag | Verdict::Fault),

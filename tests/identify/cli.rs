@@ -268,7 +268,7 @@ fn bad_arguments_and_bad_recordings_give_one_clear_error_each() {
         "--method",
         "magic",
         2,
-        "possible values: friction, passive, static, ewls, constrained, hat, mechanism, two-sided, segments, spring",
+        "possible values: friction, passive, static, ewls, constrained, hat, elements, mechanism, two-sided, segments, spring",
     );
     refused(&[TRAINING, "--method", "ewls"], 2, "--validate");
     refused(&[TRAINING, "--validate", "absent.csv"], 1, "absent.csv: ");

@@ -6,8 +6,8 @@ use study_base::rng::Stream;
 use study_haptics::identify::method::{Delta, Sort, Start, State, Terms, Window};
 use study_haptics::identify::resample::Resample;
 use study_haptics::identify::{
-    Ewls, Friction, Hat, Identified, IdentifyError, Method, Passive, Segments, Spring, Static,
-    Training, TwoSided, Warning, Width, vaf,
+    Elements, Ewls, Friction, Hat, Identified, IdentifyError, Method, Passive, Segments, Spring,
+    Static, Training, TwoSided, Warning, Width, vaf,
 };
 use study_haptics::model::{Branch, Realization};
 use study_haptics::recording::Recording;
@@ -99,6 +99,7 @@ fn every_method() -> Vec<Method> {
             huber: true,
             ..Passive::default()
         }),
+        Elements::default().into(),
         Static.into(),
         Method::Segments(Segments::default()),
         Spring.into(),

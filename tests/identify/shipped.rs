@@ -259,6 +259,7 @@ fn a_version_1_file_reads_as_it_always_did() {
             f0_n: zero,
         },
         mechanism: None,
+        elements: None,
         units: study_haptics::model::Units::Linear,
     };
     assert_eq!(realization, Some(expected));

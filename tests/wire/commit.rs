@@ -183,6 +183,7 @@ fn spring() -> Realization {
         positive: branch(),
         negative: branch(),
         mechanism: None,
+        elements: None,
         units: study_haptics::model::Units::Linear,
     }
 }

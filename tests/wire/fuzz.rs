@@ -10,10 +10,12 @@ use crate::support::{begin, detents, mechanism, mechanism_requests};
 use std::num::NonZeroU16;
 use std::time::Duration;
 use study_device::firmware::{Firmware, Options};
+use study_wire::elements::Spring;
 use study_wire::frame::{Decoder, Frame, MAX_BODY};
 use study_wire::message::{
-    Commit, DeviceState, FixedVec, Heartbeat, Hello, MechanismBegin, MechanismChunk, PathBegin,
-    PathChunk, Play, Record, Reply, Request, Stop, TableBegin, TableChunk, UploadCrc, kind,
+    Commit, DeviceState, ElementsBegin, FixedVec, Heartbeat, Hello, MechanismBegin, MechanismChunk,
+    PathBegin, PathChunk, Play, Record, Reply, Request, Stop, TableBegin, TableChunk, UploadCrc,
+    kind,
 };
 use study_wire::predict::{Direction, Lookup};
 
@@ -93,7 +95,7 @@ impl Fuzz {
         let word = self.below(1 << 32) as u32;
         let small = self.below(40) as u16;
         let clock_ms = self.at.as_millis() as u32;
-        match self.below(23) {
+        match self.below(24) {
             0 => Request::Hello(Hello {
                 nonce: self.nonce + self.below(2) as u32,
                 minor: self.below(3) as u8,
@@ -160,6 +162,24 @@ impl Fuzz {
                 values: FixedVec::of(&[self.float(); 12]),
             }),
             21 => Request::MechanismCommit(Commit { crc: self.crc }),
+            22 => Request::ElementsBegin(ElementsBegin {
+                nodes: small,
+                mass_kg: self.float(),
+                range_mm: [self.float(), self.float()],
+                trained_mm_s: self.float(),
+                force_n: self.float(),
+                velocity_mm_s: self.float(),
+                uncertified_n: Some(self.float()),
+                springs: FixedVec::of(&[
+                    Spring::Stop {
+                        slip_mm: self.float(),
+                    },
+                    Spring::Latch {
+                        rearm_mm: self.float(),
+                        break_mm: self.float(),
+                    },
+                ]),
+            }),
             _ => Request::Record(Record {
                 playback: word,
                 crc: self.crc,

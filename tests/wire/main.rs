@@ -1,6 +1,7 @@
 //! The wire format, and the device that implements it.
 
 mod commit;
+mod elements;
 mod firmware;
 mod firmware_probe;
 mod firmware_states;

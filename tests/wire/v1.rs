@@ -13,14 +13,16 @@ mod requests;
 use self::replies::replies;
 use self::requests::requests;
 use std::num::NonZeroU16;
+use study_wire::elements::Spring;
 use study_wire::frame::{Decoder, crc32, is_stream};
 use study_wire::handler::{Bounds, Handler, Measured, Profile};
 use study_wire::mechanism::Scalars;
 use study_wire::message::{
-    Ack, Commit, Constants, DeviceState, Event, EventKind, Fault, Features, FixedVec, Flags,
-    Heartbeat, Hello, Identity, Loaded, MechanismBegin, MechanismChunk, Name, Node, Outcome,
-    PathBegin, PathChunk, Play, Pulse, Record, Recorded, RecordedPoint, Refusal, Reply, Request,
-    Stop, TableBegin, TableChunk, Telemetry, TelemetrySample, UploadCrc, WireError, fixed, kind,
+    Ack, Commit, Constants, DeviceState, ElementsBegin, Event, EventKind, Fault, Features,
+    FixedVec, Flags, Heartbeat, Hello, Identity, Loaded, MechanismBegin, MechanismChunk, Name,
+    Node, Outcome, PathBegin, PathChunk, Play, Pulse, Record, Recorded, RecordedPoint, Refusal,
+    Reply, Request, Stop, TableBegin, TableChunk, Telemetry, TelemetrySample, UploadCrc, WireError,
+    fixed, kind,
 };
 use study_wire::predict::{Direction, Lookup, Motion};
 use study_wire::servo::ServoSettings;
@@ -138,6 +140,30 @@ fn mechanism() -> MechanismBegin {
     }
 }
 
+/// Elements of three nodes with a spring of each kind.
+fn elements() -> ElementsBegin {
+    ElementsBegin {
+        nodes: 3,
+        mass_kg: 0.0625,
+        range_mm: [1.5, 33.5],
+        trained_mm_s: 138.0,
+        force_n: 12.0,
+        velocity_mm_s: 1000.0,
+        uncertified_n: None,
+        springs: FixedVec::of(&[
+            Spring::Stop { slip_mm: 0.25 },
+            Spring::Maxwell {
+                slip_mm: 8.0,
+                relaxation_s: 0.125,
+            },
+            Spring::Latch {
+                rearm_mm: 10.0,
+                break_mm: 14.0,
+            },
+        ]),
+    }
+}
+
 /// The same device to a host of minor version 1.
 fn identity_1() -> Identity {
     Identity {
@@ -146,6 +172,7 @@ fn identity_1() -> Identity {
             features: Features {
                 acceleration_from_speed: true,
                 mechanism: false,
+                elements: false,
             },
             commit_ms: 135,
             acceleration_hz: 20.0,
@@ -265,7 +292,7 @@ fn every_request_has_the_specified_bytes() {
     }
     kinds.dedup();
     let all = [
-        1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 0x10, 0x11, 0x12, 0x13, 0x20, 0x21, 0x22,
+        1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 0x10, 0x11, 0x12, 0x13, 0x20, 0x21, 0x22, 0x30,
     ];
     assert_eq!(kinds, all, "a message is not in the list");
 }
@@ -298,6 +325,16 @@ fn the_crc_of_an_upload_is_that_of_its_consecutive_fields() {
         crc.value_n(value);
     }
     assert_eq!(crc.value(), MECHANISM_CRC);
+    let mut crc = UploadCrc::of_elements(&elements());
+    for (x_mm, values) in [
+        (1.5, [1.25, 0.001, 0.002, 0.5, 0.25, 0.0, 0.0, 0.0]),
+        (12.0, [-2.5, 0.0, 0.0, 0.5, 1.5, 2.0, 0.0, 0.0]),
+        (33.5, [4.0, 0.003, 0.0, 0.25, 0.0, 0.0, 0.0, 0.0]),
+    ] {
+        crc.node(&Node::of_elements(x_mm, values));
+    }
+    // by zlib over the same numbers in Python
+    assert_eq!(crc.value(), 0xf562bb78);
     let mut crc = UploadCrc::of_path(&PathBegin {
         points: 3,
         rate_hz: 1000.0,
@@ -378,7 +415,7 @@ fn invalid_replies_are_rejected() {
     let later = spoiled(
         Reply::Identity(identity_1()),
         158,
-        &[0xfd, 0xff, 0xff, 0xff],
+        &[0xf9, 0xff, 0xff, 0xff],
     );
     assert_eq!(later.unwrap().1, Reply::Identity(identity_1()));
     // energy

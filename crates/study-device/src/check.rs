@@ -5,6 +5,7 @@
 //! time, so the same test runs on a port and, in virtual time, on a simulated device.
 
 mod clauses;
+mod elements;
 pub(super) mod exchange;
 mod mechanism;
 mod playing;

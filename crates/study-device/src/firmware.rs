@@ -372,6 +372,7 @@ fn profile(options: &Options) -> Profile {
         },
         features: Features {
             mechanism: true,
+            elements: true,
             ..Features::default()
         },
         watchdog_ms: match options.flaw {

@@ -546,6 +546,7 @@ fn identity(device: &message::Identity) -> Option<Identity> {
         limits: Limits::new(device.force_n, device.velocity_mm_s).ok()?,
         servo: device.constants.map(|told| servo(device, &told)),
         mechanisms: device.constants.is_some_and(|told| told.features.mechanism),
+        elements: device.constants.is_some_and(|told| told.features.elements),
         stiffness_n_per_mm: Some(device.stiffness_n_per_mm),
         firmware: Some(display_name(&device.firmware)),
     })

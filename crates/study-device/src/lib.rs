@@ -46,6 +46,8 @@ pub struct Identity {
     pub servo: Option<ServoSettings>,
     /// Whether it plays mechanisms, and not only tables.
     pub mechanisms: bool,
+    /// Whether it plays elements.
+    pub elements: bool,
     /// Largest stiffness of a certified realization, N/mm, if it tells.
     pub stiffness_n_per_mm: Option<f64>,
     /// The version of its firmware, if it tells it.
@@ -88,9 +90,10 @@ pub struct Stimulus<'a> {
 
 /// A realization as a servo plays it.
 pub fn rendering_of(table: &Realization) -> servo::Rendering<'_> {
-    let law = match &table.mechanism {
-        Some(mechanism) => Law::Mechanism(mechanism.view()),
-        None => Law::Table {
+    let law = match (&table.mechanism, &table.elements) {
+        (Some(mechanism), _) => Law::Mechanism(mechanism.view()),
+        (None, Some(elements)) => Law::Elements(elements.view()),
+        (None, None) => Law::Table {
             table: table.table(),
             rule: table.direction,
         },

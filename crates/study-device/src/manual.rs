@@ -86,6 +86,7 @@ impl Device for Manual {
             limits: Limits::new(1e3, 1e5).expect("positive constants"),
             servo: None,
             mechanisms: false,
+            elements: false,
             stiffness_n_per_mm: None,
             firmware: None,
         }

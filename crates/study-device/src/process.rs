@@ -329,6 +329,7 @@ fn identity(hello: Hello) -> Identity {
         limits: hello.limits,
         servo: None,
         mechanisms: hello.mechanisms,
+        elements: false,
         stiffness_n_per_mm: None,
         firmware: None,
     }
@@ -350,6 +351,9 @@ impl Device for ProcessDevice {
         }
         if what.table.is_some_and(|table| table.mechanism.is_some()) && !self.identity.mechanisms {
             return Err(DeviceError::Refused(TableError::Mechanism.to_string()));
+        }
+        if what.table.is_some_and(|table| table.elements.is_some()) {
+            return Err(DeviceError::Refused(TableError::Elements.to_string()));
         }
         self.load += 1;
         self.samples = 0;

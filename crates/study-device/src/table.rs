@@ -13,6 +13,10 @@ pub enum TableError {
         "it is a mechanism, and this device plays tables only (docs/wire.md 8.7, minor version 2)"
     )]
     Mechanism,
+    #[error(
+        "it is made of elements, which this device does not play (docs/wire.md 8.10, minor version 2)"
+    )]
+    Elements,
     #[error("its mechanism has {0} values; at most 65535 can be sent")]
     TooManyValues(usize),
     #[error("it has fewer than two nodes")]

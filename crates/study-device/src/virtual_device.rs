@@ -230,6 +230,7 @@ impl Device for VirtualDevice {
             limits: firmware::Options::default().limits,
             servo: None,
             mechanisms: true,
+            elements: true,
             stiffness_n_per_mm: None,
             firmware: None,
         })

@@ -13,8 +13,9 @@
 //! at nodes, and such a blend is refused. Outside its nodes a table keeps the parameters of
 //! its edge.
 
-use crate::model::{Branch, Provenance, Realization, Trained};
+use crate::model::{Branch, Elements, Provenance, Realization, Trained};
 use std::collections::BTreeMap;
+use study_wire::elements::Spring;
 use study_wire::predict::{Lookup, locate};
 
 /// A family: a table, and what a level changes in it.
@@ -52,6 +53,9 @@ pub enum FamilyError {
     /// A model of a mechanism has no table that could be varied.
     #[error("a family varies a table, not a mechanism")]
     Mechanism,
+    /// Elements of a blend, or without a stop to which friction could be added.
+    #[error("elements are no end of a blend, and need a stop to which friction is added")]
+    Elements,
     /// Nodes that differ where parameters jump at nodes.
     #[error("with the look-up `{0}` the tables of a blend need the same nodes")]
     Nodes(&'static str),
@@ -77,9 +81,22 @@ impl Family {
         if from.mechanism.is_some() {
             return Err(FamilyError::Mechanism);
         }
+        if let Some(elements) = &from.elements {
+            let possible = match vary {
+                Vary::Blend(_) => false,
+                Vary::Friction => stop_of(elements).is_some(),
+                Vary::Damping | Vary::Mass | Vary::Elastic => true,
+            };
+            if !possible {
+                return Err(FamilyError::Elements);
+            }
+        }
         if let Vary::Blend(to) = &vary {
             if to.mechanism.is_some() {
                 return Err(FamilyError::Mechanism);
+            }
+            if to.elements.is_some() {
+                return Err(FamilyError::Elements);
             }
             if to.lookup != from.lookup {
                 return Err(FamilyError::Lookup);
@@ -105,6 +122,14 @@ impl Family {
             },
             ..self.from.clone()
         };
+        if let Some(elements) = &from.elements {
+            let varied = elements_at(elements, &self.vary, level);
+            let units = from.units;
+            return Realization {
+                units,
+                ..Realization::of_elements(from.id, from.provenance, from.vaf, from.trained, varied)
+            };
+        }
         let (positive, negative) = (&from.positive, &from.negative);
         match &self.vary {
             Vary::Blend(to) => blend(&from, to, level),
@@ -190,6 +215,30 @@ impl Family {
         };
         Passing::Between(end(low), end(high))
     }
+}
+
+/// The first stop of elements.
+fn stop_of(elements: &Elements) -> Option<usize> {
+    (elements.springs.iter()).position(|spring| matches!(spring, Spring::Stop { .. }))
+}
+
+/// Elements of a level: all profiles are affine in it, and so are their margins.
+fn elements_at(elements: &Elements, vary: &Vary, level: f64) -> Elements {
+    let mut varied = elements.clone();
+    let scale = |values: &mut Vec<f64>| values.iter_mut().for_each(|value| *value *= level);
+    match vary {
+        Vary::Blend(_) => {}
+        Vary::Damping => varied.damping_n_s_per_mm.iter_mut().for_each(scale),
+        Vary::Mass => varied.mass_kg *= level,
+        Vary::Elastic => scale(&mut varied.force_n),
+        Vary::Friction => {
+            let stop = stop_of(elements).and_then(|stop| varied.spring_n.get_mut(stop));
+            for value in stop.into_iter().flatten() {
+                *value += level;
+            }
+        }
+    }
+    varied
 }
 
 /// Mean ± half the difference of two directions, with the mean times `s`.
@@ -281,6 +330,7 @@ mod tests {
             },
             x_mm: nodes.to_vec(),
             mechanism: None,
+            elements: None,
             units: crate::model::Units::Linear,
             positive: branch(2.0),
             negative: branch(-2.0),
@@ -418,5 +468,56 @@ mod tests {
         let other = Vary::Blend(Box::new(floor(&[0.0, 2.0, 4.0])));
         let refused = Family::new(floor(&NODES), other);
         assert_eq!(refused, Err(FamilyError::Nodes("floor")));
+    }
+
+    /// Elements are varied by their profiles, and what a hand feels in slow motion with them.
+    #[test]
+    fn elements_are_varied_by_their_profiles() {
+        let elements = Elements {
+            mass_kg: 0.1,
+            x_mm: NODES.to_vec(),
+            force_n: vec![1.0, -2.0, 0.5, 3.0],
+            damping_n_s_per_mm: [vec![0.01; 4], vec![0.02; 4]],
+            springs: vec![Spring::Stop { slip_mm: 0.2 }],
+            spring_n: vec![vec![0.5, 0.0, 1.0, 0.5]],
+        };
+        let table = table(&[0.1; 16], &NODES);
+        let trained = table.trained;
+        let of = |elements: &Elements| {
+            let (provenance, vaf) = (Provenance::default(), BTreeMap::new());
+            let own = elements.clone();
+            Realization::of_elements("e".to_owned(), provenance, vaf, trained, own)
+        };
+        let from = of(&elements);
+        let at = |vary: Vary, level: f64| Family::new(from.clone(), vary).unwrap().at(level);
+        let damped = at(Vary::Damping, 3.0);
+        assert_eq!(damped.negative.b_n_s_per_mm, [0.06; 4]);
+        assert_eq!(at(Vary::Mass, 2.0).elements.unwrap().mass_kg, 0.2);
+        // C ± D: the mean is scaled, the hysteresis stays
+        let elastic = at(Vary::Elastic, 2.0);
+        assert_eq!(elastic.positive.f0_n, [2.5, -4.0, 2.0, 6.5]);
+        assert_eq!(elastic.negative.f0_n, [1.5, -4.0, 0.0, 5.5]);
+        let rough = at(Vary::Friction, 0.25);
+        assert_eq!(
+            rough.elements.unwrap().spring_n[0],
+            [0.75, 0.25, 1.25, 0.75]
+        );
+        // less friction than there is
+        let family = Family::new(from.clone(), Vary::Friction).unwrap();
+        assert_eq!(family.passing(0.0, 1.0), Passing::All);
+        assert!(matches!(family.passing(-1.0, 1.0), Passing::Between(low, _) if low.abs() < 1e-5));
+        let blend = Vary::Blend(Box::new(table.clone()));
+        assert_eq!(Family::new(from.clone(), blend), Err(FamilyError::Elements));
+        let blend = Vary::Blend(Box::new(from));
+        assert_eq!(Family::new(table, blend), Err(FamilyError::Elements));
+        let free = of(&Elements {
+            springs: Vec::new(),
+            spring_n: Vec::new(),
+            ..elements
+        });
+        assert_eq!(
+            Family::new(free, Vary::Friction),
+            Err(FamilyError::Elements)
+        );
     }
 }

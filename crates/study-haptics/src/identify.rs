@@ -58,6 +58,8 @@ method::estimators! {
     ewls: Ewls(Ewls),
     /// All nodes at once, by penalized least squares, with a direction state.
     hat: Hat(Hat),
+    /// A potential with dampers and springs that slip, relax or break.
+    elements: Elements(Elements),
     /// A virtual mechanism, by the simulation error of the force.
     mechanism: Mechanism(mechanism::Options),
     /// Least squares around each node, with weights that decrease to both sides.
@@ -68,6 +70,7 @@ method::estimators! {
     spring: Spring(Spring),
 }
 
+pub use elements::Elements;
 pub use ewls::{Estimates, Ewls};
 pub use friction::Friction;
 pub use hat::Hat;
@@ -314,6 +317,7 @@ impl<'r> Training<'r> {
                 positive: branch(&positive.theta),
                 negative: branch(&negative.theta),
                 mechanism: None,
+                elements: None,
                 units: crate::model::Units::Linear,
             },
             warnings,

@@ -8,9 +8,11 @@
 //! with the firmware.
 
 pub mod coverage;
+mod elements;
 pub mod file;
 mod units;
 
+pub use elements::Elements;
 pub use units::Units;
 
 use coverage::{Coverage, Determined};
@@ -23,7 +25,7 @@ use study_wire::predict::{BranchView, Direction, Lookup, TableView};
 pub const FORMAT: &str = "study-model/1";
 /// The `format` of a model file with a mechanism or of a turning handle.
 pub const FORMAT_2: &str = "study-model/2";
-/// The `format` of a model file that says what its recordings carry.
+/// The `format` of a model file with elements, or one that says what its recordings carry.
 pub const FORMAT_3: &str = "study-model/3";
 
 /// A haptic model's parameters and their origin: the contents of a model file.
@@ -53,6 +55,9 @@ pub struct Realization {
     /// The mechanism that is rendered instead of the table. The table then has its mass,
     /// damping and static force: what it is at rest and in slow motion.
     pub mechanism: Option<Mechanism>,
+    /// The elements that are rendered instead of the table, which is then what they are in
+    /// slow motion.
+    pub elements: Option<Elements>,
 }
 
 /// The parameters of one direction, one value per node.
@@ -191,6 +196,7 @@ impl Realization {
             positive,
             negative,
             mechanism: Some(mechanism),
+            elements: None,
         }
     }
 
@@ -208,6 +214,9 @@ impl Realization {
             mechanism.detent.first_mm += by_mm;
             mechanism.friction.first_mm += by_mm;
         }
+        if let Some(elements) = &mut self.elements {
+            elements.shift(by_mm);
+        }
         if let Some(coverage) = &mut self.provenance.coverage {
             coverage.shift(by_mm);
         }
@@ -221,6 +230,9 @@ impl Realization {
         }
         if let Some(mechanism) = &mut self.mechanism {
             mechanism.scalars.offset_n += by_n;
+        }
+        if let Some(elements) = &mut self.elements {
+            elements.force_n.iter_mut().for_each(|n| *n += by_n);
         }
     }
 
@@ -240,6 +252,7 @@ impl Realization {
         let mut certificate = self.certificate_of_device();
         if let (Direction::Play { delta_mm }, Lookup::Linear) = (self.direction, self.lookup)
             && self.mechanism.is_none()
+            && self.elements.is_none()
             && !certificate.hysteresis.holds()
         {
             let mean = windows::least_mean_gap(&self.table(), delta_mm, self.trained.x_mm);
@@ -255,6 +268,9 @@ impl Realization {
     pub fn certificate_of_device(&self) -> Certificate {
         if let Some(mechanism) = &self.mechanism {
             return mechanism.view().certificate(self.trained.v_mm_s);
+        }
+        if let Some(elements) = &self.elements {
+            return elements.view().certificate(self.trained.v_mm_s);
         }
         let range = certificate::Range {
             x_mm: self.trained.x_mm,

@@ -16,12 +16,15 @@
 //! All thresholds are in proportion to the forces of the realization, with floors that are
 //! those of the device. The search is deterministic.
 
+mod danger;
+
 use crate::model::Realization;
+pub use danger::Danger;
 use std::f64::consts::TAU;
-use std::fmt;
 use study_wire::certificate::reversal::{Renderer, Reversal};
 use study_wire::certificate::{Certificate, spring_damping_n_s_per_m};
-use study_wire::mechanism::{FASTER_THAN_TRAINED, MechanismView};
+use study_wire::elements::Spring;
+use study_wire::mechanism::FASTER_THAN_TRAINED;
 use study_wire::predict::{Direction, Motion};
 use study_wire::servo::{Law, Rendering, Servo, ServoSettings};
 
@@ -36,6 +39,8 @@ const SLOWEST_S: f64 = 4.0;
 const HAND_MM_S: f64 = 200.0;
 /// Rest after a fast stroke, s.
 const REST_S: f64 = 0.25;
+/// The same in times in which a force relaxes.
+const RELAXATIONS: f64 = 5.0;
 /// A force at rest above that of slow motion by this share of it is none of the realization.
 const EXCESS: f64 = 0.25;
 /// A force on the way back that differs by this share of the range of forces is another one.
@@ -75,109 +80,6 @@ impl Default for Device {
             encoder_mm: 0.005,
             stiffness_n_per_mm: 100.0,
             friction_n: 0.0,
-        }
-    }
-}
-
-/// What the search found; each is the worst of its kind.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Danger {
-    /// A force at rest that slow motion never has.
-    Force {
-        /// That force, N.
-        found_n: f64,
-        /// The largest force in slow motion, N.
-        slow_n: f64,
-        /// Where, mm.
-        at_mm: f64,
-        /// Speed of the stroke that led there, mm/s.
-        by_mm_s: f64,
-    },
-    /// A force on the way back that differs from that after a slow stroke.
-    Latched {
-        /// Largest difference, N.
-        apart_n: f64,
-        /// Over how much of the way back, mm.
-        stays_mm: f64,
-        /// Where the stroke ended, mm.
-        to_mm: f64,
-        /// Speed of the stroke before it, mm/s.
-        by_mm_s: f64,
-    },
-    /// Reversals that draw energy at speeds that the device does not prevent.
-    Reversal {
-        /// Energy of a reversal, J, at most.
-        most_j: f64,
-        /// Speed up to which they draw energy, mm/s.
-        up_to_mm_s: f64,
-        /// The speed at which the device trips, mm/s.
-        trips_mm_s: f64,
-    },
-    /// Chatter that draws energy.
-    Chatter {
-        /// Power beyond what the damping of the device takes, W.
-        power_w: f64,
-        /// Where, mm.
-        at_mm: f64,
-        /// Reversals per second.
-        reversals_hz: f64,
-    },
-    /// Strokes back and forth that draw energy.
-    Cycle {
-        /// Energy of one cycle beyond what the damping of the device takes, J.
-        energy_j: f64,
-        /// Cycles per second.
-        cycles_hz: f64,
-    },
-}
-
-impl fmt::Display for Danger {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Force {
-                found_n,
-                slow_n,
-                at_mm,
-                by_mm_s,
-            } => write!(
-                f,
-                "{found_n:.2} N at rest at {at_mm:.2} mm after a stroke of {by_mm_s:.0} mm/s; slow motion has {slow_n:.2} N at most"
-            ),
-            Self::Latched {
-                apart_n,
-                stays_mm,
-                to_mm,
-                by_mm_s,
-            } => write!(
-                f,
-                "after a stroke of {by_mm_s:.0} mm/s to {to_mm:.2} mm the force stays {apart_n:.2} N off over {stays_mm:.1} mm of the way back"
-            ),
-            Self::Reversal {
-                most_j,
-                up_to_mm_s,
-                trips_mm_s,
-            } => write!(
-                f,
-                "friction by the sign of the velocity gives up to {:.3} mJ at each reversal, at speeds up to {up_to_mm_s:.0} mm/s; the device trips at {trips_mm_s:.0} mm/s",
-                1e3 * most_j
-            ),
-            Self::Chatter {
-                power_w,
-                at_mm,
-                reversals_hz,
-            } => write!(
-                f,
-                "{reversals_hz:.0} reversals a second at {at_mm:.2} mm draw {:.2} mW",
-                1e3 * power_w
-            ),
-            Self::Cycle {
-                energy_j,
-                cycles_hz,
-            } => write!(
-                f,
-                "strokes back and forth at {cycles_hz:.1} Hz draw {:.1} mJ each time",
-                1e3 * energy_j
-            ),
         }
     }
 }
@@ -270,7 +172,7 @@ pub fn search(realization: &Realization, device: &Device) -> Vec<Danger> {
 
 /// The dangers for which a realization is refused: friction by the sign of the speed that the
 /// damping of the device does not confine, and a mechanism whose state a stroke takes where no
-/// data were. A table has no such state. Takes a tenth of the whole search.
+/// data were. A table has no such state, and that of elements is at most 1. Takes a tenth of the whole search.
 pub fn refusal(realization: &Realization, device: &Device) -> Option<Danger> {
     let trips_mm_s = device.servo.velocity_mm_s;
     if let Some(found) = reversal(realization, device).filter(|r| r.up_to_mm_s > trips_mm_s) {
@@ -315,8 +217,7 @@ fn with(
     device: &Device,
     look: impl FnOnce(&mut Search<'_>, &Slow),
 ) -> Vec<Danger> {
-    let view = realization.mechanism.as_ref().map(|own| own.view());
-    let what = rendering(realization, view);
+    let what = rendering(realization);
     let damping = own_damping(&realization.certificate(), device);
     let mut search = Search {
         what: &what,
@@ -329,12 +230,13 @@ fn with(
     search.found
 }
 
-/// A realization as a servo plays it; `view` is that of its mechanism.
-fn rendering<'a>(realization: &'a Realization, view: Option<MechanismView<'a>>) -> Rendering<'a> {
+/// A realization as a servo plays it.
+fn rendering(realization: &Realization) -> Rendering<'_> {
     Rendering {
-        law: match view {
-            Some(view) => Law::Mechanism(view),
-            None => Law::Table {
+        law: match (&realization.mechanism, &realization.elements) {
+            (Some(own), _) => Law::Mechanism(own.view()),
+            (None, Some(own)) => Law::Elements(own.view()),
+            (None, None) => Law::Table {
                 table: realization.table(),
                 rule: realization.direction,
             },
@@ -438,7 +340,26 @@ impl<'a> Search<'a> {
                 let deflected_mm = 2.0 * slow.most_n / own.contact_n_per_mm;
                 own.gap_mm + 3.0 * own.slip_mm.max(own.handle_slip_mm) + deflected_mm
             }
+            Law::Elements(view) => {
+                let memories = view.springs.iter().map(|spring| match *spring {
+                    Spring::Stop { slip_mm } | Spring::Maxwell { slip_mm, .. } => 2.0 * slip_mm,
+                    Spring::Latch { rearm_mm, break_mm } => break_mm - rearm_mm,
+                });
+                memories.fold(0.0, f64::max)
+            }
         }
+    }
+
+    /// The longest time in which a force at rest relaxes, s.
+    fn relaxation_s(&self) -> f64 {
+        let Law::Elements(view) = &self.what.law else {
+            return 0.0;
+        };
+        let times = view.springs.iter().map(|spring| match *spring {
+            Spring::Maxwell { relaxation_s, .. } => relaxation_s,
+            Spring::Stop { .. } | Spring::Latch { .. } => 0.0,
+        });
+        times.fold(0.0, f64::max)
     }
 
     /// Fast strokes that end at an edge or at a place within, a rest, and slowly back.
@@ -446,6 +367,7 @@ impl<'a> Search<'a> {
         let [low, high] = self.what.range_mm;
         let at = |share: f64| low + share * (high - low);
         let top = self.fast_mm_s();
+        let rest_s = REST_S.max(RELAXATIONS * self.relaxation_s());
         let (mut force, mut latched) = (None, None);
         for (from, to) in [(0.6, 0.0), (0.4, 1.0), (1.0, 0.35), (0.0, 0.65)] {
             let begun = self.play(at(from));
@@ -453,7 +375,7 @@ impl<'a> Search<'a> {
                 let (by_mm_s, to_mm) = (share * top, at(to));
                 let mut play = begun.clone();
                 play.stroke(to_mm, by_mm_s, |_, _| ());
-                play.rest(REST_S);
+                play.rest(rest_s);
                 let found_n = play.force_n;
                 // where the stop of a key begins, slow motion has more than elsewhere
                 let slow_n = slow.most_n.max(slow.near_n(self.bin(to_mm)));

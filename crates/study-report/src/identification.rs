@@ -11,6 +11,7 @@
 mod comparison;
 mod coverage;
 mod displacement;
+mod elements;
 mod first;
 mod json;
 mod loops;

@@ -302,9 +302,12 @@ impl<const NODES: usize, const POINTS: usize, R: Real> Handler<NODES, POINTS, R>
     fn play(&mut self, measured: Measured<R>, now_ms: u32, out: Out<'_>) -> Drive<R> {
         let what = if let Some(begin) = &self.table.begin {
             Rendering {
-                law: Law::Table {
-                    table: self.table.view(),
-                    rule: begin.direction,
+                law: match self.table.elements() {
+                    Some(elements) => Law::Elements(elements),
+                    None => Law::Table {
+                        table: self.table.view(),
+                        rule: begin.direction,
+                    },
                 },
                 range_mm: begin.range_mm,
                 trained_mm_s: begin.trained_mm_s,
@@ -444,6 +447,7 @@ mod tests {
         features: Features {
             acceleration_from_speed: true,
             mechanism: true,
+            elements: true,
         },
         watchdog_ms: 30,
         longest_ms: 600_000,

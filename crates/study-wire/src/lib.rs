@@ -31,6 +31,7 @@
 //! - [`predict`]: the force of a table at a given motion. Start here; `examples/servo.rs`
 //!   plays a small table.
 //! - [`mechanism`]: a virtual mechanism in place of a table.
+//! - [`elements`]: a potential with springs that slip, relax or break, in place of a table.
 //! - [`certificate`]: whether a table is passive.
 //! - [`estimate`]: speed and acceleration from an encoder, and rotary devices.
 //! - [`servo`]: one servo period, with trips, slew limit, ramp and clamp.
@@ -47,6 +48,7 @@
 #![cfg_attr(not(test), no_std)]
 
 pub mod certificate;
+pub mod elements;
 pub mod estimate;
 pub mod frame;
 pub mod handler;
@@ -55,3 +57,4 @@ pub mod message;
 pub mod predict;
 pub mod real;
 pub mod servo;
+mod sum;

@@ -20,7 +20,6 @@
 
 mod profile;
 mod state;
-mod sum;
 
 use crate::certificate::{Certificate, Margin};
 use crate::real::Real;

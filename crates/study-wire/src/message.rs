@@ -10,6 +10,7 @@
 
 mod bytes;
 pub mod code;
+pub mod elements;
 pub mod fixed;
 pub mod mechanism;
 mod probe;
@@ -23,6 +24,7 @@ use core::fmt;
 use core::num::NonZeroU16;
 
 pub use code::{DeviceState, EventKind, Fault, Loaded, Refusal};
+pub use elements::ElementsBegin;
 pub use mechanism::{MechanismBegin, MechanismChunk};
 pub use probe::{PathBegin, PathChunk};
 pub use reply::{Ack, Constants, Features, Flags, Identity, Name, Outcome, Pulse};
@@ -36,6 +38,8 @@ pub const VERSION: u8 = 1;
 pub const MINOR: u8 = 2;
 /// The minor version that added mechanisms.
 pub const MECHANISM_MINOR: u8 = 2;
+/// The minor version that added elements, for devices with that feature.
+pub const ELEMENTS_MINOR: u8 = 2;
 
 /// Why a body is no message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -352,6 +356,9 @@ messages! {
         MechanismChunk(fields: MechanismChunk) = MECHANISM_CHUNK 0x21;
         /// Ends the upload of a mechanism.
         MechanismCommit(fields: Commit) = MECHANISM_COMMIT 0x22;
+        /// Begins the upload of elements; from minor version 2 on. Nodes and COMMIT are those
+        /// of a table.
+        ElementsBegin(fields: ElementsBegin) = ELEMENTS_BEGIN 0x30;
     }
     /// A message from the device to the host.
     Reply {
@@ -379,6 +386,7 @@ impl Request {
             Self::MechanismBegin(_) | Self::MechanismChunk(_) | Self::MechanismCommit(_) => {
                 MECHANISM_MINOR
             }
+            Self::ElementsBegin(_) => ELEMENTS_MINOR,
             _ => 0,
         }
     }

@@ -278,7 +278,7 @@ pub fn mass_and_force<R: Real>(table: &TableView<'_, R>, z: R, x_mm: R, v_mm_s: 
 
 /// A parameter at `weight` of the way from node `left` to the next.
 #[inline]
-fn between<R: Real>(parameter: &[R], left: usize, weight: R) -> R {
+pub(crate) fn between<R: Real>(parameter: &[R], left: usize, weight: R) -> R {
     if weight == R::ZERO {
         parameter[left]
     } else {

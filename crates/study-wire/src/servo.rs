@@ -11,7 +11,7 @@
 //!    energy that the hand has put in; E < 0 means that the device was active.
 //! 3. Low-pass the acceleration with two poles; a sampled mass is unstable without
 //!    this filter.
-//! 4. Evaluate the table with the realization's direction rule, or step the mechanism. A
+//! 4. Evaluate the table with the realization's direction rule, or step the mechanism or the elements. A
 //!    table's speed is limited to the trained range, and the mass to at least
 //!    [`ServoSettings::least_mass_kg`].
 //! 5. Beyond the identified range, use the force at its edge and add a spring wall.
@@ -26,6 +26,7 @@
 mod low_pass;
 pub mod tally;
 
+use crate::elements::{self, ElementsView};
 use crate::mechanism::{self, MechanismView};
 use crate::predict::{self, Direction, DirectionState, Motion, TableView, clamp};
 use crate::real::Real;
@@ -102,6 +103,8 @@ pub enum Law<'a, R = f64> {
     },
     /// A mechanism with a state of its own.
     Mechanism(MechanismView<'a, R>),
+    /// A potential with dampers and springs.
+    Elements(ElementsView<'a, R>),
 }
 
 /// What is played, and the range in which it was identified.
@@ -151,6 +154,8 @@ pub struct Servo<R = f64> {
     direction: DirectionState<R>,
     /// State of a mechanism, from the first period on.
     mechanism: Option<mechanism::State<R>>,
+    /// State of elements, likewise.
+    elements: Option<elements::State<R>>,
     forwards: bool,
     /// Slew-limited force before the ramp, N.
     slewed_n: R,
@@ -239,6 +244,7 @@ impl<R: Real> Servo<R> {
             state: ServoState::Limp,
             direction: DirectionState::new(),
             mechanism: None,
+            elements: None,
             forwards: true,
             slewed_n: R::ZERO,
             held_n: R::ZERO,
@@ -345,6 +351,16 @@ impl<R: Real> Servo<R> {
         let constants = self.constants;
         let a_m_s2 = self.acceleration_filter.step(motion.a_m_s2);
         let x_mm = motion.x_mm.max(low).min(high);
+        // What has a state of its own has a handle that stops at the edge.
+        let handle = Motion {
+            x_mm,
+            v_mm_s: if x_mm == motion.x_mm {
+                motion.v_mm_s
+            } else {
+                R::ZERO
+            },
+            a_m_s2: R::ZERO,
+        };
         let (z, mut mass_kg, without_mass_n) = match &what.law {
             Law::Table { table, rule } => {
                 let z = self.direction.step(*rule, motion);
@@ -353,17 +369,16 @@ impl<R: Real> Servo<R> {
                 (z, mass_kg, force_n)
             }
             Law::Mechanism(mechanism) => {
-                // Its handle stops at the edge.
-                let inside = x_mm == motion.x_mm;
-                let handle = Motion {
-                    x_mm,
-                    v_mm_s: if inside { motion.v_mm_s } else { R::ZERO },
-                    a_m_s2: R::ZERO,
-                };
                 let at_rest = || mechanism::State::at_rest(x_mm);
                 let state = self.mechanism.get_or_insert_with(at_rest);
                 let force_n = state.step(mechanism, handle, constants.period_s);
                 (state.z_handle, mechanism.scalars.handle_kg, force_n)
+            }
+            Law::Elements(view) => {
+                let at_rest = || elements::State::at_rest(view, x_mm);
+                let state = self.elements.get_or_insert_with(at_rest);
+                let force_n = state.step(view, handle, constants.period_s);
+                (state.direction(view), view.mass_kg, force_n)
             }
         };
         if (z >= R::ZERO) != self.forwards {

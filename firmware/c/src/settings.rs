@@ -97,6 +97,7 @@ pub(crate) unsafe fn profile(settings: &StudySettings) -> Option<Profile> {
         features: Features {
             acceleration_from_speed: s.acceleration_from_speed != 0,
             mechanism: true,
+            elements: true,
         },
         watchdog_ms,
         longest_ms: LONGEST_MS,

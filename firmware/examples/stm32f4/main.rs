@@ -45,6 +45,7 @@ mod firmware {
         features: Features {
             acceleration_from_speed: true,
             mechanism: true,
+            elements: true,
         },
         watchdog_ms: 30,
         longest_ms: 600_000,

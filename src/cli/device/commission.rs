@@ -277,6 +277,7 @@ fn constant([low, high]: [f64; 2], force_n: f64) -> Realization {
         positive: branch(),
         negative: branch(),
         mechanism: None,
+        elements: None,
     }
 }
 

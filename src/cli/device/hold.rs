@@ -153,6 +153,7 @@ fn constant_force() -> Realization {
         positive: branch.clone(),
         negative: branch,
         mechanism: None,
+        elements: None,
         units: study_haptics::model::Units::Linear,
     }
 }

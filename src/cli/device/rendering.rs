@@ -188,6 +188,7 @@ fn table(
         positive,
         negative,
         mechanism: None,
+        elements: None,
     }
 }
 

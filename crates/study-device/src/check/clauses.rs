@@ -1,6 +1,7 @@
 //! The clauses that can be tested from outside, in the order of the tests: messages
 //! first, then uploads, then playbacks.
 
+use super::elements;
 use super::exchange::{Exchange, unexpected};
 use super::mechanism;
 use super::playing;
@@ -41,6 +42,7 @@ clauses! {
     "8.3" "invalid tables and limits above the device's are refused" bad_tables;
     "8.4" "an uncertified table is refused, or with permission its force is capped" uncertified;
     "8.7" "mechanisms are judged and played, or unknown" mechanism::plays;
+    "8.10" "elements are judged and played, or unknown" elements::plays;
     "11.2" "the largest table is uploaded and validated in time" largest;
     "12" "PLAY with another table or an invalid duration is refused" wrong_play;
     "9.1" "telemetry is complete and has the requested rate" playing::telemetry;

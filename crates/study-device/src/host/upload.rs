@@ -2,10 +2,11 @@
 
 use crate::table::{self, TableError};
 use study_base::limits::Limits;
-use study_haptics::model::{Branch, Mechanism, Profile, Realization};
+use study_haptics::model::{Branch, Elements, Mechanism, Profile, Realization};
+use study_wire::elements::MAX_SPRINGS;
 use study_wire::message::{
-    Commit, FixedVec, Identity, MechanismBegin, MechanismChunk, Node, Request, TableBegin,
-    TableChunk, UploadCrc,
+    Commit, ElementsBegin, FixedVec, Identity, MechanismBegin, MechanismChunk, Node, Request,
+    TableBegin, TableChunk, UploadCrc,
 };
 
 /// The requests of an upload in order, and the CRC of the table.
@@ -17,7 +18,20 @@ pub(crate) struct Upload {
 
 /// The requests that upload these nodes.
 pub(crate) fn requests(begin: TableBegin, nodes: &[Node]) -> Upload {
-    let mut crc = UploadCrc::of_table(&begin);
+    with_nodes(
+        Request::TableBegin(begin),
+        UploadCrc::of_table(&begin),
+        nodes,
+    )
+}
+
+/// The requests that upload elements with these nodes.
+pub(crate) fn elements_requests(begin: ElementsBegin, nodes: &[Node]) -> Upload {
+    let crc = UploadCrc::of_elements(&begin);
+    with_nodes(Request::ElementsBegin(begin), crc, nodes)
+}
+
+fn with_nodes(begin: Request, mut crc: UploadCrc, nodes: &[Node]) -> Upload {
     nodes.iter().for_each(|node| crc.node(node));
     let crc = crc.value();
     let chunks = nodes.chunks(TableChunk::MAX_NODES).enumerate();
@@ -28,7 +42,7 @@ pub(crate) fn requests(begin: TableBegin, nodes: &[Node]) -> Upload {
             nodes: FixedVec::of(nodes),
         })
     });
-    let mut requests = vec![Request::TableBegin(begin)];
+    let mut requests = vec![begin];
     requests.extend(chunks);
     requests.push(Request::TableCommit(Commit { crc }));
     Upload { requests, crc }
@@ -88,6 +102,24 @@ pub(super) fn of(
         }
         return of_mechanism(table, mechanism, limits, uncertified_n);
     }
+    if let Some(elements) = &table.elements {
+        let features = device.constants.map(|told| told.features);
+        if !features.is_some_and(|features| features.elements) {
+            return Err(TableError::Elements);
+        }
+        let begin = ElementsBegin {
+            nodes,
+            mass_kg: elements.mass_kg,
+            range_mm: table.trained.x_mm,
+            trained_mm_s: table.trained.v_mm_s,
+            force_n: limits.force_n.get(),
+            velocity_mm_s: limits.velocity_mm_s.get(),
+            uncertified_n,
+            springs: FixedVec::of(&elements.springs),
+        };
+        let nodes: Vec<Node> = (0..count).map(|i| element_node(elements, i)).collect();
+        return Ok(elements_requests(begin, &nodes));
+    }
     let begin = TableBegin {
         nodes,
         lookup: table.lookup,
@@ -133,6 +165,17 @@ fn of_mechanism(
     Ok(mechanism_requests(begin, &values_n))
 }
 
+fn element_node(elements: &Elements, node: usize) -> Node {
+    let [forwards, backwards] = &elements.damping_n_s_per_mm;
+    let mut values = [0.0; 3 + MAX_SPRINGS];
+    let profiles = [&elements.force_n, forwards, backwards];
+    for (value, profile) in (values.iter_mut()).zip(profiles.into_iter().chain(&elements.spring_n))
+    {
+        *value = profile[node];
+    }
+    Node::of_elements(elements.x_mm[node], values)
+}
+
 fn parameters(branch: &Branch, node: usize) -> [f64; 4] {
     [
         &branch.m_kg,
@@ -148,6 +191,7 @@ pub(super) fn describe(request: &Request) -> &'static str {
     match request {
         Request::Hello(_) => "the connection",
         Request::TableBegin(_) | Request::TableChunk(_) | Request::TableCommit(_) => "the table",
+        Request::ElementsBegin(_) => "the elements",
         Request::MechanismBegin(_) | Request::MechanismChunk(_) | Request::MechanismCommit(_) => {
             "the mechanism"
         }

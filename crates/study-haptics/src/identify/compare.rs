@@ -145,7 +145,9 @@ pub fn run(
                         left_out: trials.left_out(&cell, method, dx_mm),
                         cell,
                     }),
-                    Err(error) if method.simulates() => not_tried.push((name, error.to_string())),
+                    Err(error) if !candidates.is_empty() => {
+                        not_tried.push((name, error.to_string()))
+                    }
                     Err(error) => return Err(error),
                 }
             }

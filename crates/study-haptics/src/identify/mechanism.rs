@@ -22,7 +22,7 @@ use super::method::Progress;
 use super::samples::weight_of;
 use super::signal::{LowPass, SignalError, sampling_interval_s};
 use super::{Estimate, IdentifyError, Training, Warning};
-use crate::model::Mechanism;
+use crate::model::{Elements, Mechanism};
 use crate::recording::Recording;
 pub use decision::Decision;
 use decision::Part;
@@ -32,6 +32,7 @@ use objective::Compared;
 pub use objective::Filter;
 use rayon::prelude::*;
 use sensitivity::{STRIBECK, STRIBECK_MM_S};
+use study_wire::elements;
 use study_wire::mechanism::{MechanismView, SCALARS, State};
 use study_wire::predict::Motion;
 
@@ -358,6 +359,35 @@ pub fn predict(
     follow(mechanism, recording, samples, least_hz, |_| ())
 }
 
+/// The force of each sample of a recording by elements, N, in steps of at least
+/// [`PREDICTED_HZ`].
+pub(super) fn predict_elements(elements: &Elements, recording: &Recording) -> Vec<f64> {
+    let view = elements.view();
+    let mut state = elements::State::settled(&view, motion_between(recording, 0, 0.0));
+    (0..recording.len())
+        .map(|i| {
+            let mut force_n = 0.0;
+            for (motion, span_s) in substeps(recording, i, PREDICTED_HZ) {
+                force_n = state.step(&view, motion, span_s);
+            }
+            force_n + view.mass_kg * recording.a_m_s2[i]
+        })
+        .collect()
+}
+
+/// The motion and the duration of each step up to a sample.
+fn substeps(recording: &Recording, i: usize, least_hz: f64) -> impl Iterator<Item = (Motion, f64)> {
+    let span_s = match i {
+        0 => recording.t_s[1] - recording.t_s[0],
+        _ => recording.t_s[i] - recording.t_s[i - 1],
+    };
+    let substeps = ((span_s * least_hz * (1.0 - 1e-9)).ceil()).max(1.0);
+    (1..=substeps as usize).map(move |j| {
+        let motion = motion_between(recording, i, j as f64 / substeps);
+        (motion, span_s / substeps)
+    })
+}
+
 /// The same; `visit` sees the state at each of the samples.
 fn follow(
     mechanism: &MechanismView<'_>,
@@ -369,15 +399,9 @@ fn follow(
     let mut state = State::settled(mechanism, motion_between(recording, 0, 0.0));
     (0..samples)
         .map(|i| {
-            let span_s = match i {
-                0 => recording.t_s[1] - recording.t_s[0],
-                _ => recording.t_s[i] - recording.t_s[i - 1],
-            };
-            let substeps = ((span_s * least_hz * (1.0 - 1e-9)).ceil()).max(1.0);
             let mut force_n = 0.0;
-            for j in 1..=substeps as usize {
-                let motion = motion_between(recording, i, j as f64 / substeps);
-                force_n = state.step(mechanism, motion, span_s / substeps);
+            for (motion, span_s) in substeps(recording, i, least_hz) {
+                force_n = state.step(mechanism, motion, span_s);
             }
             visit(&state);
             force_n + mechanism.scalars.handle_kg * recording.a_m_s2[i]

@@ -223,7 +223,7 @@ mod tests {
                 }
             }
         }
-        assert_eq!(names.len(), 10);
+        assert_eq!(names.len(), 11);
     }
 
     #[test]

@@ -39,6 +39,9 @@ pub fn predict<'r>(
     if let Some(mechanism) = &realization.mechanism {
         return Box::new(super::mechanism::low_passed(mechanism, recording).into_iter());
     }
+    if let Some(elements) = &realization.elements {
+        return Box::new(super::mechanism::predict_elements(elements, recording).into_iter());
+    }
     let table = realization.table();
     let rule = realization.direction;
     let mut state = DirectionState::default();

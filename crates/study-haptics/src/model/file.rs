@@ -3,13 +3,15 @@
 //! A model file is TOML with `format = "study-model/1"`, or `"study-model/2"` with a `kind`: a
 //! `table`, whose other keys are those of version 1, or a `mechanism`, and with `units` of a
 //! straight or a turning handle, which the names of the keys then have. `"study-model/3"` has the
-//! keys of version 2 and what the recordings carry: `[coverage]` and `[terms]`. Reading is strict and reports
+//! keys of version 2, `elements` as another kind, and what the recordings carry: `[coverage]` and
+//! `[terms]`. Reading is strict and reports
 //! every fault with its line: unknown keys, numbers that are not finite, positions that
 //! do not ascend, lists of different lengths, reversed ranges. Writing is reproducible:
 //! the same realization gives the same bytes, numbers have the fewest digits that read
 //! back as the same number, and `parse(write(r)) == r` for every valid `r`.
 
 mod carried;
+mod elements;
 mod text;
 mod write;
 
@@ -39,16 +41,31 @@ pub fn parse(path: &str, text: &str) -> (Option<Realization>, Findings) {
     table::parse(path, text, read)
 }
 
+/// What a model file has parameters of.
+#[derive(Clone, Copy)]
+enum Kind {
+    Table,
+    Mechanism,
+    Elements,
+}
+
 fn read(mut root: Table<'_, '_>) -> Option<Realization> {
     let format = root.value("format").and_then(|v| v.text());
     let third = format.as_deref() == Some(FORMAT_3);
     let mut own = Units::Linear;
     if third || format.as_deref() == Some(FORMAT_2) {
-        let kinds = [("table", false), ("mechanism", true)];
-        let kind = root.required("kind").and_then(|v| v.word(&kinds));
+        let kinds = [
+            ("table", Kind::Table),
+            ("mechanism", Kind::Mechanism),
+            ("elements", Kind::Elements),
+        ];
+        let of_version = if third { &kinds[..] } else { &kinds[..2] };
+        let kind = root.required("kind").and_then(|v| v.word(of_version));
         own = root.value("units").map_or(Some(Units::Linear), units)?;
-        if kind? {
-            return read_mechanism(root, own, third);
+        match kind? {
+            Kind::Table => {}
+            Kind::Mechanism => return read_mechanism(root, own, third),
+            Kind::Elements => return read_elements(root, own),
         }
     } else if !root.has_format(FORMAT, "a model file") {
         return None;
@@ -92,6 +109,7 @@ fn read(mut root: Table<'_, '_>) -> Option<Realization> {
         positive: positive?,
         negative: negative?,
         mechanism: None,
+        elements: None,
     })
 }
 
@@ -109,6 +127,20 @@ fn read_mechanism(mut root: Table<'_, '_>, own: Units, third: bool) -> Option<Re
     Some(Realization {
         units: own,
         ..Realization::of_mechanism(id?, provenance?, vaf?, trained, mechanism)
+    })
+}
+
+/// Elements of version 3.
+fn read_elements(mut root: Table<'_, '_>, own: Units) -> Option<Realization> {
+    let id = id(&mut root);
+    let trained = root.required("trained").and_then(|v| trained(v, own));
+    let provenance = provenance(&mut root, own, true);
+    let vaf = root.value("vaf").map_or(Some(BTreeMap::new()), vaf);
+    let elements = (root.required("elements")).and_then(|v| elements::read(v, own));
+    root.finish();
+    Some(Realization {
+        units: own,
+        ..Realization::of_elements(id?, provenance?, vaf?, trained?, elements?)
     })
 }
 

@@ -167,6 +167,9 @@ impl Realization {
         if let Some(mechanism) = &mut self.mechanism {
             mechanism.rescale(Scale { x, f, m });
         }
+        if let Some(elements) = &mut self.elements {
+            elements.rescale(x, f, m);
+        }
         if let Some(coverage) = &mut self.provenance.coverage {
             coverage.rescale(x);
         }

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that fails says where")]
 
 use super::*;
-use crate::model::{Branch, Mechanism, Profile, Provenance, Trained, Units, file};
+use crate::model::{Branch, Elements, Mechanism, Profile, Provenance, Trained, Units, file};
 use std::collections::BTreeMap;
 use study_base::rng::Stream;
 use study_wire::mechanism::Scalars;
@@ -79,12 +79,75 @@ fn table(of: &Realization, direction: Direction) -> Realization {
     };
     Realization {
         mechanism: None,
+        elements: None,
         direction,
         lookup: Lookup::Linear,
         units: Units::Linear,
         positive: branch(1.0),
         negative: branch(-1.0),
         ..of.clone()
+    }
+}
+
+/// A realization of elements of any size: a potential that rises, friction, a branch that relaxes
+/// and a latch.
+fn elements(draw: &mut Stream) -> Realization {
+    let mut log = |low: f64, high: f64| (low.ln() + draw.unit() * (high / low).ln()).exp();
+    let travel = log(4.0, 40.0);
+    let force = log(0.5, 8.0);
+    let relaxation_s = log(0.002, 0.008);
+    let rearm_mm = travel * log(0.3, 0.5);
+    let (friction, relaxes, breaks) = (
+        force * log(0.05, 0.3),
+        force * log(0.1, 0.5),
+        force * log(0.1, 0.5),
+    );
+    let damping = 1e-3 * force * log(0.1, 1.0);
+    let wave = log(0.01, 0.1);
+    let x_mm: Vec<f64> = (0..=32).map(|i| travel * f64::from(i) / 32.0).collect();
+    let of = |value: &dyn Fn(f64) -> f64| x_mm.iter().map(|x| value(x / travel)).collect();
+    let own = Elements {
+        mass_kg: 1e-3 * force,
+        force_n: of(&|share| force * (share + wave * (3.0 * TAU * share).sin())),
+        damping_n_s_per_mm: [of(&|_| damping), of(&|share| damping * share)],
+        springs: vec![
+            Spring::Stop {
+                slip_mm: 0.02 * travel,
+            },
+            Spring::Maxwell {
+                // what it reaches at twice the trained speed
+                slip_mm: 8.0 * travel * relaxation_s,
+                relaxation_s,
+            },
+            Spring::Latch {
+                rearm_mm,
+                break_mm: rearm_mm + 0.2 * travel,
+            },
+        ],
+        spring_n: vec![
+            of(&|share| friction * (1.0 + (TAU * share).cos())),
+            of(&|share| relaxes * share),
+            of(&|_| breaks),
+        ],
+        x_mm: x_mm.clone(),
+    };
+    let trained = Trained {
+        x_mm: [0.0, travel],
+        v_mm_s: 4.0 * travel,
+    };
+    let vaf = BTreeMap::new();
+    Realization::of_elements("e".into(), Provenance::default(), vaf, trained, own)
+}
+
+#[test]
+fn healthy_elements_raise_no_alarm() {
+    let mut draw = Stream::new(4, &["healthy"]);
+    for i in 0..50 {
+        let what = elements(&mut draw);
+        assert!(what.certificate().passes(), "{i}: {}", what.certificate());
+        let found = search(&what, &Device::default());
+        let words: Vec<String> = found.iter().map(Danger::to_string).collect();
+        assert!(found.is_empty(), "{i}: {words:?} {:?}", what.elements);
     }
 }
 

@@ -28,6 +28,7 @@ fn realization(scale: f64) -> Realization {
         positive: branch(scale),
         negative: branch(-1.0),
         mechanism: None,
+        elements: None,
         units: Units::Linear,
     }
 }

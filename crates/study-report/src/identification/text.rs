@@ -1,7 +1,7 @@
 //! What `study identify` prints.
 
 use super::printed::{Printed, align, short_name};
-use super::{comparison, first, json, loops};
+use super::{comparison, elements, first, json, loops};
 use std::fmt::Write as _;
 use study_base::text::Untrusted;
 use study_haptics::identify::grid::Cell;
@@ -238,6 +238,7 @@ fn best_in_detail(results: &Identification) -> String {
     let provenance = &cell.realization.provenance;
     let filter = provenance.filter.as_deref().unwrap_or("unknown");
     let mechanism = (cell.fitted.as_deref()).map_or(String::new(), mechanism_in_detail);
+    let springs = elements::in_detail(&cell.realization, p);
     let (noticeable, accuracy) = match rows.len() {
         1 => (String::new(), String::new()),
         _ => (
@@ -246,7 +247,7 @@ fn best_in_detail(results: &Identification) -> String {
         ),
     };
     format!(
-        "\nthe {} cell in detail{noticeable}\nsignals: {filter}\n{accuracy}{ceilings}{mechanism}certificate {}\n    {}\n    m < 0 at {:.0} % of the nodes, b < 0 at {:.0} %\n{}",
+        "\nthe {} cell in detail{noticeable}\nsignals: {filter}\n{accuracy}{ceilings}{mechanism}{springs}certificate {}\n    {}\n    m < 0 at {:.0} % of the nodes, b < 0 at {:.0} %\n{}",
         if results.cells.len() == 1 {
             "only"
         } else {

@@ -5,6 +5,7 @@ use super::predicted::{APART, Predicted, acceleration, predicted};
 use super::scale::Scale;
 use super::{Played, REST_MM_S, ROUNDING_N};
 use crate::outcome::Sample;
+use study_wire::elements::Spring;
 use study_wire::predict::Direction;
 use study_wire::servo::Law;
 
@@ -52,13 +53,20 @@ fn jerk(samples: &[Sample], i: usize) -> f64 {
     }
 }
 
-/// Stiffness of the parts of a mechanism that the handle deflects.
+/// Stiffness of the parts of a mechanism or of elements that the handle deflects.
 fn stiffness_n_per_mm(law: &Law<'_>) -> f64 {
     match law {
         Law::Table { .. } => 0.0,
         Law::Mechanism(what) => {
             let own = what.scalars;
             own.contact_n_per_mm + own.handle_n / own.handle_slip_mm
+        }
+        Law::Elements(what) => {
+            let stiffest = |(spring, profile): (&Spring, &&[f64])| {
+                let most_n = profile.iter().copied().fold(0.0, f64::max);
+                most_n / spring.slip_mm().unwrap_or(f64::INFINITY)
+            };
+            what.springs.iter().zip(&what.spring_n).map(stiffest).sum()
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The force that the table gives for the reported motion, by the device's own servo.
 
 use crate::outcome::Sample;
+use study_wire::elements::{ElementsView, Spring};
 use study_wire::predict::{Direction, Motion};
 use study_wire::servo::{Law, Rendering, Servo, ServoSettings};
 
@@ -114,7 +115,19 @@ fn memory_mm(law: &Law<'_>) -> f64 {
             let own = what.scalars;
             own.gap_mm + 3.0 * own.slip_mm.max(own.handle_slip_mm)
         }
+        Law::Elements(what) => elements_memory_mm(what),
     }
+}
+
+/// Both deflections of the longest stop, and the hysteresis of the widest latch. What relaxes
+/// forgets in time; it counts by the way at the slip of its force.
+fn elements_memory_mm(what: &ElementsView<'_>) -> f64 {
+    let memories = what.springs.iter().map(|spring| match *spring {
+        Spring::Stop { slip_mm } => 2.0 * slip_mm,
+        Spring::Maxwell { slip_mm, .. } => slip_mm,
+        Spring::Latch { rearm_mm, break_mm } => break_mm - rearm_mm,
+    });
+    memories.fold(0.0, f64::max)
 }
 
 /// Acceleration at a sample, m/s²: the second difference of the position, in which the

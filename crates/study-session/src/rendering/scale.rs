@@ -3,6 +3,7 @@
 //! down to what the device resolves.
 
 use super::Played;
+use study_wire::elements;
 use study_wire::predict::{self, Motion};
 use study_wire::servo::Law;
 
@@ -59,6 +60,14 @@ fn range_n(played: &Played<'_>) -> f64 {
                 Law::Mechanism(what) => {
                     let damping = what.scalars.follower_n_s_per_mm + what.scalars.handle_n_s_per_mm;
                     what.static_n(x_mm, sign > 0.0) + damping * v_mm_s
+                }
+                Law::Elements(what) => {
+                    let handle = Motion {
+                        v_mm_s,
+                        ..Motion::at_rest(x_mm)
+                    };
+                    let mut state = elements::State::settled(what, handle);
+                    state.step(what, handle, 1.0 / played.servo.servo_hz)
                 }
             };
             (least, most) = (least.min(force_n), most.max(force_n));

@@ -5,9 +5,9 @@ use super::table::{Refused, require};
 use super::{Alive, Handler, LastRequest, Out};
 use crate::frame::crc32;
 use crate::message::{
-    Constants, DeviceState, EventKind, Fault, Features, Header, Heartbeat, Hello, Identity, Loaded,
-    MECHANISM_MINOR, MINOR, Outcome, Play, Pulse, Record, Refusal, Reply, Request, Stop, VERSION,
-    WireError, kind,
+    Constants, DeviceState, ELEMENTS_MINOR, EventKind, Fault, Features, Header, Heartbeat, Hello,
+    Identity, Loaded, MECHANISM_MINOR, MINOR, Outcome, Play, Pulse, Record, Refusal, Reply,
+    Request, Stop, VERSION, WireError, kind,
 };
 use crate::real::Real;
 use crate::servo::{Servo, ServoSettings};
@@ -36,8 +36,11 @@ impl<const NODES: usize, const POINTS: usize, R: Real> Handler<NODES, POINTS, R>
         }
         // What a later minor version added is unknown on this connection.
         let known = |(header, request): (Header, Request)| {
-            let mechanism = request.minor() >= MECHANISM_MINOR;
-            let refused = mechanism && !self.profile.features.mechanism;
+            let features = self.profile.features;
+            let refused = match request {
+                Request::ElementsBegin(_) => !features.elements,
+                _ => request.minor() >= MECHANISM_MINOR && !features.mechanism,
+            };
             match refused || request.minor() > self.minor {
                 true => Err(WireError::UnknownType(header.kind)),
                 false => Ok((header, request)),
@@ -115,6 +118,11 @@ impl<const NODES: usize, const POINTS: usize, R: Real> Handler<NODES, POINTS, R>
                 self.may_load()?;
                 self.mechanism.clear();
                 self.table.begin(begin)
+            }
+            Request::ElementsBegin(begin) => {
+                self.may_load()?;
+                self.mechanism.clear();
+                self.table.begin_elements(begin)
             }
             Request::TableChunk(chunk) => {
                 self.may_continue()?;
@@ -345,6 +353,7 @@ impl<const NODES: usize, const POINTS: usize, R: Real> Handler<NODES, POINTS, R>
             minor: self.minor,
             features: Features {
                 mechanism: self.profile.features.mechanism && self.minor >= MECHANISM_MINOR,
+                elements: self.profile.features.elements && self.minor >= ELEMENTS_MINOR,
                 ..self.profile.features
             },
             commit_ms: COMMIT_MS,

@@ -1,7 +1,8 @@
 //! The uploaded table and the checks before it may be played.
 
 use crate::certificate::{Certificate, Certifier, Range};
-use crate::message::{Node, Refusal, TableBegin, TableChunk, UploadCrc};
+use crate::elements::{self, ElementsView, Spring};
+use crate::message::{ElementsBegin, Node, Refusal, TableBegin, TableChunk, UploadCrc};
 use crate::predict::{BranchView, Lookup, TableView};
 use crate::real::Real;
 
@@ -63,6 +64,25 @@ impl<const N: usize, R: Real> Nodes<N, R> {
         }
     }
 
+    /// The first `len` nodes of elements, see [`Node::of_elements`].
+    fn elements<'a>(
+        &'a self,
+        len: usize,
+        mass_kg: R,
+        springs: &'a [Spring],
+    ) -> ElementsView<'a, R> {
+        let [force_n, forwards, backwards, first] = &self.positive;
+        let [second, third, fourth, fifth] = &self.negative;
+        ElementsView {
+            x_mm: &self.x_mm[..len],
+            mass_kg,
+            force_n: &force_n[..len],
+            damping_n_s_per_mm: [&forwards[..len], &backwards[..len]],
+            springs,
+            spring_n: [first, second, third, fourth, fifth].map(|profile| &profile[..len]),
+        }
+    }
+
     /// Removes the first of `len` nodes.
     fn shift(&mut self, len: usize) {
         self.x_mm.copy_within(1..len, 0);
@@ -76,12 +96,14 @@ impl<const N: usize, R: Real> Nodes<N, R> {
 /// last one that was, and the one before.
 const WINDOW: usize = TableChunk::MAX_NODES + 2;
 
-/// A table with a capacity of `N` nodes.
+/// A table, or elements, with a capacity of `N` nodes.
 #[derive(Debug, Clone)]
 pub(super) struct TableBuffer<const N: usize, R> {
     nodes: Nodes<N, R>,
     len: usize,
     pub(super) begin: Option<TableBegin>,
+    /// Of elements, in addition to `begin`.
+    elements: Option<ElementsBegin>,
     crc: UploadCrc,
     /// The first node that is not finite or does not ascend.
     bad: Option<usize>,
@@ -89,6 +111,7 @@ pub(super) struct TableBuffer<const N: usize, R> {
     window: Nodes<WINDOW, f64>,
     window_len: usize,
     certifier: Certifier,
+    of_elements: elements::Certifier,
 }
 
 /// A refusal and its detail, see [`Refusal`].
@@ -100,11 +123,13 @@ impl<const N: usize, R: Real> TableBuffer<N, R> {
             nodes: Nodes::new(),
             len: 0,
             begin: None,
+            elements: None,
             crc: UploadCrc::new(),
             bad: None,
             window: Nodes::new(),
             window_len: 0,
             certifier: Certifier::new(),
+            of_elements: elements::Certifier::new(),
         }
     }
 
@@ -118,8 +143,18 @@ impl<const N: usize, R: Real> TableBuffer<N, R> {
         Ok(())
     }
 
+    /// Begins a new upload of elements.
+    pub(super) fn begin_elements(&mut self, begin: &ElementsBegin) -> Result<(), Refused> {
+        self.begin(&TableBegin::from(begin))?;
+        self.crc = UploadCrc::of_elements(begin);
+        self.elements = Some(*begin);
+        Ok(())
+    }
+
     pub(super) fn clear(&mut self) {
         self.begin = None;
+        self.elements = None;
+        self.of_elements = elements::Certifier::new();
         self.len = 0;
         self.bad = None;
         self.window_len = 0;
@@ -144,7 +179,7 @@ impl<const N: usize, R: Real> TableBuffer<N, R> {
     fn add(&mut self, node: &Node) {
         if self.window_len == WINDOW {
             let first = self.len - WINDOW;
-            while self.certifier.judged() < first + 2 && self.judge() {}
+            while self.judged() < first + 2 && self.judge() {}
             self.window.shift(WINDOW);
             self.window_len -= 1;
         }
@@ -168,10 +203,24 @@ impl<const N: usize, R: Real> TableBuffer<N, R> {
         self.nodes.view(self.len, lookup.unwrap_or(Lookup::Linear))
     }
 
+    /// The elements, if the upload is one of elements.
+    pub(super) fn elements(&self) -> Option<ElementsView<'_, R>> {
+        let begin = self.elements.as_ref()?;
+        let mass_kg = R::of(begin.mass_kg);
+        Some((self.nodes).elements(self.len, mass_kg, begin.springs.as_slice()))
+    }
+
+    fn judged(&self) -> usize {
+        match self.elements {
+            Some(_) => self.of_elements.judged(),
+            None => self.certifier.judged(),
+        }
+    }
+
     /// Received nodes whose certificate has not been computed.
     pub(super) fn unjudged(&self) -> usize {
         match self.bad {
-            None => self.len - self.certifier.judged(),
+            None => self.len - self.judged(),
             Some(_) => 0,
         }
     }
@@ -184,13 +233,19 @@ impl<const N: usize, R: Real> TableBuffer<N, R> {
             return false;
         };
         let nodes = usize::from(begin.nodes);
-        let at = self.certifier.judged();
+        let at = self.judged();
         let known = at + 1 < self.len || (at < self.len && self.len == nodes);
         if !known || self.bad.is_some() {
             return false;
         }
-        let view = self.window.view(self.window_len, begin.lookup);
         let at = at + self.window_len - self.len;
+        if let Some(elements) = &self.elements {
+            let springs = elements.springs.as_slice();
+            let view = (self.window).elements(self.window_len, elements.mass_kg, springs);
+            self.of_elements.step(&view, at);
+            return true;
+        }
+        let view = self.window.view(self.window_len, begin.lookup);
         let range = Range {
             x_mm: begin.range_mm,
             v_mm_s: begin.trained_mm_s,
@@ -223,7 +278,15 @@ impl<const N: usize, R: Real> TableBuffer<N, R> {
         };
         asked.check_limits(bounds)?;
         while self.judge() {}
-        asked.permit(&self.certifier.finish(), bounds, with_state)
+        let certificate = match &self.elements {
+            Some(elements) => {
+                let springs = elements.springs.as_slice();
+                let view = (self.window).elements(self.window_len, elements.mass_kg, springs);
+                self.of_elements.finish(&view, elements.trained_mm_s)
+            }
+            None => self.certifier.finish(),
+        };
+        asked.permit(&certificate, bounds, with_state)
     }
 
     /// Checks that the force is defined at every position.
@@ -235,7 +298,13 @@ impl<const N: usize, R: Real> TableBuffer<N, R> {
         if let Some(node) = self.bad {
             return bad(node);
         }
-        let known = begin.direction.delta_mm().is_none_or(positive);
+        let known = match &self.elements {
+            Some(elements) => {
+                let springs = elements.springs.as_slice();
+                elements.mass_kg.is_finite() && springs.iter().all(Spring::is_valid)
+            }
+            None => begin.direction.delta_mm().is_none_or(positive),
+        };
         if ordered(begin.range_mm) && known && positive(begin.trained_mm_s) {
             Ok(())
         } else {
@@ -383,6 +452,54 @@ mod tests {
             let range = Range { x_mm: begin.range_mm, v_mm_s: begin.trained_mm_s };
             let whole = certify(&table.view(), begin.direction, range);
             prop_assert_eq!(table.certifier.finish(), whole);
+        }
+    }
+
+    proptest! {
+        /// Elements that are judged while they arrive have the certificate of the whole.
+        #[test]
+        fn judging_elements_node_by_node_gives_the_same_certificate(
+            values in proptest::array::uniform11(proptest::array::uniform8(-0.1..3.0)),
+            steps in proptest::array::uniform11(0.1..2.0),
+            judged in proptest::array::uniform4(0..6),
+        ) {
+            let mut x_mm = 1.0;
+            let mut nodes = [Node::default(); NODES];
+            for ((node, values), step) in nodes.iter_mut().zip(values).zip(steps) {
+                x_mm += step;
+                *node = Node::of_elements(x_mm, values);
+            }
+            let springs = [
+                Spring::Stop { slip_mm: 0.2 },
+                Spring::Latch { rearm_mm: 2.0, break_mm: 6.5 },
+                Spring::Maxwell { slip_mm: 3.0, relaxation_s: 0.1 },
+            ];
+            let begin = ElementsBegin {
+                nodes: NODES as u16,
+                mass_kg: 0.1,
+                range_mm: [0.0, 40.0],
+                trained_mm_s: 100.0,
+                force_n: 1.0,
+                velocity_mm_s: 100.0,
+                uncertified_n: None,
+                springs: FixedVec::of(&springs),
+            };
+            let mut table = TableBuffer::<16, f64>::new();
+            table.begin_elements(&begin).unwrap();
+            for (at, (some, judged)) in nodes.chunks(3).zip(judged).enumerate() {
+                let first = (3 * at) as u16;
+                table.chunk(&TableChunk { first, nodes: FixedVec::of(some) }).unwrap();
+                for _ in 0..judged {
+                    table.judge();
+                }
+            }
+            while table.judge() {}
+            prop_assert_eq!(table.unjudged(), 0);
+            let whole = table.elements().unwrap();
+            // the third spring has the values of its place, the others are not read
+            prop_assert_eq!(whole.spring_n[2][4], values[4][5]);
+            let found = table.of_elements.finish(&whole, begin.trained_mm_s);
+            prop_assert_eq!(found, whole.certificate(begin.trained_mm_s));
         }
     }
 }

@@ -1,9 +1,9 @@
 //! The state of a mechanism and its step.
 
-use super::sum::Sum;
 use super::{MechanismView, Scalars};
 use crate::predict::Motion;
 use crate::real::Real;
+use crate::sum::Sum;
 
 /// The state of a mechanism. The follower's position is stored as its distance from the
 /// handle, which single precision resolves as well in the slowest motion; this distance and

@@ -1,8 +1,8 @@
 //! Forces with known answers, and the energy balance under adversarial motions.
 
-use super::sum::Sum;
 use super::*;
 use crate::predict::Motion;
+use crate::sum::Sum;
 use core::f64::consts::TAU;
 
 /// A switch of three detents of 12 mm and 5 N, with a node every 0.5 mm.

@@ -45,6 +45,8 @@ pub struct Features {
     pub acceleration_from_speed: bool,
     /// It plays mechanisms, from minor version 2 on.
     pub mechanism: bool,
+    /// It plays elements, from minor version 2 on.
+    pub elements: bool,
 }
 
 /// Text of a device: UTF-8, padded with zeros. It is untrusted input.
@@ -229,7 +231,9 @@ impl Field for Features {
     const MAX_LEN: usize = u32::MAX_LEN;
 
     fn write(&self, out: &mut Writer) {
-        let bits = u32::from(self.acceleration_from_speed) | u32::from(self.mechanism) << 1;
+        let bits = u32::from(self.acceleration_from_speed)
+            | u32::from(self.mechanism) << 1
+            | u32::from(self.elements) << 2;
         bits.write(out);
     }
 
@@ -238,6 +242,7 @@ impl Field for Features {
         Ok(Self {
             acceleration_from_speed: bits & 1 != 0,
             mechanism: bits & 2 != 0,
+            elements: bits & 4 != 0,
         })
     }
 }

@@ -4,9 +4,11 @@
 //! invalid table with its own code.
 
 use super::bytes::{Field, Reader, Writer, fields};
+use super::elements::ElementsBegin;
 use super::mechanism::MechanismBegin;
 use super::probe::PathBegin;
 use super::{FixedVec, WireError};
+use crate::elements::MAX_SPRINGS;
 use crate::frame::RunningCrc;
 use crate::predict::{Direction, Lookup};
 
@@ -53,6 +55,35 @@ fields! {
         first: u16;
         /// One to three.
         nodes: FixedVec<Node, { TableChunk::MAX_NODES }>;
+    }
+}
+
+impl Node {
+    /// A node of elements: C, N, the damping for v > 0 and v < 0, N·s/mm, and the force of each
+    /// spring, N, in the places of a table's parameters.
+    pub fn of_elements(x_mm: f64, values: [f64; 3 + MAX_SPRINGS]) -> Self {
+        let [c, forwards, backwards, first, rest @ ..] = values;
+        Self {
+            x_mm,
+            positive: [c, forwards, backwards, first],
+            negative: rest,
+        }
+    }
+}
+
+/// What elements have in common with a table.
+impl From<&ElementsBegin> for TableBegin {
+    fn from(begin: &ElementsBegin) -> Self {
+        Self {
+            nodes: begin.nodes,
+            lookup: Lookup::Linear,
+            direction: Direction::Sign,
+            range_mm: begin.range_mm,
+            trained_mm_s: begin.trained_mm_s,
+            force_n: begin.force_n,
+            velocity_mm_s: begin.velocity_mm_s,
+            uncertified_n: begin.uncertified_n,
+        }
     }
 }
 
@@ -141,6 +172,11 @@ impl UploadCrc {
 
     /// Starts with MECHANISM_BEGIN.
     pub fn of_mechanism(begin: &MechanismBegin) -> Self {
+        Self::default().with(begin)
+    }
+
+    /// Starts with ELEMENTS_BEGIN.
+    pub fn of_elements(begin: &ElementsBegin) -> Self {
         Self::default().with(begin)
     }
 

@@ -33,7 +33,7 @@ fn damper(b_n_s_per_mm: &[f64; 2]) -> Rendering<'_> {
 fn table<'a, 'b>(what: &'b mut Rendering<'a>) -> &'b mut TableView<'a> {
     match &mut what.law {
         Law::Table { table, .. } => table,
-        Law::Mechanism(_) => panic!("a mechanism"),
+        Law::Mechanism(_) | Law::Elements(_) => panic!("no table"),
     }
 }
 

@@ -1,6 +1,8 @@
 use super::*;
-use crate::model::coverage::Determined;
+use crate::model::Elements;
+use crate::model::coverage::{Coverage, Determined};
 use proptest::prelude::*;
+use study_wire::elements::Spring;
 
 const SMALL: &str = r#"format = "study-model/1"
 id = "a"
@@ -444,10 +446,118 @@ proptest! {
             trained: Trained { x_mm: [x_mm[0], x_mm[x_mm.len() - 1]], v_mm_s: delta_mm },
             x_mm, positive, negative,
             mechanism: None,
+            elements: None,
             units: Units::Linear,
         };
         let (back, findings) = parse("p.toml", &write(&r));
         prop_assert_eq!(&findings.faults, &[]);
         prop_assert_eq!(back, Some(r));
+    }
+}
+
+/// Elements with every kind of spring.
+fn with_elements() -> Realization {
+    let elements = Elements {
+        mass_kg: 0.02,
+        x_mm: vec![1.0, 2.5, 4.0],
+        force_n: vec![0.5, -0.25, 1.0],
+        damping_n_s_per_mm: [vec![0.0, 0.001, 0.0], vec![0.002; 3]],
+        springs: vec![
+            Spring::Stop { slip_mm: 0.2 },
+            Spring::Maxwell {
+                slip_mm: 3.0,
+                relaxation_s: 0.05,
+            },
+            Spring::Latch {
+                rearm_mm: 1.5,
+                break_mm: 3.0,
+            },
+        ],
+        spring_n: vec![vec![0.3, 0.0, 0.1], vec![1.0; 3], vec![0.0, 2.0, 0.5]],
+    };
+    let provenance = Provenance {
+        method: "elements".to_owned(),
+        ..Provenance::default()
+    };
+    let trained = Trained {
+        x_mm: [0.5, 4.25],
+        v_mm_s: 80.0,
+    };
+    Realization::of_elements("e".into(), provenance, BTreeMap::new(), trained, elements)
+}
+
+#[test]
+fn elements_are_written_and_read_in_any_units() {
+    let linear = with_elements();
+    // what they are in slow motion
+    assert_eq!(linear.positive.f0_n, [0.5 + 0.3, -0.25 + 2.0, 1.0 + 0.1]);
+    assert_eq!(linear.negative.f0_n, [0.5 - 0.3, -0.25, 1.0 - 0.1]);
+    let turned = linear.clone().turned(Units::Radians, 20.0);
+    for one in [linear, turned] {
+        let text = write(&one);
+        let head = "format = \"study-model/3\"\nkind = \"elements\"\n";
+        assert!(text.starts_with(head), "{text}");
+        let (back, findings) = parse("a.toml", &text);
+        assert_eq!(findings.faults, []);
+        assert_eq!(write(&back.unwrap()), text);
+    }
+}
+
+/// The file as it was first written: later versions read it and write the same bytes.
+#[test]
+fn the_golden_file_of_elements_is_read_and_written_as_ever() {
+    let golden = include_str!("../../../tests/data/elements.toml");
+    let mut expected = with_elements();
+    expected.provenance.coverage = Some(Coverage {
+        full_strokes: 12,
+        partial_strokes: 5,
+        ..Coverage::empty(expected.trained.x_mm, 80.0, 3, 2)
+    });
+    for (x_mm, v_mm_s) in [(1.0, 30.0), (2.0, -70.0)] {
+        let coverage = expected.provenance.coverage.as_mut().unwrap();
+        coverage.add(x_mm, v_mm_s);
+    }
+    let (read, findings) = parse("elements.toml", golden);
+    assert_eq!(findings.faults, []);
+    assert_eq!(read, Some(expected.clone()));
+    assert_eq!(write(&expected), golden);
+}
+
+#[test]
+fn every_fault_of_elements_is_named() {
+    let text = write(&with_elements());
+    for (from, to, expected) in [
+        (
+            "0.3, 0.0, 0.1",
+            "0.3, -0.5, 0.1",
+            "with a negative value the element would not be passive",
+        ),
+        ("0.3, 0.0, 0.1", "0.3, 0.0", "has 2 numbers for 3 positions"),
+        (
+            "mass_kg = 0.02",
+            "mass_kg = -0.02",
+            "has to be 0 or more, not -0.02",
+        ),
+        (
+            "break_mm = 3.0",
+            "break_mm = 1.5",
+            "has to break above the position where it holds again",
+        ),
+        (
+            "slip_mm = 0.2",
+            "slip_mm = 0.0",
+            "has to be a finite number above zero",
+        ),
+        ("kind = \"stop\"", "kind = \"spring\"", "`spring`"),
+        ("study-model/3", "study-model/2", "`elements`"),
+    ] {
+        assert!(text.contains(from), "{from}\n{text}");
+        let (realization, findings) = parse("a.toml", &text.replacen(from, to, 1));
+        assert!(realization.is_none(), "{to}");
+        let named = findings
+            .faults
+            .iter()
+            .any(|fault| fault.message.contains(expected));
+        assert!(named, "{to}: {:?}", findings.faults);
     }
 }

@@ -1,7 +1,7 @@
 //! The text of a model file.
 
 use super::text::{Text, bare};
-use super::{FORMAT, FORMAT_2, FORMAT_3, PARAMETERS, SCALAR_KEYS, carried};
+use super::{FORMAT, FORMAT_2, FORMAT_3, PARAMETERS, SCALAR_KEYS, carried, elements};
 use crate::model::{Realization, Units};
 
 /// The text of a model file.
@@ -10,14 +10,17 @@ pub fn write(realization: &Realization) -> String {
     let key = |key: &str| r.units.key(key);
     let mut out = Text::default();
     let turns = r.units != Units::Linear;
-    let third = r.provenance.coverage.is_some() || !r.provenance.terms.is_empty();
-    if third || turns || r.mechanism.is_some() {
+    let own_states = r.mechanism.is_some() || r.elements.is_some();
+    let carries = r.provenance.coverage.is_some() || !r.provenance.terms.is_empty();
+    let third = carries || r.elements.is_some();
+    if third || turns || own_states {
         out.text("format", if third { FORMAT_3 } else { FORMAT_2 });
         out.text(
             "kind",
-            match r.mechanism {
-                Some(_) => "mechanism",
-                None => "table",
+            match (&r.mechanism, &r.elements) {
+                (Some(_), _) => "mechanism",
+                (None, Some(_)) => "elements",
+                (None, None) => "table",
             },
         );
     } else {
@@ -28,7 +31,7 @@ pub fn write(realization: &Realization) -> String {
         out.raw("units", &format!("{{ x = \"{x}\", f = \"{f}\" }}"));
     }
     out.text("id", &r.id);
-    if r.mechanism.is_none() {
+    if !own_states {
         out.text("lookup", r.lookup.as_str());
         let rule = r.direction.as_str();
         let direction = match r.direction.delta_mm() {
@@ -47,7 +50,7 @@ pub fn write(realization: &Realization) -> String {
             r.trained.v_mm_s
         ),
     );
-    if r.mechanism.is_none() {
+    if !own_states {
         out.list(&key("x_mm"), &r.x_mm);
     }
 
@@ -85,7 +88,11 @@ pub fn write(realization: &Realization) -> String {
         }
     }
     carried::write(&mut out, p, r.units);
+    if let Some(own) = &r.elements {
+        elements::write(&mut out, own, r.units);
+    }
     match &r.mechanism {
+        None if own_states => {}
         None => {
             for (name, branch) in [("positive", &r.positive), ("negative", &r.negative)] {
                 out.table(name);

@@ -130,6 +130,17 @@ fn forgets_mm(law: &Law<'_>, encoder_mm: f64) -> f64 {
             let slips_mm = 8.0 * own.slip_mm.max(own.handle_slip_mm);
             own.gap_mm + slips_mm + deflected_mm + 2.0 * encoder_mm
         }
+        Law::Elements(view) => {
+            let high_mm = view.x_mm[view.x_mm.len() - 1];
+            let each = view.springs.iter().map(|spring| match *spring {
+                Spring::Stop { slip_mm } => 2.0 * slip_mm,
+                // what relaxes forgets while the hand rests
+                Spring::Maxwell { .. } => 0.0,
+                // from wherever the hand begins, to below where it holds again
+                Spring::Latch { rearm_mm, .. } => high_mm - rearm_mm,
+            });
+            each.fold(0.0, f64::max) + 4.0 * encoder_mm
+        }
     }
 }
 
@@ -140,8 +151,7 @@ fn motion(of: &Realization, device: Device, kind: usize, draw: &mut Stream) -> O
         return None;
     }
     let reversal_mj = reversal(of, &device).map_or(0.0, |reversal| reversal.most_mj);
-    let view = of.mechanism.as_ref().map(|own| own.view());
-    let what = rendering(of, view);
+    let what = rendering(of);
     let search = Search {
         what: &what,
         device,
@@ -221,6 +231,7 @@ fn certified(random: usize) -> Vec<(String, Realization)> {
         let dahl = table(&whole, Direction::Dahl { delta_mm });
         let sign = table(&whole, Direction::Sign);
         for (kind, what) in [
+            ("elements", elements(&mut draw)),
             ("mechanism", whole),
             ("play", play),
             ("dahl", dahl),

@@ -6,16 +6,16 @@ use crate::real::Real;
 /// compensated summation, with the exact error of Knuth's two-sum). A position that is moved
 /// 10,000 times a second would otherwise drift by the roundings of single precision.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Sum<R> {
+pub(crate) struct Sum<R> {
     /// The number.
-    pub(super) value: R,
+    pub(crate) value: R,
     /// What is to be added to it: at most half a unit in its last place.
-    pub(super) rest: R,
+    pub(crate) rest: R,
 }
 
 impl<R: Real> Sum<R> {
     /// A number as it is.
-    pub(super) fn of(value: R) -> Self {
+    pub(crate) const fn of(value: R) -> Self {
         Self {
             value,
             rest: R::ZERO,
@@ -23,7 +23,7 @@ impl<R: Real> Sum<R> {
     }
 
     /// The sum with another term.
-    pub(super) fn plus(self, term: R) -> Self {
+    pub(crate) fn plus(self, term: R) -> Self {
         let term = term + self.rest;
         let value = self.value + term;
         let added = value - self.value;
