@@ -246,7 +246,14 @@ fn camps(repetitions: usize, every: usize) -> Analysis {
 
 #[test]
 fn two_opposed_camps_are_named() {
-    for (repetitions, test) in [(3, TestKind::Interaction), (1, TestKind::SlopesDiffer)] {
+    for (repetitions, test, by) in [
+        (3, TestKind::Interaction, "the interaction of participants"),
+        (
+            1,
+            TestKind::SlopesDiffer,
+            "the differences between their slopes on VAF",
+        ),
+    ] {
         let a = camps(repetitions, 2);
         assert_eq!(finding(&a, Question::Differ).verdict, Verdict::NotShown);
         assert_eq!(kind(&a, Question::Disagreement), test);
@@ -257,6 +264,9 @@ fn two_opposed_camps_are_named() {
             "Participants disagree about the realizations, and means",
         ]);
         printed.paper("Participants disagreed about the realizations, F(");
+        let methods =
+            format!("Whether participants disagree about the realizations was tested by F of {by}");
+        assert!(printed.html.contains(&methods), "{methods}");
     }
 }
 

@@ -99,7 +99,9 @@ fn report(folder: &Path, study_id: &str, figures: &[&str], tables: &[&str]) -> S
     }
     assert!(
         report.contains("For the paper")
-            && report.contains("Bradley and Terry (1952)") == (study_id == "pairs")
+            && report.contains("Bradley and Terry (1952), with ties (Davidson, 1970), by")
+                == (study_id == "pairs")
+            && report.contains("<h2>Provenance</h2>")
     );
     report
 }
@@ -248,6 +250,19 @@ fn a_track_of_a_study_gives_the_threshold_of_its_table() {
             .zip(&trials)
             .all(|(a, b)| a[..2] == b[..2] && a[3] == b[3])
     );
+    // Its line joins what the rule proposed, and its axis names levels, not their logarithms.
+    let picture = fs::read_to_string(track.with_extension("svg")).unwrap();
+    let joined: usize = (picture.lines().filter(|l| l.contains("#4d4d4d")))
+        .map(|line| line.matches(['M', 'L', 'H', 'V']).count())
+        .sum();
+    let easy = cells(&track, &["easy"]);
+    let easy = easy.iter().filter(|row| row[0] == "true").count();
+    assert!(easy > 0 && joined == trials.len() - easy, "{joined}");
+    let ticks = picture
+        .lines()
+        .filter(|l| l.contains(r#"text-anchor="end""#));
+    let ticks: Vec<&str> = ticks.map(|l| l.split(['>', '<']).nth(2).unwrap()).collect();
+    assert!(ticks.contains(&"0.05"), "{ticks:?}");
     let posterior = values
         .keys()
         .filter(|id| id.starts_with("track/") && id.ends_with("/mean"));

@@ -29,6 +29,18 @@ fn the_papers_numbers_have_one_definition_of_the_sd() {
     assert_eq!(json["definitions"][0]["sums"][0]["squares"], "720");
 }
 
+/// Counting stops at a hundred sums.
+#[test]
+fn more_sums_than_are_counted_are_at_least_so_many() {
+    for (n, said) in [("n=100", "and at least "), ("n=20", "and ")] {
+        let done = possible(&["mean=4", "sd=2.0", n, "scale=1..7"]).assert();
+        let text = String::from_utf8(done.get_output().stdout.clone()).unwrap();
+        let more = text.lines().find(|line| line.ends_with(" more")).unwrap();
+        let (_, number) = more.split_once(said).unwrap_or_else(|| panic!("{text}"));
+        assert!(number.starts_with(|c: char| c.is_ascii_digit()), "{more}");
+    }
+}
+
 #[test]
 fn what_is_missing_or_wrong_is_named() {
     for (args, said) in [

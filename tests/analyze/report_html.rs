@@ -191,7 +191,7 @@ fn hostile_names_and_comments_stay_text() {
     a.comments.push(Comment {
         model: EVIL.to_owned(),
         subject: EVIL.to_owned(),
-        repetition: 1,
+        repetition: 3,
         question: EVIL.to_owned(),
         text: format!("first\n{EVIL}"),
     });
@@ -221,6 +221,7 @@ fn hostile_names_and_comments_stay_text() {
     is_self_contained(&page);
     assert!(page.contains("&lt;script&gt;alert(1)"));
     assert!(page.contains("\\u{202e}"));
+    assert!(page.contains(", repetition 3,"));
     assert!(!page.contains('\u{202e}') && !page.contains('\u{0}'));
     let inside_tags = page.split('<').skip(1).filter_map(|t| t.split('>').next());
     for tag in inside_tags {

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use study_analysis::analyze::{Analysis, Exclusion, Rules, analyze};
-use study_report::{Source, csv};
+use study_report::{Source, csv, json};
 use study_session::outcome::ratings::Ratings;
 
 /// Realizations A, B, C, a hidden reference R, an anchor L and D, a repeat of A.
@@ -283,6 +283,9 @@ fn excluded_participants_count_as_finished_and_make_no_interim_analysis() {
         path: "r.csv".to_owned(),
         ..Source::default()
     };
+    let json: serde_json::Value = serde_json::from_str(&json::document(&source, &a)).unwrap();
+    let counts = &json["counts"];
+    assert_eq!([&counts["finished"], &counts["participants"]], [5, 4]);
     let width = study_report::text::Page {
         width: 100,
         color: false,

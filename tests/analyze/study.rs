@@ -133,6 +133,17 @@ fn several_studies_come_in_turn_and_json_takes_one() {
     let text = said(&mut analyze(dir.path()));
     let (first, second) = (text.find("one ·").unwrap(), text.find("two ·").unwrap());
     assert!(first < second);
+    // each into a folder of its own
+    let out = dir.path().join("out");
+    analyze(dir.path())
+        .arg("--out")
+        .arg(&out)
+        .assert()
+        .success();
+    for id in ["one", "two"] {
+        let own = fs::read_to_string(out.join(id).join("report.html")).unwrap();
+        assert!(own.contains(&format!("<dd>{id}</dd>")), "{id}");
+    }
     analyze(dir.path()).arg("--json").assert().code(1);
     analyze(&dir.path().join("two"))
         .arg("--json")

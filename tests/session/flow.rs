@@ -16,4 +16,5 @@ mod resume;
 mod rig;
 mod saving;
 mod studies;
+mod unasked;
 mod whole;

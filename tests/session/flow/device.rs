@@ -27,7 +27,7 @@ pub(super) fn in_phase(screen: &str) -> Rig {
     rig
 }
 
-fn failures(rig: &Rig) -> Vec<(u32, u32, Failure)> {
+pub(super) fn failures(rig: &Rig) -> Vec<(u32, u32, Failure)> {
     rig.events()
         .filter_map(|e| match e {
             Event::AttemptFailed {

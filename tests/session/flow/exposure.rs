@@ -3,7 +3,7 @@
 use super::rig::{Rig, name};
 use super::studies::{plain, qid, rich};
 use study_plan::protocol::{Answer, Exposure, Protocol};
-use study_session::outcome::{Author, Event, FormId};
+use study_session::outcome::{Author, Event, Failure, FormId};
 use study_session::session::{Input, Screen};
 
 fn felt_for(min_s: f64, max_s: Option<f64>, replays: u32) -> Protocol {
@@ -58,14 +58,27 @@ fn a_realization_is_felt_again_before_it_is_rated_and_that_is_recorded() {
     let mut rig = Rig::new(protocol.clone());
     rig.until("Form");
     assert!(rig.view().can_replay);
+    rig.playback.exploration_s = 1.25;
+    rig.playback.strokes = 2;
     rig.send(Input::PlayAgain).until("Form");
     assert!(!rig.view().can_replay, "once only");
     rig.answer_page().until_reference(2);
     let row = &rig.session.history().rating_rows(&protocol)[0];
     assert_eq!((row.replays, row.attempt), (Some(1), Some(1)));
-    assert_eq!(row.exploration_s, Some(6.0), "twice 3 s");
+    assert_eq!(row.exploration_s, Some(4.25), "3 s, then 1.25 s");
     assert_eq!(row.position, Some(1));
     assert_eq!(rig.count(|e| matches!(e, Event::Replayed { .. })), 1);
+}
+
+#[test]
+fn who_leaves_while_it_is_felt_again_has_not_ended_the_attempt() {
+    let mut rig = Rig::new(felt_for(0.0, None, 1));
+    rig.until("Form")
+        .send(Input::PlayAgain)
+        .until("Playing")
+        .send(Input::Quit);
+    let interrupted = |e: &Event| matches!(e, Event::AttemptFailed { trial: 1, failure, .. } if *failure == Failure::Interrupted);
+    assert_eq!(rig.count(interrupted), 1);
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! Pauses.
 
 use super::device::{in_phase, screen};
-use super::rig::Rig;
+use super::part_rig::pairs;
+use super::rig::{DeviceMood, Rig, StoreMood};
 use super::studies::plain;
 use study_session::outcome::Event;
 use study_session::session::{Effect, Input, Screen};
@@ -52,6 +53,33 @@ fn a_pause_while_the_device_stops_is_kept() {
     assert_eq!(screen(&rig), "Paused");
     rig.send(Input::Advance);
     assert_eq!(screen(&rig), "Form");
+}
+
+/// The next interval is loaded already, and must not play under a pause or while saving fails.
+#[test]
+fn what_comes_between_two_intervals_holds_the_next_one_back() {
+    for between in [Input::Pause, Input::SaveFailed("disk full".to_owned())] {
+        let mut rig = Rig::new(pairs("gap_s = 1.0"));
+        rig.until("Playing");
+        rig.device = DeviceMood::Silent;
+        let playback = rig.playback;
+        rig.send(Input::Advance).send(between.clone());
+        rig.effects.clear();
+        rig.store = StoreMood::Slow;
+        rig.send(Input::DeviceStopped(playback))
+            .send(Input::DeviceLoaded)
+            .wait(5.0);
+        let start = |rig: &Rig| rig.effects.contains(&Effect::Start);
+        assert!(!start(&rig), "{between:?}");
+        let all = rig.all_on_disk();
+        rig.send(all);
+        if between == Input::Pause {
+            assert_eq!(screen(&rig), "Paused");
+            rig.send(Input::Advance);
+        }
+        rig.wait(0.0);
+        assert!(start(&rig), "{between:?}");
+    }
 }
 
 #[test]

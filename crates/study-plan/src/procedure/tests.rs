@@ -159,12 +159,16 @@ fn a_journal_that_its_rule_would_not_give_is_found() {
 /// An easy trial moves no staircase and teaches QUEST+.
 #[test]
 fn easy_trials_only_teach_quest_plus() {
-    let easy = Answer {
-        presented: 2.0,
-        positive: false,
-        easy: true,
-    };
-    for rule in rules() {
+    // on the ladder and beside it
+    for (rule, presented) in rules()
+        .into_iter()
+        .flat_map(|r| [(r.clone(), 2.0), (r, 1.99)])
+    {
+        let easy = Answer {
+            presented,
+            positive: false,
+            easy: true,
+        };
         let mut track = Track::new(&rule, &ladder(), &mut stream()).unwrap();
         let before = track.next();
         track.answer(&easy);
@@ -176,16 +180,25 @@ fn easy_trials_only_teach_quest_plus() {
     }
 }
 
-/// Every level of a staircase is within the ladder, however the answers fall, and it
-/// stops at its largest number of trials without being finished.
+/// Every level of a staircase is within the ladder and its own limits, however the answers
+/// fall, and it stops at its largest number of trials without being finished.
 #[test]
 fn a_staircase_stays_on_its_ladder() {
-    for positive in [true, false] {
-        let rule = Rule::Staircase(staircase());
+    let whole = (None, None, 0.0..=2.0);
+    let narrow = (Some(0.5), Some(1.5), 0.5..=1.5);
+    for ((min_level, max_level, within), positive) in [&whole, &narrow]
+        .into_iter()
+        .flat_map(|limits| [true, false].map(|positive| (limits, positive)))
+    {
+        let rule = Rule::Staircase(Staircase {
+            min_level: *min_level,
+            max_level: *max_level,
+            ..staircase()
+        });
         let mut track = Track::new(&rule, &ladder(), &mut stream()).unwrap();
         let mut n = 0;
         while let Some(proposal) = track.next() {
-            assert!((0.0..=2.0).contains(&proposal.level));
+            assert!(within.contains(&proposal.level));
             n += 1;
             track.answer(&Answer {
                 presented: ladder().level(proposal.step),

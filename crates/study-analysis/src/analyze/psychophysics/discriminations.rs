@@ -319,4 +319,19 @@ mod tests {
             );
         }
     }
+
+    /// Whoever compares the intervals has the d′ of differencing, also in tables.
+    #[test]
+    fn the_sensitivity_of_comparing_is_that_of_differencing() {
+        let independent = Sensitivity {
+            d: Some(Stat::of(1.1)),
+            ..Sensitivity::undefined("")
+        };
+        let differencing = Sensitivity {
+            d_differencing: Some(Stat::of(0.7)),
+            ..independent.clone()
+        };
+        assert_eq!(independent.d().0, Some(1.1));
+        assert_eq!(differencing.d().0, Some(0.7));
+    }
 }

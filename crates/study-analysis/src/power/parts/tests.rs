@@ -112,6 +112,24 @@ fn one_pair_has_the_power_of_its_binomial_counts() {
     }
 }
 
+/// Who drops out answers nothing: half of 32 participants have the power of about 16.
+#[test]
+fn who_drops_out_of_pairs_does_not_count() {
+    let mut settings = settings(
+        PartWorld::Pairs(pair(&[0.7, 0.8])),
+        &[Test::Preferred],
+        1000,
+    );
+    settings.assumptions.slope = 0.25;
+    let [all, half] = [32, 16].map(|n| power(&settings, cell(n, 2, 4), 0));
+    settings.assumptions.dropout = 0.5;
+    let left = power(&settings, cell(32, 2, 4), 0);
+    assert!(
+        (left - half).abs() < 0.06 && left < all - 0.15,
+        "{left}: {half}, {all}"
+    );
+}
+
 /// With many answers abilities are the true ones, and the test of VAF is that of a
 /// correlation over them.
 #[test]
