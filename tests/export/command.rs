@@ -594,3 +594,16 @@ fn ages_are_whole_years_and_not_above_89() {
     let readme = fs::read_to_string(out.join("README.md")).unwrap();
     assert!(readme.contains("Ages above 89"), "{readme}");
 }
+
+/// The table of formats in docs/export.md has each format, and no other one.
+#[test]
+fn every_format_is_documented() {
+    let text = fs::read_to_string(repository("docs/export.md")).unwrap();
+    let rows = text
+        .lines()
+        .skip_while(|line| !line.starts_with("| format |"));
+    let rows = rows.skip(2).take_while(|line| line.starts_with("| `"));
+    let documented: BTreeSet<&str> = rows.filter_map(|row| row.split('`').nth(1)).collect();
+    let formats: BTreeSet<&str> = FORMATS.iter().map(|format| format.name).collect();
+    assert_eq!(documented, formats);
+}

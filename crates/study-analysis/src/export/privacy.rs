@@ -66,11 +66,9 @@ pub(super) fn notices(
 
 /// Row and column of each cell that a person typed.
 fn typed_cells<'t>(table: &'t Table<'_>) -> impl Iterator<Item = (usize, &'t str, &'t str)> {
-    // Who ran a session, on which device and front, stands in every row.
-    let once = |name: &str| !matches!(name, "operator" | "device_id" | "front_name");
     table.rows.iter().enumerate().flat_map(move |(at, row)| {
         (table.fields.iter().zip(row)).filter_map(move |(field, cell)| match cell {
-            Cell::Text(text) if field.free && once(&field.name) => {
+            Cell::Text(text) if field.free && !field.once => {
                 Some((at, field.name.as_str(), text.as_ref()))
             }
             _ => None,

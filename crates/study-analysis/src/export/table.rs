@@ -8,7 +8,7 @@ use super::select::{OLDEST, Selected, is_age};
 use std::borrow::Cow;
 use study_base::text::ModelId;
 use study_plan::protocol::columns::{
-    Column, IntervalColumn, Kind, ParticipantColumn, RatingColumn, Repeats,
+    Column, IntervalColumn, Kind, ParticipantColumn, RatingColumn, Repeats, Typed,
 };
 use study_plan::protocol::{Protocol, Question, Scale};
 use study_session::outcome::cell::{Cell, Header, Row};
@@ -56,6 +56,10 @@ pub(super) struct Field {
     pub(super) empty: Option<String>,
     /// Whether a person typed its cells.
     pub(super) free: bool,
+    /// Whether what was typed stands in every row of a session.
+    pub(super) once: bool,
+    /// Whether its cells tell when a session took place.
+    pub(super) tells_when: bool,
 }
 
 impl Field {
@@ -72,6 +76,8 @@ impl Field {
             ordered: false,
             empty: None,
             free: false,
+            once: false,
+            tells_when: false,
         }
     }
 
@@ -86,6 +92,9 @@ impl Field {
         };
         let mut field = Self::new(kind, name, column.meaning);
         field.unit = column.unit.map(str::to_owned);
+        field.free = column.typed != Typed::No;
+        field.once = column.typed == Typed::Once;
+        field.tells_when = column.tells_when;
         field.empty = column.empty.map(str::to_owned);
         if let Kind::Level(levels) = column.kind {
             let pair = |(value, label): &(&str, &str)| ((*value).to_owned(), (*label).to_owned());
@@ -385,7 +394,6 @@ impl<'a> Tables<'a> {
                 _ if column.repeats == Repeats::Covariate => field = covariate_field(name),
                 "vaf" | "rendered_vaf" | "delivered_vaf" => field.max = Some(1.0),
                 "level" | "level_proposed" => field = level_field(field, protocol),
-                "operator" | "device_id" | "front_name" | "remarks" | "reason" => field.free = true,
                 name if is_realization(name) => field.levels.clone_from(&levels),
                 _ => {}
             }
@@ -460,12 +468,11 @@ impl<'a> Tables<'a> {
             realizations: realizations.table(),
             intervals,
         };
-        let times = ["started_at", "rated_at", "operator"];
         for table in tables.all_mut() {
             table.drop_fields(|f| {
                 (f.free && !options.comments)
                     || (options.redact_ids && f.name == "row")
-                    || (options.redact_times && times.contains(&f.name.as_str()))
+                    || (options.redact_times && f.tells_when)
             });
         }
         if tables

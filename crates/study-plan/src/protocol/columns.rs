@@ -54,6 +54,21 @@ pub struct Column {
     pub optional: bool,
     /// Which studies have it.
     pub study: Studies,
+    /// Whether somebody typed its cells, so that they may tell who it was.
+    pub typed: Typed,
+    /// Whether its cells tell when a session took place: `--redact times` leaves it out.
+    pub tells_when: bool,
+}
+
+/// Whether somebody typed the cells of a column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Typed {
+    /// Nobody.
+    No,
+    /// Once for a session; it stands in every row.
+    Once,
+    /// For each row.
+    EachRow,
 }
 
 /// Which studies have a column.
@@ -78,7 +93,20 @@ impl Column {
             repeats: Repeats::Once,
             optional: false,
             study: Studies::All,
+            typed: Typed::No,
+            tells_when: matches!(kind, Kind::Time),
         }
+    }
+
+    const fn typed(mut self, typed: Typed) -> Self {
+        self.typed = typed;
+        self
+    }
+
+    /// Tells when a session took place, though its cells are no times.
+    const fn tells_when(mut self) -> Self {
+        self.tells_when = true;
+        self
     }
 
     const fn optional(mut self) -> Self {
@@ -235,8 +263,8 @@ table! {
             ("process", "a program of the laboratory"),
             ("manual", "a sample mounted by hand"),
         ], "kind of the device"),
-        DeviceId: text("device_id", "device that presented the attempt"),
-        Operator: text("operator", "who ran the session"),
+        DeviceId: text("device_id", "device that presented the attempt").typed(Typed::Once),
+        Operator: text("operator", "who ran the session").typed(Typed::Once).tells_when(),
         ToolVersion: text("tool_version", "version of this program"),
         ProtocolVersion: PROTOCOL_VERSION,
         Questions: Column::new(
@@ -247,7 +275,7 @@ table! {
         Corrected: flag("corrected", "whether an answer was corrected"),
         Declined: flag("declined", "whether an answer was declined; attempts.csv has the reason"),
         Remarks: text("remarks", "remarks made during the trial, in all attempts, joined by ` | `")
-            .empty("no remarks"),
+            .empty("no remarks").typed(Typed::EachRow),
         ReferenceS: number("reference_s", "duration of the reference prompt").unit("s")
             .empty(NEVER_PRESENTED),
         ExplorationS: number(
@@ -328,7 +356,7 @@ table! {
         ).unit("ms").empty("not measured").optional(),
         InputChannel: INPUT_CHANNEL.empty("not answered, or not by a person"),
         FrontName: text("front_name", "program of `--front` that asked the participant, as it says")
-            .empty("none: the program's own screen").optional(),
+            .empty("none: the program's own screen").optional().typed(Typed::Once),
         Group: text("group", "group of the participant").empty("the study has no groups")
             .optional().with_parts(),
         SessionId: text("session_id", "planned session, of `[[sessions]]`")
@@ -471,7 +499,8 @@ table! {
             ("excluded", "not analyzed"),
             ("withdrawn", "withdrew consent"),
         ], "state"),
-        Reason: text("reason", "why the state was set").empty("no reason was given"),
+        Reason: text("reason", "why the state was set").empty("no reason was given")
+            .typed(Typed::EachRow),
         Row: whole("row", "row of the schedule")
             .empty("the participant is a pilot, simulated or a no-show"),
         Pilot: PILOT,
