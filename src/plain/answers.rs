@@ -78,3 +78,14 @@ pub fn in_words(answer: &Answer, words: &Words) -> String {
         },
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_label_stands_after_its_number() {
+        let words = Words::default();
+        assert_eq!(labeled(&7, "very real", &words), "7 means: very real");
+    }
+}

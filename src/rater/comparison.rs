@@ -291,6 +291,23 @@ mod tests {
     use super::*;
 
     #[test]
+    fn what_is_farther_from_the_reference_is_rated_lower() {
+        let mean = |distance_n: f64| -> f64 {
+            let rating = |number| {
+                Comparing::new(3, number)
+                    .beside_reference(distance_n)
+                    .number()
+            };
+            (1..=50).filter_map(rating).sum::<f64>() / 50.0
+        };
+        let means = [0.0, 1.0, 3.0].map(mean);
+        assert!(
+            means[0] > 80.0 && means.is_sorted_by(|a, b| a > b),
+            "{means:?}"
+        );
+    }
+
+    #[test]
     fn without_noise_every_method_finds_the_comparison() {
         use study_plan::protocol::Interval;
         for method in [

@@ -5,6 +5,7 @@ use study_analysis::analyze::{Analysis, Rules, Value, analyze};
 use study_report::Source;
 use study_report::text::{Page, page};
 use study_session::outcome::ratings::Ratings;
+use study_stats::carry_over::{OrderedRating, carry_over};
 
 fn of(csv: &str) -> Analysis {
     let ratings = Ratings::read_csv("a.csv", csv.as_bytes(), None).unwrap();
@@ -101,6 +102,25 @@ fn an_ambiguous_trial_index_precedes_no_trial() {
     assert!(twice.values.reason("order_previous_rating/slope").is_some());
     let once = of(&table(some));
     assert!(once.values.number("order_previous_rating/slope").is_some());
+}
+
+/// Each repetition is a block: its first rating follows the last one of the block before,
+/// but could not have come in another place of it.
+#[test]
+fn carry_over_is_compared_with_the_orders_within_repetitions() {
+    let a = of(&table(some));
+    let mut ratings = Vec::new();
+    for (s, r, m) in (0..5).flat_map(|s| (0..8).map(move |i| (s, i / 4, i % 4))) {
+        ratings.push(OrderedRating {
+            subject: s as u32,
+            realization: m as u32,
+            block: r as u32,
+            rating: some(s, m, r).parse().unwrap(),
+        });
+    }
+    let slope = a.values.number("carry_over/slope").unwrap();
+    let expected = carry_over(&ratings).unwrap().slope;
+    assert!((slope - expected).abs() < 1e-12, "{slope}, {expected}");
 }
 
 /// Squares of 10³⁰⁸ exceed a double. What may be lost by that says so; no reason claims

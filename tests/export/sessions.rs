@@ -158,6 +158,19 @@ fn the_headline_of_pairs_and_tracks_is_that_of_the_analysis() {
             .sum::<u64>();
         assert_eq!(used as u64, trials, "{kind}");
         assert_eq!(out.join("thresholds.csv").exists(), kind == "staircase");
+        if kind == "staircase" {
+            let thresholds = table(&out.join("thresholds.csv"));
+            assert_eq!(thresholds.len(), 2 * 3, "two tracks of three participants");
+            for row in &thresholds {
+                let id = format!(
+                    "psy/{}/{}/posterior/threshold/median",
+                    row["participant"], row["track"]
+                );
+                let own = parts.iter().find(|p| p["part"] == row["part"].as_str());
+                let value = own.unwrap()["values"][&id].as_f64();
+                assert_eq!(row["threshold"].parse().ok(), value, "{id}");
+            }
+        }
     }
 }
 

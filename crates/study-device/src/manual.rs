@@ -203,6 +203,8 @@ impl Device for WithManual {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicU32, Ordering};
 
     fn id(name: &str) -> ModelId {
         ModelId::new(name).unwrap()
@@ -237,6 +239,51 @@ mod tests {
         let many: Vec<&ModelId> = names.iter().collect();
         let distinct: BTreeSet<String> = codes(1, &many).into_values().collect();
         assert_eq!(distinct.len(), 2000);
+    }
+
+    /// A motor that counts how often it is made limp.
+    struct Motor(Arc<AtomicU32>);
+
+    impl Device for Motor {
+        fn identity(&self) -> Identity {
+            Manual::default().identity()
+        }
+
+        fn load(&mut self, _: &Stimulus<'_>, _: Limits, _: Duration) -> Result<(), DeviceError> {
+            Ok(())
+        }
+
+        fn start(&mut self, _: Duration) -> Result<(), DeviceError> {
+            Ok(())
+        }
+
+        fn stop(&mut self, _: Duration) -> Result<(), DeviceError> {
+            Ok(())
+        }
+
+        fn limp(&mut self, _: Duration) {
+            self.0.fetch_add(1, Ordering::Relaxed);
+        }
+
+        fn poll(&mut self, _: Duration) -> Vec<Report> {
+            Vec::new()
+        }
+    }
+
+    #[test]
+    fn the_motor_is_limp_while_a_sample_is_mounted() {
+        let limped = Arc::new(AtomicU32::new(0));
+        let mut device = WithManual::new(Box::new(Motor(limped.clone())));
+        let what = Stimulus {
+            model: "the-real-switch",
+            table: None,
+            code: "417",
+            by_hand: true,
+            allow_uncertified: false,
+        };
+        let limits = device.identity().limits;
+        device.load(&what, limits, Duration::ZERO).unwrap();
+        assert_eq!(limped.load(Ordering::Relaxed), 1);
     }
 
     #[test]

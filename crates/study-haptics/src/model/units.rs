@@ -213,6 +213,8 @@ impl Mechanism {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::file::SCALAR_KEYS;
+    use study_wire::mechanism::SCALARS;
 
     /// 20 N at 30 mm are 0.6 N·m, and 30 mm along the arc are 1 rad.
     #[test]
@@ -222,6 +224,36 @@ mod tests {
         assert!((degrees - 57.295_779_513).abs() < 1e-9, "{degrees}");
         assert!((Units::Degrees.of_n(20.0, 30.0) - 0.6).abs() < 1e-12);
         assert_eq!(Units::Linear.of_mm(3.0, 30.0), 3.0);
+    }
+
+    /// Every number of a mechanism is converted as the unit in its key says.
+    #[test]
+    fn a_mechanism_is_converted_by_the_units_of_its_keys() {
+        let profile = Profile {
+            first_mm: 1.0,
+            step_mm: 1.0,
+            n: vec![1.0; 2],
+        };
+        let mut mechanism = Mechanism {
+            scalars: Scalars::from_array([1.0; SCALARS]),
+            detent: profile.clone(),
+            friction: profile,
+            recorded_hz: None,
+        };
+        let (x, f, m) = (2.0, 3.0, 5.0);
+        mechanism.rescale(Scale { x, f, m });
+        for (key, found) in SCALAR_KEYS.iter().zip(mechanism.scalars.to_array()) {
+            let expected = match key.split_once('_').map_or("", |(_, unit)| unit) {
+                "kg" => m,
+                "n_per_mm" | "n_s_per_mm" => f / x,
+                "mm" | "mm_s" | "slip_mm" => x,
+                "n" => f,
+                "" => 1.0,
+                other => panic!("{other}"),
+            };
+            assert_eq!(found, expected, "{key}");
+        }
+        assert_eq!((mechanism.detent.step_mm, mechanism.friction.n[0]), (x, f));
     }
 
     #[test]
