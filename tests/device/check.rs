@@ -134,6 +134,7 @@ fn without_a_device_there_is_one_verdict() {
 #[test]
 fn a_path_is_followed_and_recorded_completely() {
     use study_device::probe::{ProbePath, record};
+    use study_wire::message::DeviceState;
     let rate_hz = 1000.0;
     let x_mm: Vec<f64> = (0..3000)
         .map(|i| 17.5 - 12.0 * (std::f64::consts::TAU * 0.5 * f64::from(i) / rate_hz).cos())
@@ -155,11 +156,15 @@ fn a_path_is_followed_and_recorded_completely() {
     }
     let most_n = recording.f_n.iter().fold(0.0f64, |m, f| m.max(f.abs()));
     assert!((3.0..12.0).contains(&most_n), "{most_n}");
+    // The device is limp afterwards, and after a refusal, too.
     assert_eq!(bench.firmware.held_n(), 0.0);
+    assert_eq!(bench.firmware.state(), DeviceState::Limp);
     // beyond the stroke, and above the velocity limit
     let refusal = |path: &ProbePath| {
         let mut bench = Bench::new(Options::default());
-        record(&mut bench, 4, path, &mut |_| {}).unwrap_err()
+        let refused = record(&mut bench, 4, path, &mut |_| {}).unwrap_err();
+        assert_eq!(bench.firmware.state(), DeviceState::Limp);
+        refused
     };
     let mut far = path.clone();
     far.x_mm[1500] = 70.0;
