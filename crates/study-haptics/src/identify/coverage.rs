@@ -1,9 +1,12 @@
 //! Where recordings went, for the model file.
 
+use super::evidence::Term;
 use super::folds::strokes;
-use crate::model::coverage::Coverage;
+use super::problem::{Estimate, Warning};
+use crate::model::coverage::{Coverage, Determined};
 use crate::model::{Mechanism, Realization};
 use crate::recording::Recording;
+use std::collections::BTreeMap;
 
 /// Places of the map.
 const PLACES: usize = 20;
@@ -11,6 +14,36 @@ const PLACES: usize = 20;
 const CLASSES: usize = 6;
 /// Share of the range at either side that is its end, as for the full strokes of a playback.
 const END: f64 = 0.2;
+
+/// What recordings say of mass and damping, by the names in a model file, without a value where they do not
+/// show the term: nothing is known of one that they do not bound either.
+pub(super) fn determined(terms: &[Estimate]) -> BTreeMap<String, Determined> {
+    let named = |term: Term| match term {
+        Term::Mass => "m_kg",
+        Term::Damping => "b_n_s_per_mm",
+    };
+    let of = |term: &Estimate| {
+        let evidence = [Term::Mass, Term::Damping];
+        let of = evidence.into_iter().find(|t| t.as_str() == term.name)?;
+        let known = Determined {
+            value: term.identified.then_some(term.value),
+            standard_error: term.standard_error.filter(|_| term.identified),
+            upper_bound: term.upper_bound,
+        };
+        Some((named(of).to_owned(), known))
+    };
+    terms.iter().filter_map(of).collect()
+}
+
+/// A note with what recordings cannot bound.
+pub(super) fn note(note: Option<String>, warnings: &[Warning]) -> Option<String> {
+    let unbounded = warnings.iter().filter_map(|warning| match warning {
+        Warning::LeftOut(evidence) if evidence.upper_bound.is_none() => Some(evidence.to_string()),
+        _ => None,
+    });
+    let all: Vec<String> = note.into_iter().chain(unbounded).collect();
+    (!all.is_empty()).then(|| all.join("; "))
+}
 
 /// The coverage of a realization by the recordings that it was identified from.
 pub fn of(realization: &Realization, recordings: &[&Recording]) -> Coverage {

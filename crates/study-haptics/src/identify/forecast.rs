@@ -98,7 +98,8 @@ pub fn of(motion: impl Fn(f64) -> Motion, total_s: f64, sensors: Sensors) -> Opt
         .collect();
     let fewest = both.iter().min().copied()? as f64 * every;
     let evidence = evidence::of(&[&recording], range_mm)?;
-    let twice = |evidence: &Evidence| evidence.upper_bound.map(|bound| 2.0 * bound);
+    let shown = |evidence: &Evidence| evidence.upper_bound.filter(|_| evidence.shows);
+    let twice = |evidence: &Evidence| shown(evidence).map(|bound| 2.0 * bound);
     Some(Forecast {
         range_mm,
         least: [twice(&evidence[0]), twice(&evidence[1])],

@@ -67,7 +67,8 @@ pub struct Estimate {
     pub standard_error: Option<f64>,
     /// What the term is at most, with a confidence of 99 %, in the unit.
     pub upper_bound: Option<f64>,
-    /// Whether the recordings determine it: otherwise it is left out, or no more than set.
+    /// Whether the recordings determine it: otherwise it is left out, or no more than set. A table leaves out a term that they
+    /// determine, with a warning, if least squares would find too little of it.
     pub identified: bool,
 }
 
@@ -79,7 +80,7 @@ impl From<&Evidence> for Estimate {
             value: evidence.value,
             standard_error: Some(evidence.standard_error),
             upper_bound: evidence.upper_bound,
-            identified: evidence.is_carried(),
+            identified: evidence.is_found(),
         }
     }
 }
