@@ -48,6 +48,8 @@
 #![cfg_attr(not(test), no_std)]
 
 pub mod certificate;
+#[cfg(test)]
+mod draw;
 pub mod elements;
 pub mod estimate;
 pub mod frame;

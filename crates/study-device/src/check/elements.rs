@@ -1,20 +1,18 @@
 //! Test of elements, which a device may play from minor version 2 on.
 
 use super::exchange::Exchange;
+use super::playing::peak_of;
 use super::{ClauseResult, FORCE_N, fail};
 use crate::host::upload::{Upload, elements_requests};
-use std::time::Duration;
 use study_wire::elements::{MAX_SPRINGS, Spring};
 use study_wire::message::{
-    Commit, DeviceState, ElementsBegin, FixedVec, Identity, MINOR, Node, Play, Refusal, Request,
-    Stop,
+    Commit, DeviceState, ElementsBegin, FixedVec, Identity, MINOR, Node, Refusal, Request,
 };
 
 /// Nodes of the realization.
 const NODES: u16 = 9;
 /// Force of each spring, N.
 const SPRING_N: f64 = 0.1;
-const PLAYED: Duration = Duration::from_secs(1);
 
 /// The values of a node: C, both dampings, the springs.
 type Values = [f64; 3 + MAX_SPRINGS];
@@ -80,29 +78,10 @@ pub(super) fn plays(exchange: &mut Exchange<'_>) -> ClauseResult {
     exchange.expect_refusal(wrong, Refusal::Checksum)?;
     send(exchange, &upload)?;
     exchange.expect_done(commit(&upload))?;
-    let playback = exchange.next_playback();
-    exchange.expect_done(Request::Play(Play {
-        playback,
-        crc: upload.crc,
-        longest_ms: 60_000,
-        every: None,
-    }))?;
-    exchange.wait(PLAYED)?;
-    let outcome = exchange.outcome()?;
-    exchange.expect_done(Request::Stop(Stop { playback }))?;
-    if !outcome.state.applies_force() {
-        return fail(format!(
-            "the playback ended early: {}, {}; hold the handle near the middle of its stroke",
-            outcome.state, outcome.fault
-        ));
-    }
-    if outcome.peak_force_n > FORCE_N.min(device.force_n) {
-        return fail(format!("{} N", outcome.peak_force_n));
-    }
+    let peak_n = peak_of(exchange, upload.crc, FORCE_N.min(device.force_n))?;
     Ok(format!(
-        "{} refused, one played; force up to {:.2} N",
-        refused.len(),
-        outcome.peak_force_n
+        "{} refused, one played; force up to {peak_n:.2} N",
+        refused.len()
     ))
 }
 

@@ -48,6 +48,34 @@ fn play(
     })
 }
 
+/// Plays for a second what is loaded; its largest force, N, which may not be above `limit_n`.
+pub(super) fn peak_of(
+    exchange: &mut Exchange<'_>,
+    crc: u32,
+    limit_n: f64,
+) -> Result<f64, CheckFailure> {
+    let playback = exchange.next_playback();
+    exchange.expect_done(Request::Play(Play {
+        playback,
+        crc,
+        longest_ms: 60_000,
+        every: None,
+    }))?;
+    exchange.wait(SECOND)?;
+    let outcome = exchange.outcome()?;
+    exchange.expect_done(Request::Stop(Stop { playback }))?;
+    if !outcome.state.applies_force() {
+        return fail(format!(
+            "the playback ended early: {}, {}; hold the handle near the middle of its stroke",
+            outcome.state, outcome.fault
+        ));
+    }
+    if outcome.peak_force_n > limit_n {
+        return fail(format!("{} N", outcome.peak_force_n));
+    }
+    Ok(outcome.peak_force_n)
+}
+
 fn stop_request(playback: &Playback) -> Request {
     Request::Stop(Stop {
         playback: playback.number,

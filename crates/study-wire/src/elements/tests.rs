@@ -1,6 +1,7 @@
 //! Forces with known answers, and the energy balance under adversarial motions.
 
 use super::*;
+use crate::draw::Draw;
 use core::f64::consts::TAU;
 
 const NONE: &[f64] = &[];
@@ -171,23 +172,6 @@ fn a_latch_has_to_release_more_than_a_step_can_draw() {
     assert!((of(4.0, 200.0) - 3.0).abs() < 1e-9);
     // a step of 0.1 mm is more than half of 0.15 mm
     assert!(of(2.15, 200.0) < 0.0);
-}
-
-/// A small generator, so that the test needs no other crate.
-struct Draw(u64);
-
-impl Draw {
-    fn unit(&mut self) -> f64 {
-        // xorshift64*
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        (self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn within(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.unit()
-    }
 }
 
 /// A realization of all kinds of springs, with profiles that vary from node to node.

@@ -1,6 +1,7 @@
 //! Forces with known answers, and the energy balance under adversarial motions.
 
 use super::*;
+use crate::draw::Draw;
 use crate::predict::Motion;
 use crate::sum::Sum;
 use core::f64::consts::TAU;
@@ -165,23 +166,6 @@ fn parameters_that_are_no_passive_mechanism_are_refused() {
         mechanism(scalars(), &detent[..1], &friction).check(300.0),
         Err(Flaw::Profile)
     );
-}
-
-/// A small generator, so that the test needs no other crate.
-struct Draw(u64);
-
-impl Draw {
-    fn unit(&mut self) -> f64 {
-        // xorshift64*
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        (self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn within(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.unit()
-    }
 }
 
 /// ∫ D from the first value, N·mm: exact, because D is cubic in each interval.
