@@ -206,6 +206,14 @@ fn ids_and_times_are_replaced_and_left_out_if_asked() {
             }
         }
     }
+    // Times alone: what tells when a session took place, and nothing else.
+    let (out, _) = export(&folder, "csv", home.path(), "times", &["--redact", "times"]);
+    let (all, _) = csv(&home.path().join("plain/ratings.csv"));
+    let (kept, _) = csv(&out.join("ratings.csv"));
+    let gone: BTreeSet<&str> = (all.iter().filter(|name| !kept.contains(name)))
+        .map(String::as_str)
+        .collect();
+    assert_eq!(gone, ["operator", "rated_at", "started_at"].into());
     let out = home.path().join("csv");
     let (head, _) = csv(&out.join("ratings.csv"));
     assert!(!head.contains(&"row".to_owned()) && head.contains(&"exploration_s".to_owned()));
