@@ -115,30 +115,32 @@ fn an_upper_bound_covers_and_twice_the_bound_is_found() {
     for set in 0..sets {
         let phase = 0.5 * f64::from(set);
         let nothing = evidence(&slow_target(&mut stream, phase, 0.0, 0.0));
-        assert!(!nothing.is_carried(), "{nothing:?}");
+        assert!(!nothing.carried, "{nothing:?}");
         let bound = nothing.upper_bound.unwrap();
         let planted = 0.7 * bound;
         let small = evidence(&slow_target(&mut stream, phase, 0.0, planted));
         covered += usize::from(small.upper_bound.unwrap() >= planted);
         let large = evidence(&slow_target(&mut stream, phase, 0.0, 2.0 * bound));
-        found += usize::from(large.is_carried());
+        found += usize::from(large.carried);
     }
     assert!(covered >= 38, "{covered} of {sets}");
     assert!(found >= 36, "{found} of {sets}");
 }
 
-/// The acceleration of an encoder at 200 Hz is noise: a mass is not claimed even where it is large
-/// enough to be felt, and no bound is invented.
+/// The acceleration of an encoder at 200 Hz is noise, by which a table would find a third of the mass: none is claimed there, even where it
+/// is large enough to be felt. The estimate beside the bound has no such bias.
 #[test]
 fn a_mass_that_the_encoder_cannot_show_is_not_claimed() {
     let mut stream = Stream::new(25, &["evidence"]);
     let recording = slow_target(&mut stream, 0.0, 0.05, 0.03);
     let [mass, damping] = evidence::of(&[&recording], recording.range_mm()).unwrap();
-    assert!(!mass.is_carried() && mass.reliability < 0.5, "{mass:?}");
+    assert!(!mass.carried && mass.reliability < 0.5, "{mass:?}");
+    let errors = (mass.value - 0.05) / mass.standard_error;
+    assert!(errors.abs() < 3.0, "{mass:?}");
     assert!(
         mass.upper_bound.is_none_or(|bound| bound > 0.05),
         "{mass:?}"
     );
-    assert!(damping.is_carried(), "{damping:?}");
+    assert!(damping.carried, "{damping:?}");
     assert!((damping.value - 0.03).abs() < 0.1 * 0.03, "{damping:?}");
 }

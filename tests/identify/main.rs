@@ -1,6 +1,7 @@
 //! From trajectories and recordings to model files.
 
 mod bad_input;
+mod bounds;
 mod cli;
 mod compare;
 mod doubtful;

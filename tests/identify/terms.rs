@@ -3,10 +3,13 @@
 #![allow(clippy::unwrap_used, reason = "a test that fails says where")]
 
 use crate::estimators_tables::{identified, motion, target};
+use study_haptics::identify::evidence::Term;
 use study_haptics::identify::grid::{self, Plan};
 use study_haptics::identify::method::{Start, Terms, Window};
 use study_haptics::identify::resample::Resample;
-use study_haptics::identify::{Ewls, Friction, Hat, Method, Passive, Training, TwoSided, Width};
+use study_haptics::identify::{
+    Ewls, Friction, Hat, Method, Passive, Training, TwoSided, Warning, Width,
+};
 use study_wire::predict::{Direction, DirectionState, Lookup, Motion};
 
 /// Terms that are left out are 0, and the file says so.
@@ -141,5 +144,10 @@ fn the_scan_goes_below_a_hundredth_of_the_travel_while_the_error_falls() {
     let found = identified(&r, Method::Friction(Friction::default()), 1.0);
     let delta = found.realization.direction.delta_mm().unwrap();
     assert!((0.035..=0.055).contains(&delta), "{delta}");
-    assert_eq!(found.warnings, []);
+    // there is no mass, and the output says so
+    let [Warning::LeftOut(mass)] = found.warnings[..] else {
+        panic!("{:?}", found.warnings)
+    };
+    assert_eq!((mass.term, mass.found), (Term::Mass, false));
+    assert_eq!(found.realization.positive.m_kg[0], 0.0);
 }

@@ -201,7 +201,7 @@ impl<'r> Training<'r> {
                     Term::Damping => &mut terms.b,
                 };
                 if *kept {
-                    *kept = evidence.is_carried();
+                    *kept = evidence.carried;
                     asked.push(*evidence);
                 }
             }
@@ -341,11 +341,16 @@ pub struct Identified {
 }
 
 impl Identified {
-    /// What the recordings say of terms, and a warning for each that is left out.
+    /// What the recordings say of terms, and a warning for each that is left out, or that is there without being shown.
     fn add_terms(&mut self, evidence: Vec<Evidence>) {
         self.terms.extend(evidence.iter().map(Estimate::from));
-        let left_out = evidence.into_iter().filter(|e| !e.is_carried());
-        self.warnings.extend(left_out.map(Warning::LeftOut));
+        let warning = |evidence: Evidence| match (evidence.carried, evidence.found) {
+            (true, true) => None,
+            (true, false) => Some(Warning::Ambiguous(evidence)),
+            (false, _) => Some(Warning::LeftOut(evidence)),
+        };
+        self.warnings
+            .extend(evidence.into_iter().filter_map(warning));
     }
 }
 

@@ -1,71 +1,67 @@
-//! Which terms a recording carries: whether mass and damping predict force on data left out.
+//! Which terms a recording carries: mass and damping with their errors, and with a bound where they are left out.
 //!
 //! The question is asked of a reference model with one mass and one damping,
 //!
 //! ```text
-//! F = Σ_j h_j(x) (C_j + z D_j) + b v + m a + s z exp(−(5 v / v_rms)²)
+//! F = Σ_j h_j(x) (C_j + z D_j) + b v + m a + (s z + r sign(a)) exp(−(5 v / v_rms)²)
 //! ```
 //!
 //! with the hat functions h_j, the direction state z that fits best (the sign of v, or play or Dahl of several lengths)
-//! and a ridge on the second differences of C and D. It is linear, and its normal equations are sums over blocks of consecutive samples, so that leaving a
-//! block out is a subtraction. A term is carried if
+//! and a ridge on the second differences of C and D. Two different things are asked.
 //!
-//! * its regressor, after everything that the other terms explain is removed, varies by more than
-//!   its own noise: the reliability κ = 1 − n σ² / S is at least [`LEAST_RELIABILITY`], with S the
-//!   remaining sum of squares and σ² the noise of single samples, from third differences;
-//! * its estimate is above [`LEAST_RATIO`] standard errors, which come from the sums over the
-//!   blocks and therefore allow for errors that are correlated within a block;
-//! * the blocks are predicted better with it than without it when they are left out.
+//! **Does a table take the term up?** A table is identified by least squares, from velocity and acceleration as they are, and is there to predict. It takes up
+//! what least squares finds and what predicts data left out (`carried`), unless the answer to the second question contradicts (`reference`).
 //!
-//! The last column of the model takes what friction does at low speed, and what an encoder makes of
-//! the sign of v there: without it dry friction appears as damping. How much is not known, so that
-//! the difference between the estimates with and without the column counts as an error in the bound.
+//! **Is it the mass, or the damping?** What predicts may be friction at reversals, or an encoder's steps; and where velocity and
+//! acceleration are differences of encoder counts, least squares finds too little of a term (`reference`):
 //!
-//! Quantization is well conditioned noise: a condition number does not see it, these do. A term that
-//! is not carried has the upper bound (max(θ, 0) + 2.33 s) / κ, which the truth stays below with a
-//! confidence of 99 %, and of which twice is found in 90 % of repetitions. It is computed from
-//! averages of 1, 2, 4, … consecutive samples, the fewest whose κ suffices: slow motions that single
-//! samples drown in noise still bound a term.
+//! * *Estimate.* m and b are estimated with instruments w (`instruments`): derivatives of the position over a scale of time that do not share
+//!   the noise of the differences. With the instrument free of everything that the rest of the model explains, and scaled to Σ w a = 1,
+//!   the estimate is θ = Σ w F. It is consistent at every scale; that of largest (Σ w a)²/Σ w² is used.
+//! * *Error.* θ − m = Σ w (F − m a − …), and the residual in the bracket, its noise, its drift and what the model does not have, are
+//!   correlated in time in an unknown way. What such a residual does to a sum with w is seen by shifting the two against one
+//!   another in time (`spread`): V(m) is the mean square of the sum over a hundred cyclic shifts, with both scaled by the
+//!   residual's local size. V(m) is a parabola, because the residual has −m times the noise of a. What friction does at low speed and at a reversal
+//!   is not known, and would be taken for damping and mass: the columns of s and r take it. The largest difference of the estimates without s,
+//!   and with rules of z that fit nearly as well, counts as an error, too.
+//! * *Found.* The recordings show a term if blocks of samples that are left out are predicted better with it, and θ exceeds four errors (a search over two
+//!   terms and many recordings meets three by chance). Where twice the bound would be found, it is enough that θ exceeds four errors without that
+//!   of the model, and is above 0 in all models that fit nearly as well; or that it exceeds 2.326 errors (99 %), and the squared
+//!   error on the blocks is a fifth larger without it.
+//! * *Bound.* The upper bound is the largest m that a test does not reject, (m − θ)² ≤ 2.576² V(m) (Fieller's limit), or half the mass that
+//!   exceeds (4 + 1.881) √V(m), and is therefore found with a probability of 97 %, if that is larger; the error of the model counts
+//!   twice there, because a term changes it. Fieller's limit does not exist if Σ w a is not 2.7 times what the noise of a makes of
+//!   it; the recording then shows no acceleration.
 //!
-//! Reference for κ: Fuller, Measurement Error Models, 1987, section 1.1; for the standard
-//! errors: Liang & Zeger 1986, Biometrika 73:13.
+//! **One press and release.** With fewer than [`ENOUGH_STROKES`] strokes, hardly a place is passed twice in the same direction. Then v and a are
+//! functions of position and direction, and so is F − m a − b v for *every* m and b: whatever was measured, a force that depends on position and
+//! direction alone explains it with any mass. Nothing tells a mass from the shape of the force within the few counts in which the
+//! speed turns, so that it has **no bound**. Damping has one, because friction does not push: it cannot exceed what it would be if all
+//! hysteresis were damping (`dissipation`). The same bound serves where Fieller's limit of a damping does not exist.
+//!
+//! References for the instruments: Fuller, Measurement Error Models, 1987, section 1.4; for the bound: Fieller 1954, J. R. Stat. Soc. B
+//! 16:175; for the shifts: Chatfield, The Analysis of Time Series, 2004, section 8.1 (cross-correlations of shifted series); for errors of blocks:
+//! Liang & Zeger 1986, Biometrika 73:13.
 
+mod carried;
+mod dissipation;
+mod equations;
+mod instruments;
 pub mod lag;
+mod noise;
+mod reference;
+mod spread;
 
-use super::banded::Banded;
-use super::vaf::motion;
-use crate::recording::{Recording, acceleration, velocity};
+use super::folds::strokes;
+use crate::recording::Recording;
+use carried::LEAST_RELIABILITY;
+use equations::{BLOCKS, PER_NODE};
+pub(in crate::identify) use noise::white_noise_n;
+use reference::{Found, Reference};
 use std::fmt;
-use study_wire::predict::{Direction, DirectionState, Lookup, locate};
 
-/// Least reliability of a regressor.
-pub const LEAST_RELIABILITY: f64 = 0.8;
-/// Least ratio of an estimate to its standard error.
-pub const LEAST_RATIO: f64 = 3.0;
-/// Blocks of consecutive samples that are left out in turn, over all recordings.
-const BLOCKS: usize = 20;
-/// Lengths of the play that are tried, as shares of the travel.
-const DELTAS: [f64; 6] = [0.005, 0.01, 0.02, 0.04, 0.08, 0.16];
-/// Weight of the squared second differences, in units of a node's mean information.
-const RIDGE: f64 = 3e-3;
-/// Share of a node's information that keeps unknowns at 0 where they are not excited.
-const FLOOR: f64 = 1e-9;
-/// Quantile of the normal distribution of the one-sided bound of 99 %.
-const ONE_SIDED: f64 = 2.326;
-/// Fewest samples per unknown of averages that bound a term.
-const SAMPLES_PER_UNKNOWN: usize = 3;
-/// Most nodes of the reference model.
-const MOST_NODES: usize = 200;
-/// Speeds below this share of the rms speed are low.
-const LOW_SPEED: f64 = 0.2;
-/// White noise has at most this ratio of variances over two samples and over one.
-const WHITE: f64 = 1.5;
-/// Unknowns beside the nodes: m, b, s.
-const BORDER: usize = 3;
-/// Unknowns per node: C and D.
-const PER_NODE: usize = 2;
-/// Half-bandwidth: second differences reach two nodes.
-const HALF: usize = 2 * PER_NODE;
+/// With fewer strokes, nothing tells a mass or a damping from a force that depends on position and direction.
+pub const ENOUGH_STROKES: usize = 4;
 
 study_base::named! {
     /// A term of a realization that a recording may not carry.
@@ -79,7 +75,7 @@ study_base::named! {
 
 impl Term {
     /// Mass and damping, in the order of the unknowns.
-    const BOTH: [Self; 2] = [Self::Mass, Self::Damping];
+    pub(super) const BOTH: [Self; 2] = [Self::Mass, Self::Damping];
 
     /// The unit of its values.
     pub fn unit(self) -> &'static str {
@@ -114,360 +110,142 @@ pub struct Evidence {
     pub term: Term,
     /// Its estimate in the reference model, kg or N·s/mm.
     pub value: f64,
-    /// The standard error of the estimate, under errors correlated within blocks.
+    /// The standard error of the estimate, with that of the model.
     pub standard_error: f64,
-    /// By how much the estimate differs if friction does not depend on the speed.
-    pub model_error: f64,
-    /// The share of the regressor's variance, beside the other terms, that is not its noise: 0
-    /// to 1.
-    pub reliability: f64,
-    /// By which share the squared error on blocks left out is larger without the term.
-    pub gain: f64,
-    /// What the term is at most, with a confidence of 99 %; `None` if its regressor stays below its
-    /// noise on every scale of time.
+    /// Whether the recordings show the term.
+    pub found: bool,
+    /// What the term is at most, with a confidence of 99 %; `None` if the recordings do not bound it.
     pub upper_bound: Option<f64>,
+    /// What would be found in 97 % of repetitions, kg or N·s/mm; `None` if nothing would.
+    pub shown_from: Option<f64>,
+    /// Whether that is twice the bound. It is more where friction alone bounds a damping better than what tells the two apart.
+    pub shows: bool,
+    /// Whether there are [`ENOUGH_STROKES`].
+    pub enough_strokes: bool,
+    /// Whether a table takes the term up.
+    pub carried: bool,
+    /// The share of the variance of its regressor, beside the other terms, that is not noise: 0 to 1.
+    pub reliability: f64,
 }
 
 impl Evidence {
-    /// Whether the recordings carry the term.
-    pub fn is_carried(&self) -> bool {
-        self.reliability >= LEAST_RELIABILITY
-            && self.value > LEAST_RATIO * self.standard_error
-            && self.gain > 0.0
-    }
-
-    fn bound(&self) -> f64 {
-        let error = self.standard_error.hypot(self.model_error);
-        (self.value.max(0.0) + ONE_SIDED * error) / self.reliability
+    /// What recording would show the term.
+    fn advice(&self) -> &'static str {
+        match self.term {
+            Term::Mass => "many strokes at several speeds, some of them fast, would show one",
+            Term::Damping => "several strokes at different speeds would show one",
+        }
     }
 }
 
-/// `mass: not identified by the recordings, at most 12.00 g (99 %)`.
+/// `mass: not identified by the recordings, at most 12.00 g (99 %)`, or why it was left out, or why it was not.
 impl fmt::Display for Evidence {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let term = self.term.as_str();
-        match self.upper_bound {
-            Some(bound) => {
-                let bound = self.term.shown(bound);
-                write!(
+        let (term, of) = (self.term.as_str(), self.term.regressor());
+        if self.found {
+            let [value, error] = [self.value, self.standard_error].map(|v| self.term.shown(v));
+            write!(f, "{term}: {value} ± {error}")?;
+            return match (self.carried, self.reliability < LEAST_RELIABILITY) {
+                (true, _) => Ok(()),
+                (false, true) => write!(
                     f,
-                    "{term}: not identified by the recordings, at most {bound} (99 %)"
-                )
-            }
-            None => write!(
+                    ", left out, because a table would find too little of it: only {:.0} % of the variance of the {of} is not \
+                     noise; a filter or a sensor of the {of} would help",
+                    100.0 * self.reliability
+                ),
+                (false, false) => write!(
+                    f,
+                    ", left out, because what was left out is predicted as well without it"
+                ),
+            };
+        }
+        write!(f, "{term}: not identified by the recordings")?;
+        match self.upper_bound.map(|bound| self.term.shown(bound)) {
+            Some(bound) => write!(f, ", at most {bound} (99 %)")?,
+            None => write!(f, " and not bounded")?,
+        }
+        if self.carried {
+            return write!(
                 f,
-                "{term}: not identified by the recordings, which do not show the {} above its noise",
-                self.term.regressor()
+                "; it is kept because it predicts what was left out, but friction that depends on the speed may look like it"
+            );
+        }
+        match (self.enough_strokes, self.shows, self.upper_bound) {
+            (true, true, _) => Ok(()),
+            (false, ..) => write!(
+                f,
+                "; with fewer than {ENOUGH_STROKES} strokes a force that depends on position and direction looks like any {term}; {}",
+                self.advice()
+            ),
+            (true, false, Some(_)) => write!(
+                f,
+                "; no {term} can be told from friction by this motion; {}",
+                self.advice()
+            ),
+            (true, false, None) => write!(
+                f,
+                ", because the {of} is explained by position and direction or stays below its noise; {}",
+                self.advice()
             ),
         }
     }
 }
 
-/// What the recordings say about mass and damping, each beside the other if that one is carried.
+/// What the recordings say about mass and damping, each beside the other if that one is found.
 /// `range_mm` is where the nodes are. `None` if there are too few samples for blocks.
 pub fn of(recordings: &[&Recording], range_mm: [f64; 2]) -> Option<[Evidence; 2]> {
-    let mut found = at_scale(recordings, range_mm)?;
-    let mut averages: Vec<Recording> = recordings.iter().map(|r| (*r).clone()).collect();
-    let unbounded = |found: &[Evidence; 2]| found.iter().any(|e| e.upper_bound.is_none());
-    while unbounded(&found) {
-        averages = averages.iter().map(pairs_averaged).collect();
-        let shorter: Vec<&Recording> = averages.iter().filter(|r| r.len() > 3).collect();
-        let samples: usize = shorter.iter().map(|r| r.len()).sum();
-        let unknowns = PER_NODE * nodes(recordings, range_mm).len();
-        if samples < SAMPLES_PER_UNKNOWN * unknowns {
-            break;
-        }
-        let coarse = at_scale(&shorter, range_mm)?;
-        for (evidence, coarse) in found.iter_mut().zip(coarse) {
-            evidence.upper_bound = evidence.upper_bound.or(coarse.upper_bound);
-        }
-    }
-    Some(found)
-}
-
-/// The means of every two consecutive samples, with velocity and acceleration from those of the
-/// position.
-fn pairs_averaged(recording: &Recording) -> Recording {
-    let means = |column: &[f64]| -> Vec<f64> {
-        let pairs = column.chunks_exact(2);
-        pairs.map(|pair| 0.5 * (pair[0] + pair[1])).collect()
-    };
-    let (t_s, x_mm) = (means(&recording.t_s), means(&recording.x_mm));
-    let differences = |of: fn(&[f64], &[f64], usize) -> f64| match t_s.len() {
-        0..3 => Vec::new(),
-        n => (0..n).map(|i| of(&t_s, &x_mm, i)).collect(),
-    };
-    Recording {
-        v_mm_s: differences(velocity),
-        a_m_s2: differences(acceleration),
-        f_n: means(&recording.f_n),
-        t_s,
-        x_mm,
-        header: Vec::new(),
-        warnings: Vec::new(),
-        name: recording.name.clone(),
-        sha256: String::new(),
-    }
-}
-
-/// The evidence of the samples as they are.
-fn at_scale(recordings: &[&Recording], range_mm: [f64; 2]) -> Option<[Evidence; 2]> {
-    let samples: usize = recordings.iter().map(|r| r.len()).sum();
-    let nodes = nodes(recordings, range_mm);
-    if samples < BLOCKS * (PER_NODE + 2) {
+    let enough =
+        |of: &[&Recording]| of.iter().map(|r| r.len()).sum::<usize>() >= BLOCKS * (PER_NODE + 2);
+    if !enough(recordings) {
         return None;
     }
-    let reference = rules(range_mm)
-        .filter_map(|rule| {
-            let equations = Equations::of(recordings, &nodes, rule);
-            let error = equations.squared_error([true; 2])?;
-            Some((error, equations))
-        })
-        .min_by(|a, b| a.0.total_cmp(&b.0))?
-        .1;
-    let noise = [
-        noise(recordings, |r| &r.a_m_s2),
-        noise(recordings, |r| &r.v_mm_s),
-    ];
-    let with = |kept: [bool; 2], term: usize| reference.evidence(kept, term, noise[term]);
+    let count = |r: &&Recording| strokes(r).last().map_or(0, |last| last + 1);
+    let enough_strokes = recordings.iter().map(count).sum::<usize>() >= ENOUGH_STROKES;
+    let carried = carried::of(recordings, range_mm)?;
+    let averages = noise::averaged(recordings);
+    let averages: Vec<&Recording> = (averages.iter())
+        .map(|r| &**r)
+        .filter(|r| r.len() > 3)
+        .collect();
+    let reference = Reference::new(&averages, range_mm, enough_strokes)?;
+    let found = each_beside_the_other(
+        |kept, term| reference.evidence(kept, term),
+        Found::is_found,
+        |found| found.value / found.standard_error,
+    )?;
+    Some([0, 1].map(|term| Evidence {
+        term: Term::BOTH[term],
+        value: found[term].value,
+        standard_error: found[term].standard_error,
+        found: found[term].is_found(),
+        upper_bound: found[term].upper_bound,
+        shown_from: found[term].shown_from,
+        shows: found[term].shows,
+        enough_strokes,
+        carried: carried[term].is_carried() && found[term].may_be_carried(),
+        reliability: carried[term].reliability,
+    }))
+}
+
+/// Mass and damping, each beside the other if that one stays: a term that does not must not take the place of
+/// the other. `with` gives a term (0: mass, 1: damping) in a model with the kept ones. If neither stays, the stronger one is
+/// asked for alone.
+fn each_beside_the_other<T: Copy>(
+    with: impl Fn([bool; 2], usize) -> Option<T>,
+    stays: impl Fn(T) -> bool,
+    strength: impl Fn(T) -> f64,
+) -> Option<[T; 2]> {
     let alone = |term: usize| with([term == 0, term == 1], term);
     let both = [with([true; 2], 0)?, with([true; 2], 1)?];
-    // a term that is not carried must not take the place of the other
-    match both.map(|evidence| evidence.is_carried()) {
+    match both.map(&stays) {
         [true, true] => Some(both),
         [true, false] => Some([alone(0)?, both[1]]),
         [false, true] => Some([both[0], alone(1)?]),
         [false, false] => {
-            let ratio = |e: &Evidence| e.reliability * e.value / e.standard_error;
-            let stronger = usize::from(ratio(&both[1]) > ratio(&both[0]));
+            let stronger = usize::from(strength(both[1]) > strength(both[0]));
             let mut found = both;
             found[stronger] = alone(stronger)?;
             Some(found)
-        }
-    }
-}
-
-/// The rules for the direction state that are tried.
-fn rules([low, high]: [f64; 2]) -> impl Iterator<Item = Direction> {
-    let of = move |share: &f64| {
-        let delta_mm = share * (high - low);
-        [Direction::Play { delta_mm }, Direction::Dahl { delta_mm }]
-    };
-    DELTAS.iter().flat_map(of).chain([Direction::Sign])
-}
-
-/// Equally spaced nodes at the scale on which detents are looked for.
-fn nodes(recordings: &[&Recording], [low, high]: [f64; 2]) -> Vec<f64> {
-    let scale_mm = recordings[0].scale_mm();
-    let count = ((high - low) / scale_mm)
-        .ceil()
-        .clamp(2.0, MOST_NODES as f64);
-    (0..=count as usize)
-        .map(|i| low + (high - low) * i as f64 / count)
-        .collect()
-}
-
-/// The standard deviation of the noise of single samples of the force, N. `None` if it is not
-/// white, as after a low-pass: noise has the same differences over two samples as over one.
-pub(super) fn white_noise_n(recordings: &[&Recording]) -> Option<f64> {
-    let thinned: Vec<Recording> = (recordings.iter())
-        .map(|r| r.select(&(0..r.len()).step_by(2).collect::<Vec<_>>()))
-        .collect();
-    let single = noise(recordings, |r| &r.f_n);
-    let double = noise(&thinned.iter().collect::<Vec<_>>(), |r| &r.f_n);
-    (single > 0.0 && double < WHITE * single).then(|| single.sqrt())
-}
-
-/// The variance of the noise of single samples of a column: that of its third differences over
-/// 1 + 9 + 9 + 1. The signal hardly contributes where it is sampled several times in its fastest
-/// change, and where it is not, its derivatives cannot be trusted either.
-fn noise(recordings: &[&Recording], column: impl Fn(&Recording) -> &[f64]) -> f64 {
-    let (mut sum, mut count) = (0.0, 0_usize);
-    for recording in recordings {
-        for w in column(recording).windows(4) {
-            let difference = w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0];
-            sum += difference * difference;
-            count += 1;
-        }
-    }
-    sum / (20.0 * count.max(1) as f64)
-}
-
-/// The normal equations of one block of samples.
-#[derive(Debug, Clone)]
-struct Block {
-    normal: Banded,
-    right: Vec<f64>,
-    /// Σ F².
-    square: f64,
-}
-
-impl Block {
-    fn empty(nodes: usize) -> Self {
-        let n = nodes * PER_NODE;
-        Self {
-            normal: Banded::bordered(n, HALF, BORDER),
-            right: vec![0.0; n + BORDER],
-            square: 0.0,
-        }
-    }
-
-    /// The squared error of parameters on the block.
-    fn error(&self, x: &[f64]) -> f64 {
-        let product = self.normal.times(x);
-        let mixed = product.iter().zip(&self.right).zip(x);
-        self.square + mixed.map(|((p, r), x)| x * (p - 2.0 * r)).sum::<f64>()
-    }
-}
-
-/// The normal equations, by blocks and in total with the ridges.
-#[derive(Debug)]
-struct Equations {
-    blocks: Vec<Block>,
-    total: Block,
-    samples: usize,
-}
-
-impl Equations {
-    fn of(recordings: &[&Recording], nodes: &[f64], rule: Direction) -> Self {
-        let samples: usize = recordings.iter().map(|r| r.len()).sum();
-        let squares = recordings.iter().flat_map(|r| &r.v_mm_s).map(|v| v * v);
-        let low_mm_s = LOW_SPEED * (squares.sum::<f64>() / samples as f64).sqrt();
-        let mut blocks = vec![Block::empty(nodes.len()); BLOCKS];
-        let mut seen = 0;
-        for recording in recordings {
-            let mut state = DirectionState::default();
-            for i in 0..recording.len() {
-                let motion = motion(recording, i);
-                let z = state.step(rule, motion);
-                let (left, share) = locate(nodes, Lookup::Linear, motion.x_mm);
-                let low = (-(motion.v_mm_s / low_mm_s).powi(2)).exp();
-                let block = &mut blocks[seen * BLOCKS / samples];
-                let unknowns = nodes.len() * PER_NODE;
-                let entries = [
-                    (left * PER_NODE, 1.0 - share),
-                    (left * PER_NODE + 1, z * (1.0 - share)),
-                    ((left + 1) * PER_NODE, share),
-                    ((left + 1) * PER_NODE + 1, z * share),
-                    (unknowns, motion.a_m_s2),
-                    (unknowns + 1, motion.v_mm_s),
-                    (unknowns + 2, low * z),
-                ];
-                let force_n = recording.f_n[i];
-                for (k, (row, one)) in entries.iter().enumerate() {
-                    if *one == 0.0 {
-                        continue;
-                    }
-                    block.right[*row] += one * force_n;
-                    for (column, other) in &entries[..=k] {
-                        block.normal.add(*row, *column, one * other);
-                    }
-                }
-                block.square += force_n * force_n;
-                seen += 1;
-            }
-        }
-        let mut total = Block::empty(nodes.len());
-        for block in &blocks {
-            total.normal.add_scaled(&block.normal, 1.0);
-            for (sum, one) in total.right.iter_mut().zip(&block.right) {
-                *sum += one;
-            }
-            total.square += block.square;
-        }
-        add_ridges(&mut total.normal, nodes.len(), samples);
-        Self {
-            blocks,
-            total,
-            samples,
-        }
-    }
-
-    /// Which unknowns are free, with the kept ones of mass and damping.
-    fn free(&self, kept: [bool; 2]) -> Vec<bool> {
-        let mut free = vec![true; self.total.right.len()];
-        let first = free.len() - BORDER;
-        free[first..first + 2].copy_from_slice(&kept);
-        free
-    }
-
-    fn squared_error(&self, kept: [bool; 2]) -> Option<f64> {
-        let x = (self.total.normal).solve(&self.total.right, &self.free(kept))?;
-        Some(self.total.error(&x))
-    }
-
-    /// The sum of the squared errors of every block, predicted by the others.
-    fn error_left_out(&self, kept: [bool; 2]) -> Option<f64> {
-        let free = self.free(kept);
-        (self.blocks.iter())
-            .map(|block| {
-                let mut normal = self.total.normal.clone();
-                normal.add_scaled(&block.normal, -1.0);
-                let right: Vec<f64> = (self.total.right.iter().zip(&block.right))
-                    .map(|(all, one)| all - one)
-                    .collect();
-                Some(block.error(&normal.solve(&right, &free)?))
-            })
-            .sum()
-    }
-
-    /// The evidence for a term (0: mass, 1: damping) in a model with the kept ones.
-    fn evidence(&self, kept: [bool; 2], term: usize, noise: f64) -> Option<Evidence> {
-        let free = self.free(kept);
-        let x = self.total.normal.solve(&self.total.right, &free)?;
-        let at = x.len() - BORDER + term;
-        let mut unit = vec![0.0; x.len()];
-        unit[at] = 1.0;
-        let column = self.total.normal.solve(&unit, &free)?;
-        // the contribution of each block to the estimate
-        let shifts = self.blocks.iter().map(|block| {
-            let product = block.normal.times(&x);
-            let gradient = block.right.iter().zip(&product).map(|(r, p)| r - p);
-            column.iter().zip(gradient).map(|(c, g)| c * g).sum::<f64>()
-        });
-        let variance: f64 = shifts.map(|shift| shift * shift).sum();
-        let blocks = BLOCKS as f64;
-        // what friction does at low speed is not known: its column may be there or not
-        let mut constant_friction = free.clone();
-        constant_friction[x.len() - 1] = false;
-        let without_column = (self.total.normal).solve(&self.total.right, &constant_friction)?;
-        let remaining = 1.0 / column[at];
-        let mut without = kept;
-        without[term] = false;
-        let (with, without) = (self.error_left_out(kept)?, self.error_left_out(without)?);
-        let mut evidence = Evidence {
-            term: Term::BOTH[term],
-            value: x[at],
-            standard_error: (variance * blocks / (blocks - 1.0)).sqrt(),
-            model_error: (x[at] - without_column[at]).abs(),
-            reliability: (1.0 - self.samples as f64 * noise / remaining).clamp(0.0, 1.0),
-            gain: without / with - 1.0,
-            upper_bound: None,
-        };
-        if evidence.reliability >= LEAST_RELIABILITY {
-            evidence.upper_bound = Some(evidence.bound());
-        }
-        Some(evidence)
-    }
-}
-
-fn add_ridges(normal: &mut Banded, nodes: usize, samples: usize) {
-    let information = samples as f64 / nodes as f64;
-    let low_speed = nodes * PER_NODE + BORDER - 1;
-    normal.add(low_speed, low_speed, FLOOR * samples as f64);
-    for node in 0..nodes {
-        for p in 0..PER_NODE {
-            let unknown = |back: usize| (node - back) * PER_NODE + p;
-            normal.add(unknown(0), unknown(0), FLOOR * information);
-            if node < 2 {
-                continue;
-            }
-            let second = [(unknown(2), 1.0), (unknown(1), -2.0), (unknown(0), 1.0)];
-            for (k, (row, one)) in second.iter().enumerate() {
-                for (column, other) in &second[..=k] {
-                    normal.add(*row, *column, RIDGE * information * one * other);
-                }
-            }
         }
     }
 }

@@ -67,7 +67,8 @@ pub struct Estimate {
     pub standard_error: Option<f64>,
     /// What the term is at most, with a confidence of 99 %, in the unit.
     pub upper_bound: Option<f64>,
-    /// Whether the recordings determine it: otherwise it is left out, or no more than set.
+    /// Whether the recordings determine it: otherwise it is left out, or no more than set. A table leaves out a term that they
+    /// determine if least squares would find too little of it, and has one that they do not determine if it predicts; both with a warning.
     pub identified: bool,
 }
 
@@ -79,7 +80,7 @@ impl From<&Evidence> for Estimate {
             value: evidence.value,
             standard_error: Some(evidence.standard_error),
             upper_bound: evidence.upper_bound,
-            identified: evidence.is_carried(),
+            identified: evidence.found,
         }
     }
 }
@@ -139,6 +140,9 @@ pub enum Warning {
     /// The recordings do not carry this term.
     #[error("{0}; --terms overrides this")]
     LeftOut(Evidence),
+    /// The recordings do not show this term, but a table predicts better with it.
+    #[error("{0}; --terms overrides this")]
+    Ambiguous(Evidence),
     /// The force has features between the nodes.
     #[error(
         "{rms_n:.3} N rms of the force repeat at places closer than 2 dx = {} mm, which nodes at this distance cannot follow: choose a smaller dx", 2.0 * .dx_mm

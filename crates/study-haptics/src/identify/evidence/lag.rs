@@ -4,7 +4,9 @@
 //! damping of either sign, by position. With the force moved back the reference model fits better. Friction, play and mass
 //! do not have this effect, because the model has them; a viscoelastic target may have.
 
-use super::{Equations, PER_NODE, nodes, pairs_averaged, rules};
+use super::equations::{Equations, PER_NODE, Rule, directions, nodes, rows};
+use super::instruments::Instruments;
+use super::noise::pairs_averaged;
 use crate::recording::Recording;
 
 /// Longest lag that is tried, s.
@@ -47,8 +49,20 @@ pub fn of(recording: &Recording) -> Option<Lag> {
         while moved.duration_s() / (moved.len() as f64) < 0.5 * INTERVAL_S {
             moved = pairs_averaged(&moved);
         }
-        let of = |rule| Equations::of(&[&moved], &nodes, rule).squared_error([true; 2]);
-        rules(range_mm).filter_map(of).fold(f64::INFINITY, f64::min)
+        let instruments = [Instruments::new(&moved, 1)];
+        let of = |direction| {
+            let rule = Rule {
+                direction,
+                smooth: 1,
+            };
+            let rows = rows(&[&moved], &nodes, rule, &instruments);
+            let equations = Equations::of(rows.into_iter(), moved.len(), nodes.len());
+            let x = equations.solve(0, &equations.free([true; 2], [true, false]))?;
+            Some(equations.total.error(&x))
+        };
+        directions(range_mm)
+            .filter_map(of)
+            .fold(f64::INFINITY, f64::min)
     };
     let least = |lags: &mut dyn Iterator<Item = f64>| {
         lags.map(|lag_s| (error(lag_s), lag_s))
