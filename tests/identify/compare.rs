@@ -158,11 +158,30 @@ fn the_command_compares_recommends_and_writes_the_recommended_model() {
     );
     let files: Vec<_> = fs::read_dir(dir.path().join("m")).unwrap().collect();
     assert_eq!(files.len(), 1);
+    // what the recording bounds is in the file, without a value, and in words what it does not bound
+    let text = fs::read_to_string(files[0].as_ref().unwrap().path()).unwrap();
+    let (model, findings) = study_haptics::model::file::parse("m.toml", &text);
+    assert_eq!(findings.faults, []);
+    let provenance = model.unwrap().provenance;
+    let known = ["m_kg", "b_n_s_per_mm"].map(|name| provenance.terms[name]);
+    assert!(known.iter().all(|t| t.value.is_none()), "{known:?}");
+    assert!(known[0].upper_bound.is_none(), "{known:?}");
+    let note = provenance.note.unwrap();
+    assert!(
+        note.contains("mass: not identified by the recordings and not bounded"),
+        "{note}"
+    );
     let (code, out, _) = study(dir.path(), &["t.csv", "--validate", "v.csv", "--json"]);
     assert_eq!(code, 0);
     let document: serde_json::Value = serde_json::from_str(&out).unwrap();
     assert_eq!(document["cells"].as_array().unwrap().len(), 1);
     assert_eq!(document["best"], 0);
+    let terms = &document["cells"][0]["terms"];
+    assert_eq!([&terms[0]["name"], &terms[1]["name"]], ["mass", "damping"]);
+    assert!(terms[0]["upper_bound"].is_null() && terms[1]["identified"] == false);
+    let bounds = [terms[1]["upper_bound"].as_f64(), known[1].upper_bound];
+    let [of_document, of_file] = bounds.map(Option::unwrap);
+    assert!((of_document / of_file - 1.0).abs() < 1e-9, "{bounds:?}");
     let comparison = &document["comparison"];
     let recommended = comparison["recommended"].as_u64().unwrap() as usize;
     assert_eq!(comparison["candidates"][recommended]["method"], "passive");

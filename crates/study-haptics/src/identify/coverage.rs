@@ -1,9 +1,12 @@
 //! Where recordings went, for the model file.
 
+use super::evidence::Term;
 use super::folds::strokes;
-use crate::model::coverage::Coverage;
+use super::problem::{Estimate, Warning};
+use crate::model::coverage::{Coverage, Determined};
 use crate::model::{Mechanism, Realization};
 use crate::recording::Recording;
+use std::collections::BTreeMap;
 
 /// Places of the map.
 const PLACES: usize = 20;
@@ -11,6 +14,37 @@ const PLACES: usize = 20;
 const CLASSES: usize = 6;
 /// Share of the range at either side that is its end, as for the full strokes of a playback.
 const END: f64 = 0.2;
+
+/// What recordings say of mass and damping, by the names in a model file, without a value where they do not
+/// show the term: nothing is known of one that they do not bound either.
+pub(super) fn determined(terms: &[Estimate]) -> BTreeMap<String, Determined> {
+    let of = |term: Term| {
+        let found = terms.iter().find(|of| of.name == term.as_str())?;
+        let key = match term {
+            Term::Mass => "m_kg",
+            Term::Damping => "b_n_s_per_mm",
+        };
+        let known = Determined {
+            value: found.identified.then_some(found.value),
+            standard_error: found.standard_error.filter(|_| found.identified),
+            upper_bound: found.upper_bound,
+        };
+        Some((key.to_owned(), known))
+    };
+    Term::BOTH.into_iter().filter_map(of).collect()
+}
+
+/// A note with what recordings do not bound, and why.
+pub(super) fn note(note: Option<String>, warnings: &[Warning]) -> Option<String> {
+    let unbounded = warnings.iter().filter_map(|warning| match warning {
+        Warning::LeftOut(evidence) | Warning::Ambiguous(evidence) => {
+            (evidence.upper_bound.is_none()).then(|| evidence.to_string())
+        }
+        _ => None,
+    });
+    let all: Vec<String> = note.into_iter().chain(unbounded).collect();
+    (!all.is_empty()).then(|| all.join("; "))
+}
 
 /// The coverage of a realization by the recordings that it was identified from.
 pub fn of(realization: &Realization, recordings: &[&Recording]) -> Coverage {

@@ -382,7 +382,11 @@ pub fn run(
         let covered = coverage::of(&cell.realization, &trained);
         let provenance = &mut cell.realization.provenance;
         provenance.filter = Some(filter.clone());
-        provenance.coverage = (!request.without_coverage).then_some(covered);
+        if !request.without_coverage {
+            provenance.coverage = Some(covered);
+            provenance.terms = coverage::determined(&cell.terms);
+            provenance.note = coverage::note(provenance.note.take(), &cell.warnings);
+        }
     }
     let detents = validation::detents(&training[0].recording);
     let best = grid::best(&cells, validations);

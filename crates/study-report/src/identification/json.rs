@@ -3,11 +3,11 @@
 use super::{comparison, loops};
 use serde_json::{Map, Value, json};
 use std::path::Path;
-use study_haptics::identify::Method;
 use study_haptics::identify::identification::{Identification, Source};
 use study_haptics::identify::mechanism::{Filter, Fitted, PARAMETERS};
 use study_haptics::identify::vaf::Score;
 use study_haptics::identify::validation::Accuracy;
+use study_haptics::identify::{Estimate, Method};
 use study_wire::certificate::Certificate;
 
 /// The results as a JSON document, format `study-identify/1`.
@@ -45,6 +45,7 @@ pub fn document(results: &Identification) -> String {
                 "negative_damping": cell.certificate.negative_damping,
                 "certificate": certificate(&cell.certificate),
                 "warnings": warnings,
+                "terms": cell.terms.iter().map(term).collect::<Vec<_>>(),
                 "mechanism": cell.fitted.as_deref().map(mechanism),
             })
         })
@@ -116,6 +117,18 @@ fn part(accuracy: &Accuracy) -> Value {
         "bias_n": accuracy.bias_n,
         "residual_n": accuracy.residual_n,
         "nrmse": accuracy.nrmse,
+    })
+}
+
+/// What the recordings say of a term; its bound is null if they do not bound it.
+fn term(term: &Estimate) -> Value {
+    json!({
+        "name": term.name,
+        "unit": term.unit,
+        "value": term.value,
+        "standard_error": term.standard_error,
+        "upper_bound": term.upper_bound,
+        "identified": term.identified,
     })
 }
 
