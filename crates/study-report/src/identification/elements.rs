@@ -1,8 +1,9 @@
-//! Elements as text.
+//! Elements as text and as JSON.
 
 use super::printed::Printed;
+use serde_json::{Value, json};
 use std::fmt::Write as _;
-use study_haptics::model::Realization;
+use study_haptics::model::{Elements, Realization};
 use study_wire::elements::Spring;
 
 /// The springs of a realization of elements, a line each; empty for another one.
@@ -34,10 +35,73 @@ pub(super) fn in_detail(realization: &Realization, p: Printed) -> String {
     out
 }
 
+/// Elements with the keys of a model file in mm and N.
+pub(super) fn json(elements: &Elements) -> Value {
+    let springs = elements.springs.iter().zip(&elements.spring_n);
+    let springs: Vec<Value> = springs
+        .map(|(spring, n)| match *spring {
+            Spring::Stop { slip_mm } => json!({ "kind": "stop", "slip_mm": slip_mm, "n": n }),
+            Spring::Maxwell {
+                slip_mm,
+                relaxation_s,
+            } => json!({ "kind": "maxwell", "slip_mm": slip_mm, "relaxation_s": relaxation_s, "n": n }),
+            Spring::Latch { rearm_mm, break_mm } => {
+                json!({ "kind": "latch", "rearm_mm": rearm_mm, "break_mm": break_mm, "n": n })
+            }
+        })
+        .collect();
+    let [forwards, backwards] = &elements.damping_n_s_per_mm;
+    json!({
+        "mass_kg": elements.mass_kg,
+        "x_mm": elements.x_mm,
+        "force_n": elements.force_n,
+        "forwards_n_s_per_mm": forwards,
+        "backwards_n_s_per_mm": backwards,
+        "springs": springs,
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use study_haptics::model::{Elements, Provenance, Trained, Units};
+    use study_haptics::model::{Provenance, Trained, Units};
+
+    #[test]
+    fn the_document_has_every_number() {
+        let elements = Elements {
+            mass_kg: 0.02,
+            x_mm: vec![0.0, 10.0],
+            force_n: vec![0.5, -0.5],
+            damping_n_s_per_mm: [vec![0.01, 0.02], vec![0.03, 0.0]],
+            springs: vec![
+                Spring::Stop { slip_mm: 0.2 },
+                Spring::Maxwell {
+                    slip_mm: 10.0,
+                    relaxation_s: 0.07,
+                },
+                Spring::Latch {
+                    rearm_mm: 5.0,
+                    break_mm: 6.2,
+                },
+            ],
+            spring_n: vec![vec![0.1, 0.12], vec![14.0, 14.0], vec![0.0, 3.5]],
+        };
+        assert_eq!(
+            json(&elements),
+            json!({
+                "mass_kg": 0.02,
+                "x_mm": [0.0, 10.0],
+                "force_n": [0.5, -0.5],
+                "forwards_n_s_per_mm": [0.01, 0.02],
+                "backwards_n_s_per_mm": [0.03, 0.0],
+                "springs": [
+                    { "kind": "stop", "slip_mm": 0.2, "n": [0.1, 0.12] },
+                    { "kind": "maxwell", "slip_mm": 10.0, "relaxation_s": 0.07, "n": [14.0, 14.0] },
+                    { "kind": "latch", "rearm_mm": 5.0, "break_mm": 6.2, "n": [0.0, 3.5] },
+                ],
+            })
+        );
+    }
 
     #[test]
     fn every_spring_has_a_line_in_the_units_of_the_handle() {

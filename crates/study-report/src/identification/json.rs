@@ -1,6 +1,6 @@
 //! The document `study-identify/1`.
 
-use super::{comparison, loops};
+use super::{comparison, elements, loops};
 use serde_json::{Map, Value, json};
 use std::path::Path;
 use study_haptics::identify::identification::{Identification, Source};
@@ -47,6 +47,7 @@ pub fn document(results: &Identification) -> String {
                 "warnings": warnings,
                 "terms": cell.terms.iter().map(term).collect::<Vec<_>>(),
                 "mechanism": cell.fitted.as_deref().map(mechanism),
+                "elements": cell.realization.elements.as_ref().map(elements::json),
             })
         })
         .collect();
