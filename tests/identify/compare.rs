@@ -22,7 +22,7 @@ fn compared(recording: &Recording) -> Comparison {
 
 /// Rows t, x, F at 200 Hz of `force(x, v)` with noise of 0.02 N, for 20 s of strokes of different
 /// speeds.
-fn text_of(seed: u64, travel_mm: f64, force: impl Fn(f64, f64) -> f64) -> String {
+pub(crate) fn text_of(seed: u64, travel_mm: f64, force: impl Fn(f64, f64) -> f64) -> String {
     let mut noise = Stream::new(seed, &["compare"]);
     let mut text = String::from("t_s,x_mm,f_n\n");
     for i in 0..4000 {
@@ -121,7 +121,7 @@ fn dx_is_chosen_where_detents_are_many() {
     assert!(passive.left_out.unwrap().vaf > 0.95, "{passive:?}");
 }
 
-fn study(dir: &Path, args: &[&str]) -> (i32, String, String) {
+pub(crate) fn study(dir: &Path, args: &[&str]) -> (i32, String, String) {
     let output = (Command::cargo_bin("study").unwrap())
         .current_dir(dir)
         .arg("identify")

@@ -21,3 +21,4 @@ mod stimulus;
 mod switches;
 mod terms;
 mod trajectory;
+mod words;
