@@ -168,6 +168,40 @@ fn parameters_that_are_no_passive_mechanism_are_refused() {
     );
 }
 
+/// ½ r s (1 + σ) + a T w at the value in the middle, in either direction, with the slopes a behind and r ahead and T = 1 ms.
+#[test]
+fn friction_that_rises_on_both_sides_of_a_value_needs_more_at_speed() {
+    let (a, r) = (0.11, 11.1);
+    let middle_n = 0.5;
+    let rising = [middle_n - 4.0 * a, middle_n, middle_n + 4.0 * r];
+    let falling = [rising[2], rising[1], rising[0]];
+    let bristle_mm = 0.5 * 0.06 * 1.35;
+    for friction in [rising, falling] {
+        let of = mechanism(scalars(), &[0.0; 2], &friction);
+        for top_mm_s in [0.0, 300.0, 1000.0] {
+            let (margin, at_mm) = of.friction_margin_n(top_mm_s);
+            let expected = middle_n - bristle_mm * r - a * 1e-3 * top_mm_s;
+            assert!((margin - expected).abs() < 1e-12, "{margin} {expected}");
+            assert_eq!(at_mm, 4.0);
+        }
+        assert_eq!(of.check(300.0), Ok(()));
+        assert_eq!(of.check(1000.0), Err(Flaw::Friction));
+        // up to twice the trained speed
+        let of_trained = of.certificate(500.0).hysteresis.value;
+        assert_eq!(of_trained, of.friction_margin_n(1000.0).0);
+    }
+    // behind a value from which friction had fallen it needs no more, however fast the follower is
+    let friction = [middle_n + 4.0 * a, middle_n, middle_n + 4.0 * r];
+    let of = mechanism(scalars(), &[0.0; 2], &friction);
+    for top_mm_s in [0.0, 3900.0] {
+        let (margin, _) = of.friction_margin_n(top_mm_s);
+        assert!(
+            (margin - (middle_n - bristle_mm * r)).abs() < 1e-12,
+            "{margin}"
+        );
+    }
+}
+
 /// ∫ D from the first value, N·mm: exact, because D is cubic in each interval.
 struct Potential<'a> {
     of: Profile<'a>,
