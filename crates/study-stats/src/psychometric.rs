@@ -10,11 +10,13 @@
 //!
 //! [`maximum_likelihood`] has γ and λ fixed and an explicit test whether a maximum
 //! exists; [`free_lapse`] estimates λ, too. [`posterior`] integrates over λ, γ and
-//! overdispersion, and always has an answer.
+//! overdispersion, and always has an answer. [`hierarchy`] learns the functions of several
+//! participants together.
 
 mod bayes;
 mod core;
 mod group;
+pub mod hierarchy;
 mod likelihood;
 mod simplex;
 mod spacing;
