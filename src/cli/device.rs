@@ -7,13 +7,9 @@ pub(super) mod port;
 pub(super) mod record;
 mod rendered;
 mod rendering;
-#[cfg(unix)]
 mod safety;
-#[cfg(unix)]
 mod simulate;
 mod single_playback;
-#[cfg(not(unix))]
-mod unsupported;
 
 use super::{Console, Failure};
 use serialport::SerialPortType;
@@ -43,19 +39,14 @@ enum What {
     Check(check::CheckArgs),
     /// Guide through what only a person can check: weight, ruler, emergency stop, friction
     Commission(commission::Args),
-    /// Run a simulated device on a pseudo-terminal; its path is the first line of output
-    #[cfg(unix)]
+    /// Run a simulated device on a pseudo-terminal or at an address of this computer; its port
+    /// is the first line of output
     Simulate(simulate::Args),
-    /// Run a simulated device (not supported on this system)
-    #[cfg(not(unix))]
-    #[command(hide = true)]
-    Simulate(unsupported::Args),
     /// Play one table without a session
     #[command(hide = true)]
     Hold(hold::Args),
     /// Measure the time to zero force after the host is killed, stopped, stalled or
     /// unplugged, on a simulated device
-    #[cfg(unix)]
     #[command(hide = true)]
     Safety(safety::Args),
     /// List the codes for the labels of physical samples; not for the experimenter
@@ -73,12 +64,8 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         What::Check(args) => check::check(args, console),
         What::Commission(args) => commission::run(args, console),
         What::Hold(args) => hold::run(args, console),
-        #[cfg(unix)]
         What::Safety(args) => safety::run(args, console),
-        #[cfg(unix)]
         What::Simulate(args) => simulate::run(args, console),
-        #[cfg(not(unix))]
-        What::Simulate(_) => Err(unsupported::failure()),
         What::Codes { protocol } => codes(protocol, console),
     }
 }

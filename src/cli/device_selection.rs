@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use study_base::text::Untrusted;
 use study_device::host::HostSettings;
-use study_device::link::{LinkedDevice, Priority, priority};
+use study_device::link::tcp::TcpAddress;
+use study_device::link::{LinkedDevice, Opener, Priority, priority};
 use study_device::manual::Manual;
 use study_device::process::{HELLO_TIMEOUT, Opened, Opening, ProcessDevice};
 use study_device::serial::{BAUD, SerialOpener};
@@ -46,8 +47,8 @@ pub(super) struct DeviceAddress {
 /// Address of a serial device.
 #[derive(Debug, Clone, Default, clap::Args)]
 pub(super) struct SerialPortArgs {
-    /// Serial port of the device
-    #[arg(long, value_name = "PATH")]
+    /// Serial port of the device, or its address over TCP, such as tcp://127.0.0.1:5000
+    #[arg(long, value_name = "PORT")]
     pub(super) port: Option<String>,
     /// Baud rate of a serial port, ignored by USB [default: 460800]
     #[arg(long, value_name = "BAUD", value_parser = clap::value_parser!(u32).range(9600..=4_000_000))]
@@ -212,8 +213,17 @@ impl DeviceAddress {
 }
 
 impl SerialPortArgs {
-    /// The serial port, from the arguments or `device.toml`.
-    pub(super) fn serial(&self) -> Result<SerialOpener, Failure> {
+    /// The port that was given, for messages and files: without the token of an address.
+    pub(super) fn shown_port(&self) -> Option<String> {
+        let given = self.port.as_ref()?;
+        Some(match TcpAddress::read(given) {
+            Some(Ok(address)) => address.to_string(),
+            _ => given.clone(),
+        })
+    }
+
+    /// The serial port or the address over TCP, from the arguments or `device.toml`.
+    pub(super) fn serial(&self) -> Result<Box<dyn Opener>, Failure> {
         let config = DeviceConfig::read(Path::new(CONFIG_FILE))?.serial;
         let given = self.port.clone();
         // A port argument takes precedence over a serial number in the file.
@@ -228,7 +238,10 @@ impl SerialPortArgs {
         }
         let baud = self.baud.or(config.baud).unwrap_or(BAUD);
         let port = port.unwrap_or_default();
-        Ok(SerialOpener::new(&port, baud, usb_serial))
+        Ok(match TcpAddress::read(&port) {
+            Some(address) => Box::new(address.map_err(|e| Failure::usage(format!("--port: {e}")))?),
+            None => Box::new(SerialOpener::new(&port, baud, usb_serial)),
+        })
     }
 
     /// Opens the device behind a serial port.
@@ -236,7 +249,7 @@ impl SerialPortArgs {
         let opener = self.serial()?;
         // Heartbeats are sent only while this thread polls.
         priority::raise_nice();
-        LinkedDevice::open(Box::new(opener), settings).map_err(|e| port_failure(&e))
+        LinkedDevice::open(opener, settings).map_err(|e| port_failure(&e))
     }
 }
 

@@ -83,7 +83,6 @@ pub(super) struct Args {
 
 /// Runs the command.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
-    tui::check_platform().map_err(unusable)?;
     let protocol = match &args.protocol {
         Some(given) => given.clone(),
         None => protocol_here()?,
@@ -418,7 +417,7 @@ fn resume_command(args: &Args, participant: &str) -> String {
     option("results", results);
     option("device", args.device.kind.map(|k| k.as_str().to_owned()));
     let serial = &args.device.address.serial;
-    option("port", serial.port.clone());
+    option("port", serial.shown_port());
     option("baud", serial.baud.map(|b| b.to_string()));
     option("command", args.device.address.command.clone());
     option(

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use study_device::firmware::{Firmware, Options, Wrong, WrongLoads};
 use study_device::host::HostSettings;
 use study_device::link::memory::Noise;
-use study_device::link::pty::Simulator;
+use study_device::link::simulator::{Simulator, Socket};
 use study_device::link::{LinkedDevice, priority};
 use study_device::serial::SerialOpener;
 use study_device::{Device, Report, Stimulus};
@@ -57,7 +57,13 @@ struct Served {
 impl Served {
     fn start(options: Options, noise: Noise) -> Self {
         let seed = options.seed;
-        let mut simulator = Simulator::open(Firmware::new(options), noise, seed, None).unwrap();
+        let mut simulator = Simulator::open(
+            Firmware::new(options),
+            noise,
+            seed,
+            Socket::Pty { name: None },
+        )
+        .unwrap();
         let path = simulator.path().unwrap().to_owned();
         let over = Arc::new(AtomicBool::new(false));
         let ended = Arc::clone(&over);

@@ -30,6 +30,7 @@ mod release_0_1;
 mod screen;
 #[path = "../support/mod.rs"]
 mod support;
+mod tcp;
 mod tui_hostile;
 mod tui_keys;
 mod tui_pictures;

@@ -24,6 +24,12 @@ pub const PATIENCE: Duration = Duration::from_secs(120);
 /// which a person's pace is not the matter. Any other device refuses it.
 pub const HURRY: (&str, &str) = ("STUDY_TEST_HURRY", "10");
 
+/// The program under test: the one that was built with the tests, or the one that
+/// `STUDY_TEST_PROGRAM` names, such as a script that runs a build for another system.
+pub fn program() -> std::ffi::OsString {
+    std::env::var_os("STUDY_TEST_PROGRAM").unwrap_or_else(|| env!("CARGO_BIN_EXE_study").into())
+}
+
 /// The emulator does not accept a size of 0.
 fn cells(n: u16) -> NonZero<u16> {
     NonZero::new(n.max(1)).unwrap()
@@ -133,7 +139,7 @@ impl Terminal {
                 pixel_height: 0,
             })
             .unwrap();
-        let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_study"));
+        let mut command = CommandBuilder::new(program());
         command.args(arguments);
         command.cwd(folder);
         command.env("TERM", "xterm-256color");

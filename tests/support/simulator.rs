@@ -4,23 +4,42 @@ use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
-/// A simulated device on a pseudo-terminal.
+/// A simulated device on a pseudo-terminal or at an address.
 pub struct Simulator {
     child: Child,
     stdin: ChildStdin,
     stdout: BufReader<ChildStdout>,
-    /// A link to the port that stays valid when the device is reconnected.
+    /// A link to the port that stays valid when the device is reconnected, or the address with
+    /// its token.
     pub port: PathBuf,
 }
 
 impl Simulator {
     /// Starts one with a long watchdog time, for a busy machine.
     pub fn start(folder: &Path, more: &[&str]) -> Self {
-        let port = folder.join("port");
-        let mut child = Command::new(env!("CARGO_BIN_EXE_study"))
-            .args(["device", "simulate", "--watchdog", "200", "--link"])
-            .arg(&port)
-            .args(more)
+        let link = folder.join("port");
+        let at_link = ["--link", link.to_str().unwrap()];
+        let mut simulator = Self::of(&[&at_link, more].concat());
+        assert!(
+            simulator.port.exists(),
+            "the first line is not a port: {:?}",
+            simulator.port
+        );
+        simulator.port = link;
+        simulator
+    }
+
+    /// Starts one that is reached over TCP.
+    pub fn start_tcp(more: &[&str]) -> Self {
+        let simulator = Self::of(&[&["--listen"], more].concat());
+        assert!(simulator.port.to_str().unwrap().starts_with("tcp://"));
+        simulator
+    }
+
+    fn of(arguments: &[&str]) -> Self {
+        let mut child = Command::new(super::program())
+            .args(["device", "simulate", "--watchdog", "200"])
+            .args(arguments)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
@@ -32,13 +51,9 @@ impl Simulator {
             child,
             stdin,
             stdout,
-            port,
+            port: PathBuf::new(),
         };
-        let path = simulator.line();
-        assert!(
-            Path::new(&path).exists(),
-            "the first line is not a port: {path}"
-        );
+        simulator.port = simulator.line().into();
         simulator
     }
 

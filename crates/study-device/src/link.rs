@@ -4,15 +4,19 @@
 //! one is opened. [`LinkedDevice`] runs the [`Host`] on its own thread, so that
 //! heartbeats do not wait for the user interface and the user interface does not wait
 //! for the device. The thread sends heartbeats only while the user interface polls.
-//! [`memory`] is a simulated line in virtual time; `pty`, on Unix, a simulated device
-//! on a pseudo-terminal.
+//! [`memory`] is a simulated line in virtual time; [`simulator`] a simulated device in real
+//! time, at an address of this computer or, on Unix, on a pseudo-terminal (`pty`).
+//! [`tcp`] is the host's end of a connection, and [`super::serial`] of a cable.
 
+pub(crate) mod cable;
 pub mod memory;
 pub mod priority;
 #[cfg(unix)]
 pub mod pty;
 #[cfg(unix)]
 pub mod relay;
+pub mod simulator;
+pub mod tcp;
 
 use super::host::{Health, Host, HostSettings};
 use super::{Device, DeviceError, Identity, Report, Stimulus};
@@ -44,12 +48,12 @@ pub enum LinkError {
     NotSerial,
     #[error("it does not support {0} baud")]
     BaudRate(u32),
+    #[error("no device listens there")]
+    NobodyListens,
     #[error("unplugged")]
     Unplugged,
     #[error("the port accepts no data")]
     WriteTimeout,
-    #[error("serial devices are not supported on this system; use Linux or macOS")]
-    Unsupported,
     #[error("the port fails: {0}")]
     System(String),
 }

@@ -1,18 +1,17 @@
 //! Serial ports as links.
 //!
 //! A port is found again by the serial number of its USB adapter, even when it is
-//! plugged in elsewhere; without a serial number, by its path. [`SerialLink`] exists on
-//! Unix; on other systems opening a port fails with [`LinkError::Unsupported`].
+//! plugged in elsewhere; without a serial number, by its path.
 
 #[cfg(unix)]
 mod unix;
-#[cfg(not(unix))]
-mod unsupported;
+#[cfg(windows)]
+mod windows;
 
 #[cfg(unix)]
 pub use unix::SerialLink;
-#[cfg(not(unix))]
-pub use unsupported::SerialLink;
+#[cfg(windows)]
+pub use windows::SerialLink;
 
 use super::link::{Link, LinkError, Opener};
 use serialport::{SerialPortInfo, SerialPortType};
@@ -30,7 +29,7 @@ pub struct SerialOpener {
 }
 
 impl SerialOpener {
-    /// The port at `path`, such as `/dev/ttyUSB0`, at `baud` bits per second (ignored by
+    /// The port at `path`, such as `/dev/ttyUSB0` or `COM3`, at `baud` bits per second (ignored by
     /// USB CDC devices and pseudo-terminals). The serial number of a USB port is stored;
     /// a given `usb_serial` takes precedence over the path.
     pub fn new(path: &str, baud: u32, usb_serial: Option<String>) -> Self {

@@ -5,7 +5,7 @@ use crate::cli::device_selection::SerialPortArgs;
 use std::time::{Duration, Instant};
 use study_base::text::Untrusted;
 use study_device::check::Connection;
-use study_device::link::{Link, LinkError, Opener as _};
+use study_device::link::{Link, LinkError};
 
 /// An open port with a clock.
 pub(in crate::cli) struct PortConnection {

@@ -1,22 +1,27 @@
 //! `study device safety`, hidden: measures the time to zero force in real time.
 //!
-//! A simulated device runs in this process on a pseudo-terminal, or this process stands
-//! between a port and a device that is an example of `firmware/`. A child process is the
-//! host that plays. The child is killed, stopped or stalled, or the cable is
-//! unplugged, repeatedly, and the time until the device's force is zero is measured. The
-//! result holds for the simulated device on this machine under its present load.
+//! A simulated device runs in this process on a pseudo-terminal or at an address of this
+//! computer, or, on Unix, this process stands between a port and a device that is an example of
+//! `firmware/`. A child process is the host that plays. The child is killed, stopped (on Unix) or
+//! stalled, or the cable is unplugged, repeatedly, and the time until the device's force is zero is
+//! measured. The result holds for the simulated device on this machine under its present load.
 
-use super::hold;
+use super::{hold, simulate};
 use crate::cli::{Console, Failure};
 use std::io::Write as _;
+use std::net::{Ipv4Addr, SocketAddr};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 use study_device::check::quantile;
 use study_device::firmware::{Firmware, Options};
 use study_device::link::memory::Noise;
 use study_device::link::priority;
-use study_device::link::pty::{Control, Simulator};
+#[cfg(unix)]
 use study_device::link::relay::Relay;
+#[cfg(unix)]
+use study_device::link::simulator::Socket;
+use study_device::link::simulator::{Control, Simulator};
+#[cfg(unix)]
 use study_device::serial::SerialLink;
 use study_wire::message::DeviceState;
 
@@ -30,25 +35,37 @@ pub(in crate::cli) struct Args {
     #[arg(long, value_name = "HZ", default_value_t = 4000)]
     rate: u32,
     /// A device on this port instead of the simulated one
-    #[arg(long, value_name = "PATH")]
+    #[cfg(unix)]
+    #[arg(long, value_name = "PATH", conflicts_with = "tcp")]
     port: Option<String>,
+    /// Reach the simulated device over TCP; on Windows there is no other way
+    #[arg(long)]
+    tcp: bool,
 }
 
 /// What happens to the host.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Accident {
     Killed,
+    #[cfg(unix)]
     Stopped,
     Stalled,
     Unplugged,
 }
 
 impl Accident {
-    const ALL: [Self; 4] = [Self::Killed, Self::Stopped, Self::Stalled, Self::Unplugged];
+    const ALL: &[Self] = &[
+        Self::Killed,
+        #[cfg(unix)]
+        Self::Stopped,
+        Self::Stalled,
+        Self::Unplugged,
+    ];
 
     fn as_str(self) -> &'static str {
         match self {
             Self::Killed => "host killed",
+            #[cfg(unix)]
             Self::Stopped => "host stopped",
             Self::Stalled => "screen stalled",
             Self::Unplugged => "unplugged",
@@ -79,15 +96,10 @@ fn failed(why: impl std::fmt::Display) -> Failure {
 pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     // The device must not wait for a busy machine.
     priority::raise();
-    let mut rig: Box<dyn Rig> = match &args.port {
-        None => Box::new(Simulated::new(0, args.rate)?),
-        Some(port) => Box::new(Relay::new(Box::new(
-            SerialLink::open(port, 460_800).map_err(failed)?,
-        ))),
-    };
+    let mut rig = rig(args)?;
     let (mut late, mut repeated) = (0, 0);
     console.out("accident             n   median   99 %    most   allowed\n")?;
-    for accident in Accident::ALL {
+    for accident in Accident::ALL.iter().copied() {
         let progress = crate::cli::console::progress(u64::from(args.times), accident.as_str());
         let mut times_ms = Vec::new();
         for n in 0..args.times {
@@ -129,6 +141,16 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
         .hint("repeat the measurement on an idle machine; the simulated device needs a free processor"))
 }
 
+fn rig(args: &Args) -> Result<Box<dyn Rig>, Failure> {
+    #[cfg(unix)]
+    if let Some(port) = &args.port {
+        let device = SerialLink::open(port, 460_800).map_err(failed)?;
+        return Ok(Box::new(Relay::new(Box::new(device))));
+    }
+    let tcp = args.tcp || cfg!(not(unix));
+    Ok(Box::new(Simulated::new(0, args.rate, tcp)?))
+}
+
 /// A device whose force can be seen.
 trait Rig {
     /// The next device, or the same one with a new port; its port.
@@ -145,25 +167,31 @@ trait Rig {
 /// The simulated device, anew for each accident.
 struct Simulated {
     rate: u32,
+    tcp: bool,
     device: Simulator,
 }
 
 impl Simulated {
-    fn new(seed: u32, rate: u32) -> Result<Self, Failure> {
+    fn new(seed: u32, rate: u32, tcp: bool) -> Result<Self, Failure> {
         let firmware = Firmware::new(Options {
             seed: u64::from(seed),
             servo_hz: f64::from(rate),
             ..Options::default()
         });
-        let device = Simulator::open(firmware, Noise::default(), u64::from(seed), None);
+        let socket = match tcp {
+            #[cfg(unix)]
+            false => Socket::Pty { name: None },
+            _ => simulate::at_address(SocketAddr::from((Ipv4Addr::LOCALHOST, 0)))?,
+        };
+        let device = Simulator::open(firmware, Noise::default(), u64::from(seed), socket);
         let device = device.map_err(failed)?;
-        Ok(Self { rate, device })
+        Ok(Self { rate, tcp, device })
     }
 }
 
 impl Rig for Simulated {
     fn ready(&mut self, seed: u32) -> Result<String, Failure> {
-        *self = Self::new(seed, self.rate)?;
+        *self = Self::new(seed, self.rate, self.tcp)?;
         Ok(self.device.path().unwrap_or_default().to_owned())
     }
 
@@ -190,6 +218,7 @@ impl Rig for Simulated {
 }
 
 /// A device on a port; it is believed what it says of itself.
+#[cfg(unix)]
 impl Rig for Relay {
     fn ready(&mut self, _: u32) -> Result<String, Failure> {
         self.plug().map_err(failed)
@@ -279,15 +308,16 @@ impl Host {
     }
 
     fn cause(&mut self, accident: Accident, rig: &mut dyn Rig) -> Result<(), Failure> {
-        let signal = |signal| {
-            let id = i32::try_from(self.child.id()).ok();
-            let id = id.and_then(rustix::process::Pid::from_raw);
-            id.ok_or_else(|| failed("the host has ended"))
-                .and_then(|id| rustix::process::kill_process(id, signal).map_err(failed))
-        };
         match accident {
-            Accident::Killed => signal(rustix::process::Signal::KILL),
-            Accident::Stopped => signal(rustix::process::Signal::STOP),
+            // On Unix by SIGKILL.
+            Accident::Killed => self.child.kill().map_err(failed),
+            #[cfg(unix)]
+            Accident::Stopped => {
+                let id = i32::try_from(self.child.id()).ok();
+                let id = id.and_then(rustix::process::Pid::from_raw);
+                let id = id.ok_or_else(|| failed("the host has ended"))?;
+                rustix::process::kill_process(id, rustix::process::Signal::STOP).map_err(failed)
+            }
             Accident::Unplugged => rig.unplug(),
             Accident::Stalled => {
                 let stdin = self.child.stdin.as_mut();

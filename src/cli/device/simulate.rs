@@ -1,14 +1,16 @@
-//! `study device simulate`: a device on a pseudo-terminal.
+//! `study device simulate`: a device on a pseudo-terminal or at an address of this computer.
 
-use crate::cli::{Console, Failure};
+use crate::cli::{Console, Failure, Kind};
+use crate::tui::Signals;
+use std::net::SocketAddr;
+#[cfg(unix)]
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use study_device::firmware::{Firmware, Flaw, Options, Wrong, WrongLoads};
 use study_device::link::memory::Noise;
 use study_device::link::priority;
-use study_device::link::pty::{Control, Simulator};
+use study_device::link::simulator::{Control, Simulator, Socket};
+use study_device::link::tcp::Token;
 
 /// Arguments of `study device simulate`.
 #[derive(Debug, clap::Args)]
@@ -27,8 +29,15 @@ pub(in crate::cli) struct Args {
     #[arg(long, value_name = "NAME", default_value = "simulated-1")]
     serial: String,
     /// Create a symbolic link with this name that always leads to the current port
-    #[arg(long, value_name = "PATH")]
+    #[cfg(unix)]
+    #[arg(long, value_name = "PATH", conflicts_with = "listen")]
     link: Option<PathBuf>,
+    /// Wait for a host at this address of this computer instead of on a pseudo-terminal; port 0 is
+    /// any free one. Others can reach an address that is not of the loopback interface, and
+    /// need the token that is printed
+    #[arg(long, value_name = "ADDRESS:PORT", num_args = 0..=1, require_equals = true,
+          default_missing_value = ANY_PORT)]
+    listen: Option<SocketAddr>,
     /// Fault of the link: corrupt, drop, duplicate, reorder or delay, with the fraction of
     /// frames, such as drop=0.01. May be repeated
     #[arg(long, value_name = "FAULT", value_parser = fault)]
@@ -41,6 +50,9 @@ pub(in crate::cli) struct Args {
     #[arg(long, value_name = "HOW", value_parser = wrong)]
     wrong: Option<WrongLoads>,
 }
+
+/// Any free port, which only this computer can reach.
+const ANY_PORT: &str = "127.0.0.1:0";
 
 /// Why an argument is rejected.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -158,8 +170,9 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
         ..Options::default()
     });
     let failed = |e: study_device::link::LinkError| Failure::device(e);
-    let mut simulator = Simulator::open(firmware, noise(&args.fault), args.seed, args.link.clone())
-        .map_err(failed)?;
+    let socket = socket(args)?;
+    let mut simulator =
+        Simulator::open(firmware, noise(&args.fault), args.seed, socket).map_err(failed)?;
     let port = |simulator: &Simulator| format!("{}\n", simulator.path().unwrap_or_default());
     console.out(port(&simulator))?;
     console.say(format!(
@@ -174,14 +187,15 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
     let lines = super::hold::input_lines();
     // A device has a processor of its own.
     priority::raise();
-    let ended = ended();
-    while !ended.load(Ordering::Relaxed) {
+    let signals = Signals::register().map_err(Failure::device)?;
+    let mut ended = false;
+    while !ended && signals.take().is_none() {
         for _ in 0..64 {
             simulator.step();
         }
         while let Ok(line) = lines.try_recv() {
             match command(&line) {
-                Some(Command::Quit) => ended.store(true, Ordering::Relaxed),
+                Some(Command::Quit) => ended = true,
                 Some(Command::Control(what)) => {
                     simulator.control(what).map_err(failed)?;
                     // Confirms that the command was executed.
@@ -207,18 +221,27 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
     Ok(())
 }
 
-/// A flag that is set by the signals that ask a program to end.
-fn ended() -> Arc<AtomicBool> {
-    let flag = Arc::new(AtomicBool::new(false));
-    for signal in [
-        signal_hook::consts::SIGINT,
-        signal_hook::consts::SIGTERM,
-        signal_hook::consts::SIGHUP,
-    ] {
-        // A signal that cannot be caught ends the program at once.
-        let _ = signal_hook::flag::register(signal, Arc::clone(&flag));
+/// Where the device is found.
+fn socket(args: &Args) -> Result<Socket, Failure> {
+    match args.listen {
+        Some(at) => at_address(at),
+        #[cfg(unix)]
+        None => Ok(Socket::Pty {
+            name: args.link.clone(),
+        }),
+        #[cfg(not(unix))]
+        None => at_address(SocketAddr::from(([127, 0, 0, 1], 0))),
     }
-    flag
+}
+
+/// At an address, with a new token.
+pub(super) fn at_address(at: SocketAddr) -> Result<Socket, Failure> {
+    let mut bytes = [0; 16];
+    getrandom::fill(&mut bytes)
+        .map_err(|e| Failure::device(format!("no random number for the token: {e}")))?;
+    let token: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
+    let token = Token::new(&token).map_err(|e| Failure::new(Kind::Bug, e))?;
+    Ok(Socket::Tcp { at, token })
 }
 
 #[cfg(test)]

@@ -24,7 +24,7 @@ fn command_line(args: &Args) -> String {
         }
     };
     option("device", Some(args.device.clone()));
-    option("port", args.port.port.clone());
+    option("port", args.port.shown_port());
     option("baud", args.port.baud.map(|b| b.to_string()));
     option("rate", Some(args.rate.to_string()));
     option("max-force", Some(args.max_force.to_string()));

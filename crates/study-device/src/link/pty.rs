@@ -1,31 +1,15 @@
-//! The simulated device on a pseudo-terminal, in real time.
-//!
-//! To another program it is a device on a serial port. [`Simulator`] runs the simulated
-//! firmware in real time and transfers the bytes. The cable can be unplugged and plugged
-//! in again, and the line can have faults.
-//!
-//! The device's time follows the clock, but one step is at most [`MAX_STEP`] long. On a
-//! busy machine the device's time then falls behind; the simulator counts these pauses.
+//! The device's end of a pseudo-terminal: to another program it is a serial port.
 
 use super::LinkError;
-use super::memory::{Line, Noise};
-use crate::firmware::Firmware;
+use super::cable::{Cable, MAX_WAITING};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fd::OwnedFd;
 use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 use rustix::io::Errno;
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
-use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
-use study_wire::message::Fault;
-
-/// Longest step of the device's time.
-pub const MAX_STEP: Duration = Duration::from_millis(5);
-/// Largest number of bytes that wait for a host that does not read; more are lost.
-const MAX_WAITING: usize = 1 << 16;
-/// Largest lateness that is distinguished, µs.
-const MAX_LATE_US: usize = 10_000;
+use std::path::Path;
+use std::time::Duration;
 
 /// The device's end of a pseudo-terminal.
 #[derive(Debug)]
@@ -58,21 +42,21 @@ impl Pty {
             waiting: Vec::new(),
         })
     }
+}
 
-    /// Path of the host's end.
-    pub fn path(&self) -> &str {
+impl Cable for Pty {
+    fn path(&self) -> &str {
         &self.path
     }
 
-    /// The bytes received so far; none without a host.
-    pub(super) fn read(&mut self) -> Vec<u8> {
+    fn read(&mut self) -> Vec<u8> {
         let mut bytes = vec![0; 4096];
         let n = rustix::io::read(&self.master, &mut bytes).unwrap_or(0);
         bytes.truncate(n);
         bytes
     }
 
-    pub(super) fn write(&mut self, bytes: &[u8]) {
+    fn write(&mut self, bytes: &[u8]) {
         if self.waiting.len() + bytes.len() <= MAX_WAITING {
             self.waiting.extend_from_slice(bytes);
         }
@@ -85,8 +69,7 @@ impl Pty {
         }
     }
 
-    /// Waits at most `wait` for bytes.
-    fn wait(&self, wait: Duration) {
+    fn wait(&mut self, wait: Duration) {
         let Ok(wait) = Timespec::try_from(wait) else {
             return;
         };
@@ -99,192 +82,8 @@ impl Pty {
     }
 }
 
-/// An action on a simulated device.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Control {
-    /// Unplugs the cable.
-    Unplug,
-    /// Plugs the cable in again, on a new port.
-    Plug,
-    /// Restarts the device.
-    Reset,
-    /// Trips the device's safety circuit.
-    Trip,
-    /// Stops the device's processor for a time.
-    Stall(Duration),
-    /// From the next playback on somebody holds the handle at this place, mm.
-    Hold(f64),
-}
-
-/// Timing of the simulator.
-#[derive(Debug, Clone)]
-pub struct StepTiming {
-    /// Number of steps by lateness in whole µs; the last entry includes later ones.
-    late_us: Vec<u64>,
-    /// Number of steps that were longer than [`MAX_STEP`].
-    pub pauses: u64,
-    /// Total time by which the device's time is behind.
-    pub paused: Duration,
-}
-
-impl StepTiming {
-    /// Quantile of the lateness over all steps, µs; `fraction` is between 0 and 1.
-    pub fn quantile_us(&self, fraction: f64) -> usize {
-        let total: u64 = self.late_us.iter().sum();
-        let wanted = (fraction * total as f64).ceil() as u64;
-        let mut seen = 0;
-        for (us, count) in self.late_us.iter().enumerate() {
-            seen += count;
-            if seen >= wanted {
-                return us;
-            }
-        }
-        MAX_LATE_US
-    }
-
-    /// Number of steps.
-    pub fn steps(&self) -> u64 {
-        self.late_us.iter().sum()
-    }
-}
-
-/// A simulated device in real time.
-#[derive(Debug)]
-pub struct Simulator {
-    firmware: Firmware,
-    pty: Option<Pty>,
-    /// Symbolic link that always leads to the current port.
-    name: Option<PathBuf>,
-    to_device: Line,
-    to_host: Line,
-    start: Instant,
-    timing: StepTiming,
-    /// Current time of the device.
-    now: Duration,
-}
-
-impl Simulator {
-    /// A device on a new port. `name` becomes a symbolic link to the current port.
-    ///
-    /// # Errors
-    /// [`LinkError`] if there is no pseudo-terminal or the link cannot be created.
-    pub fn open(
-        firmware: Firmware,
-        noise: Noise,
-        seed: u64,
-        name: Option<PathBuf>,
-    ) -> Result<Self, LinkError> {
-        let line = |way| Line::new(Duration::ZERO, noise, seed, way);
-        let mut simulator = Self {
-            firmware,
-            pty: None,
-            name,
-            to_device: line("there"),
-            to_host: line("back"),
-            start: Instant::now(),
-            timing: StepTiming {
-                late_us: vec![0; MAX_LATE_US + 1],
-                pauses: 0,
-                paused: Duration::ZERO,
-            },
-            now: Duration::ZERO,
-        };
-        simulator.plug()?;
-        Ok(simulator)
-    }
-
-    /// Path of the port; `None` while it is unplugged.
-    pub fn path(&self) -> Option<&str> {
-        self.pty.as_ref().map(Pty::path)
-    }
-
-    /// The simulated firmware.
-    pub fn firmware(&self) -> &Firmware {
-        &self.firmware
-    }
-
-    /// Timing so far.
-    pub fn timing(&self) -> &StepTiming {
-        &self.timing
-    }
-
-    /// Performs an action on the device.
-    ///
-    /// # Errors
-    /// [`LinkError`] if it cannot be plugged in.
-    pub fn control(&mut self, what: Control) -> Result<(), LinkError> {
-        match what {
-            Control::Unplug => self.pty = None,
-            Control::Plug => self.plug()?,
-            Control::Reset => self.firmware.reset(self.now),
-            Control::Trip => self.firmware.trip(Fault::External, self.now),
-            Control::Stall(lasting) => self.firmware.stall(self.now, lasting),
-            Control::Hold(x_mm) => self.firmware.hold_at(x_mm),
-        }
-        Ok(())
-    }
-
-    fn plug(&mut self) -> Result<(), LinkError> {
-        if self.pty.is_some() {
-            return Ok(());
-        }
-        let pty = Pty::open()?;
-        if let Some(name) = &self.name {
-            replace_symlink(name, pty.path())
-                .map_err(|e| LinkError::System(format!("{}: {e}", name.display())))?;
-        }
-        self.pty = Some(pty);
-        Ok(())
-    }
-
-    /// Waits for the next servo period or for bytes, then simulates up to now.
-    pub fn step(&mut self) {
-        let paused = self.timing.paused;
-        let due = self.now + self.firmware.period();
-        let wait = (due + paused).saturating_sub(self.start.elapsed());
-        match &self.pty {
-            Some(pty) => pty.wait(wait),
-            None => std::thread::sleep(wait),
-        }
-        let mut now = self.start.elapsed().saturating_sub(paused);
-        let late_us = now.saturating_sub(due).as_micros() as usize;
-        self.timing.late_us[late_us.min(MAX_LATE_US)] += 1;
-        let longest = self.now + MAX_STEP;
-        if now > longest {
-            self.timing.pauses += 1;
-            self.timing.paused += now - longest;
-            now = longest;
-        }
-        if let Some(pty) = &mut self.pty {
-            for frame in frames(&pty.read()) {
-                self.to_device.send(frame.to_vec(), now);
-            }
-        }
-        self.firmware.receive(&self.to_device.arrived(now), now);
-        for frame in frames(&self.firmware.take_output()) {
-            self.to_host.send(frame.to_vec(), now);
-        }
-        let bytes = self.to_host.arrived(now);
-        if let Some(pty) = &mut self.pty {
-            pty.write(&bytes);
-        }
-        self.now = now;
-    }
-}
-
-impl Drop for Simulator {
-    fn drop(&mut self) {
-        // Only a symbolic link is removed, never another file.
-        if let Some(name) = &self.name
-            && std::fs::symlink_metadata(name).is_ok_and(|found| found.is_symlink())
-        {
-            let _ = std::fs::remove_file(name);
-        }
-    }
-}
-
 /// Creates a symbolic link; replaces an earlier link but no other file.
-fn replace_symlink(name: &Path, path: &str) -> std::io::Result<()> {
+pub(super) fn replace_symlink(name: &Path, path: &str) -> std::io::Result<()> {
     match std::fs::symlink_metadata(name) {
         Ok(found) if found.file_type().is_symlink() => std::fs::remove_file(name)?,
         Ok(_) => return Err(std::io::ErrorKind::AlreadyExists.into()),
@@ -293,15 +92,9 @@ fn replace_symlink(name: &Path, path: &str) -> std::io::Result<()> {
     std::os::unix::fs::symlink(path, name)
 }
 
-/// Splits bytes at the ends of frames, so that faults affect single frames.
-fn frames(bytes: &[u8]) -> impl Iterator<Item = &[u8]> {
-    bytes.split_inclusive(|byte| *byte == 0)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::firmware::Options;
     use crate::link::Link as _;
     use crate::serial::SerialLink;
 
@@ -334,32 +127,5 @@ mod tests {
             pty.write(&[7; 100]);
         }
         assert!(pty.waiting.len() <= MAX_WAITING);
-    }
-
-    #[test]
-    fn a_name_leads_to_the_current_port() {
-        let folder = tempfile::tempdir().unwrap();
-        let name = folder.path().join("port");
-        let open = |name: &Path| {
-            Simulator::open(
-                Firmware::new(Options::default()),
-                Noise::default(),
-                1,
-                Some(name.to_owned()),
-            )
-        };
-        let mut simulator = open(&name).unwrap();
-        let leads = || std::fs::read_link(&name).unwrap();
-        assert_eq!(leads(), Path::new(simulator.path().unwrap()));
-        // With the old port still open the new one has another number.
-        let _held = SerialLink::open(simulator.path().unwrap(), 460_800).unwrap();
-        simulator.control(Control::Unplug).unwrap();
-        simulator.control(Control::Plug).unwrap();
-        assert_eq!(leads(), Path::new(simulator.path().unwrap()));
-        drop(simulator);
-        assert!(!name.exists());
-        std::fs::write(&name, "mine").unwrap();
-        assert!(open(&name).is_err(), "a file must not be replaced");
-        assert_eq!(std::fs::read(&name).unwrap(), b"mine");
     }
 }

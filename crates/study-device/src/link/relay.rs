@@ -3,6 +3,7 @@
 //! With it the time to zero force of any device can be measured, also of one whose force
 //! nobody here simulates: the device says in the same servo period that it has become limp.
 
+use super::cable::Cable as _;
 use super::pty::Pty;
 use super::{Link, LinkError};
 use std::time::Duration;
