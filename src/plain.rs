@@ -39,10 +39,9 @@ impl Plain {
     /// Takes standard input and output.
     ///
     /// # Errors
-    /// [`TuiError`] if a session cannot run here.
+    /// [`TuiError`] if they cannot be read or signals cannot be caught.
     /// `hurry` is how many times as fast lines may follow each other: 1 except in tests.
     pub fn open(live: bool, hurry: u32) -> Result<Self, TuiError> {
-        crate::tui::check_platform()?;
         let input = Lines::open().map_err(TuiError::Terminal)?;
         Ok(Self {
             dialogue: Dialogue::new(input.has_keys(), live),

@@ -56,11 +56,6 @@ pub enum TuiError {
     /// The terminal cannot position text.
     #[error("the terminal (TERM={0:?}) cannot show a page")]
     DumbTerminal(String),
-    /// The platform has no signals that would end a session in order.
-    #[error(
-        "a session cannot run on this platform: nothing would stop the device when the terminal closes"
-    )]
-    Platform,
     /// Another error of the terminal.
     #[error("the terminal cannot be used: {0}")]
     Terminal(#[source] std::io::Error),
@@ -78,18 +73,9 @@ impl TuiError {
                 "use a terminal such as xterm, or set TERM to its actual type, or use \
                  --plain; `study rehearse` needs no terminal"
             }
-            Self::Platform => "run it on Linux or macOS, or in the Windows Subsystem for Linux",
             Self::Terminal(_) => "try another terminal window",
         }
     }
-}
-
-/// Refuses a platform on which a session could not end in order.
-///
-/// # Errors
-/// [`TuiError::Platform`].
-pub fn check_platform() -> Result<(), TuiError> {
-    terminal::check_platform()
 }
 
 /// How often the terminal is checked while nothing happens.

@@ -6,15 +6,15 @@
 //! reading never returns once a terminal is gone, and the device must not wait for
 //! that.
 
-#[cfg(not(unix))]
-mod other;
 #[cfg(unix)]
 mod unix;
+#[cfg(windows)]
+mod windows;
 
-#[cfg(not(unix))]
-use other as platform;
 #[cfg(unix)]
 use unix as platform;
+#[cfg(windows)]
+use windows as platform;
 
 pub(crate) use platform::{Signals, survive_file_size_limit};
 
@@ -100,25 +100,12 @@ pub(super) struct Terminal {
     signals: Signals,
 }
 
-/// Refuses a platform on which a session could not end in order.
-pub(super) fn check_platform() -> Result<(), TuiError> {
-    if platform::SUPPORTED {
-        Ok(())
-    } else {
-        Err(TuiError::Platform)
-    }
-}
-
 impl Terminal {
     pub(super) fn open(mouse: bool) -> Result<Self, TuiError> {
-        check_platform()?;
         if !io::stdin().is_terminal() || !io::stdout().is_terminal() {
             return Err(TuiError::NoTerminal);
         }
-        let term = std::env::var("TERM").unwrap_or_default();
-        if term.is_empty() || term == "dumb" {
-            return Err(TuiError::DumbTerminal(term));
-        }
+        platform::positions_text().map_err(TuiError::DumbTerminal)?;
         HOOK.call_once(|| {
             let before = std::panic::take_hook();
             std::panic::set_hook(Box::new(move |info| {

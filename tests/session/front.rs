@@ -40,7 +40,7 @@ struct Session {
 
 impl Session {
     fn start(folder: &Path, protocol: &Path, front: &str) -> Self {
-        let mut child = Command::new(env!("CARGO_BIN_EXE_study"))
+        let mut child = Command::new(crate::support::program())
             .arg("run")
             .arg(protocol)
             .args(["--plain", "--front", front])

@@ -6,7 +6,12 @@
 //! simulated crashes.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+#![allow(
+    clippy::print_stderr,
+    reason = "how many answers were at stake is printed"
+)]
 
+use super::plain::Lines;
 use crate::support::player::{Did, play_before, play_to_end};
 use crate::support::{PATIENT, Terminal, changed_protocol, study};
 use std::path::Path;
@@ -110,4 +115,68 @@ fn a_hundred_kills_lose_nothing_that_was_shown_as_saved() {
 #[test]
 fn another_hundred_kills_lose_nothing_that_was_shown_as_saved() {
     kills(2, 100);
+}
+
+/// The same by lines, at a multiple of a person's pace: what the console of another system
+/// can show as well.
+fn kills_in_lines(seed: u64, count: u32) {
+    let home = tempfile::tempdir().unwrap();
+    let protocol = home.path().join("protocol");
+    changed_protocol("turn-signal", &protocol, &[PATIENT]);
+    let protocol = protocol.to_str().unwrap();
+    let mut chance = Stream::new(seed, &["kill in lines"]);
+    let (mut participant, mut survived) = (1, 0);
+    for kill in 0..count {
+        let id = format!("P{participant:02}");
+        let run = [
+            "run",
+            protocol,
+            "--plain",
+            "--participant",
+            &id,
+            "--operator",
+            "x",
+        ];
+        let lines = Lines::hurried(home.path(), &run);
+        let until = Instant::now() + Duration::from_secs_f64(0.1 + 4.0 * chance.unit());
+        let seen = lines.play_and_kill(until);
+        let kept = done(home.path(), &id);
+        assert!(
+            kept >= seen,
+            "kill {kill}: the lines said that {seen} trials were saved, {kept} are"
+        );
+        survived += seen;
+        if is_done(home.path(), &id) {
+            participant += 1;
+        }
+    }
+    assert!(survived > 0, "nothing was saved: nothing was tested");
+    // The last session can be finished and is complete.
+    let id = format!("P{participant:02}");
+    let run = [
+        "run",
+        protocol,
+        "--plain",
+        "--participant",
+        &id,
+        "--operator",
+        "x",
+    ];
+    let end = Lines::hurried(home.path(), &run).play(None);
+    assert!(end.starts_with("The session is finished"), "{end}");
+    assert_eq!(done(home.path(), &id), 15);
+    let (code, out, err) = study(&["verify", "results"], home.path());
+    assert_eq!(code, 0, "{out}{err}");
+    eprintln!("{count} kills, {participant} participants, {survived} trials shown as saved");
+}
+
+#[test]
+fn kills_of_a_session_in_lines_lose_nothing_that_was_said_to_be_saved() {
+    kills_in_lines(3, 5);
+}
+
+#[test]
+#[ignore = "minutes: .ci/wine runs it"]
+fn two_hundred_kills_in_lines() {
+    kills_in_lines(4, 200);
 }

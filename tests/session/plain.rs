@@ -1,7 +1,9 @@
 //! Whole sessions in plain lines, typed at a pseudo-terminal and through a pipe.
 
 use crate::support::player::play_to_end;
-use crate::support::{HURRY, PATIENCE, PATIENT, Terminal, changed_protocol, study};
+use crate::support::{
+    HURRY, PATIENCE, PATIENT, Terminal, changed_protocol, program, repository, study,
+};
 use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, native_pty_system};
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
@@ -31,6 +33,33 @@ pub(crate) struct Lines {
     unread: Duration,
 }
 
+/// How the lines begin that wait for an answer.
+const ASKS: [&str; 8] = [
+    "Type the participant",
+    "Type the operator",
+    "Type y",
+    "Press Enter",
+    "Type a number",
+    "Type the number",
+    "Type your answer",
+    "The session is",
+];
+
+/// Text without the sequences by which the console of another system moves the cursor.
+fn without_sequences(text: &str) -> String {
+    let mut pieces = text.split("\u{1b}[");
+    let mut plain = pieces.next().unwrap().to_owned();
+    for piece in pieces {
+        plain.push_str(
+            piece
+                .trim_start_matches(|c: char| !c.is_ascii_alphabetic())
+                .get(1..)
+                .unwrap_or(""),
+        );
+    }
+    plain
+}
+
 impl Lines {
     /// A session that goes faster than a person would: see [`HURRY`].
     pub(crate) fn hurried(folder: &Path, arguments: &[&str]) -> Self {
@@ -40,14 +69,24 @@ impl Lines {
     }
 
     pub(crate) fn start(folder: &Path, arguments: &[&str], variable: Option<(&str, &str)>) -> Self {
+        Self::of(program(), folder, arguments, variable)
+    }
+
+    fn of(
+        program: std::ffi::OsString,
+        folder: &Path,
+        arguments: &[&str],
+        variable: Option<(&str, &str)>,
+    ) -> Self {
         let size = PtySize {
             rows: 24,
-            cols: 80,
+            // The console of another system breaks longer lines.
+            cols: 250,
             pixel_width: 0,
             pixel_height: 0,
         };
         let pair = native_pty_system().openpty(size).unwrap();
-        let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_study"));
+        let mut command = CommandBuilder::new(program);
         command.args(arguments);
         command.cwd(folder);
         command.env("TERM", "xterm-256color");
@@ -82,9 +121,15 @@ impl Lines {
         self.keys.flush().unwrap();
     }
 
-    /// Waits for a line after what was read that starts with one of `starts`; the line.
+    /// Waits for a line after what was read that starts with one of `starts`; the line, or
+    /// nothing at the end of the output.
     pub(crate) fn line(&mut self, starts: &[&str]) -> String {
-        let begin = Instant::now();
+        let line = self.line_before(starts, Instant::now() + PATIENCE);
+        line.unwrap_or_else(|| panic!("{starts:?}:\n{}", self.seen))
+    }
+
+    /// The same; `None` if it does not come in time.
+    fn line_before(&mut self, starts: &[&str], until: Instant) -> Option<String> {
         loop {
             while let Some((line, _)) = self.seen[self.read..].split_once('\n') {
                 let line = line.trim_end().to_owned();
@@ -94,15 +139,23 @@ impl Lines {
                     self.trial = rest.split(' ').next().unwrap().parse().unwrap();
                 }
                 if starts.iter().any(|start| line.starts_with(start)) {
-                    return line;
+                    return Some(line);
                 }
             }
-            assert!(begin.elapsed() < PATIENCE, "{starts:?}:\n{}", self.seen);
+            let left = until.checked_duration_since(Instant::now())?;
             // The output ends after its last bytes, and the program may end before them.
-            match self.output.recv_timeout(Duration::from_millis(100)) {
-                Ok(bytes) => self.seen.push_str(&String::from_utf8_lossy(&bytes)),
+            let wait = left.min(Duration::from_millis(100));
+            match self.output.recv_timeout(wait) {
+                Ok(bytes) => {
+                    let text = String::from_utf8_lossy(&bytes);
+                    self.seen
+                        .push_str(&match std::env::var_os("STUDY_TEST_PROGRAM") {
+                            Some(_) => without_sequences(&text),
+                            None => text.into_owned(),
+                        });
+                }
                 Err(RecvTimeoutError::Timeout) => {}
-                Err(RecvTimeoutError::Disconnected) => return String::new(),
+                Err(RecvTimeoutError::Disconnected) => return Some(String::new()),
             }
         }
     }
@@ -116,41 +169,64 @@ impl Lines {
 
     /// Types what each page asks for, until a line starts with `stop`, or to the end.
     pub(crate) fn play(&mut self, stop: Option<&str>) -> String {
-        const ASKS: [&str; 8] = [
-            "Type the participant",
-            "Type the operator",
-            "Type y",
-            "Press Enter",
-            "Type a number",
-            "Type the number",
-            "Type your answer",
-            "The session is",
-        ];
         let starts: Vec<&str> = ASKS.into_iter().chain(stop).collect();
         loop {
             let line = self.asked(&starts);
             if line.is_empty() || stop.is_some_and(|stop| line.starts_with(stop)) {
                 return line;
             }
-            let rating = 2 + self.trial % 5;
-            let typed = match line.as_str() {
-                l if l.starts_with("Type the participant") => "P01\n".to_owned(),
-                l if l.starts_with("Type the operator") => "lw\n".to_owned(),
-                l if l.starts_with("Type y:") || l.starts_with("Type y ") => "y\n".to_owned(),
-                l if ["1 to 7", "1 to 9"]
-                    .iter()
-                    .any(|s| l[13..].starts_with(&format!(" from {s}"))) =>
-                {
-                    format!("{rating}\n")
-                }
-                l if l.starts_with("Type a number") && self.trial > 0 => format!("3{rating}\n"),
-                l if l.starts_with("Type a number") => "33\n".to_owned(),
-                l if l.starts_with("Type the number") => "1\n".to_owned(),
-                l if l.starts_with("The session is") => return line,
-                _ => "\n".to_owned(),
-            };
-            self.types(&typed);
+            if line.starts_with("The session is") {
+                return line;
+            }
+            self.answer(&line);
         }
+    }
+
+    /// Types what a line of [`ASKS`] asks for.
+    fn answer(&mut self, asked: &str) {
+        let rating = 2 + self.trial % 5;
+        let typed = match asked {
+            l if l.contains("Enter alone: ") => "\n".to_owned(),
+            l if l.starts_with("Type the participant") => "P01\n".to_owned(),
+            l if l.starts_with("Type the operator") => "lw\n".to_owned(),
+            l if l.starts_with("Type y:") || l.starts_with("Type y ") => "y\n".to_owned(),
+            l if ["1 to 7", "1 to 9"]
+                .iter()
+                .any(|s| l[13..].starts_with(&format!(" from {s}"))) =>
+            {
+                format!("{rating}\n")
+            }
+            l if l.starts_with("Type a number") && self.trial > 0 => format!("3{rating}\n"),
+            l if l.starts_with("Type a number") => "33\n".to_owned(),
+            l if l.starts_with("Type the number") => "1\n".to_owned(),
+            _ => "\n".to_owned(),
+        };
+        self.types(&typed);
+    }
+
+    /// Plays until a moment, then kills the program: the number of trials that were shown as
+    /// saved.
+    pub(crate) fn play_and_kill(mut self, until: Instant) -> usize {
+        while let Some(line) = self.line_before(&ASKS, until)
+            && !line.is_empty()
+            && !line.starts_with("The session is")
+        {
+            std::thread::sleep(self.unread);
+            self.answer(&line);
+        }
+        let id = self.child.process_id().unwrap().to_string();
+        let killed = std::process::Command::new("kill")
+            .args(["-KILL", &id])
+            .status();
+        // It may have ended by itself.
+        killed.unwrap();
+        self.child.wait().unwrap();
+        while let Ok(bytes) = self.output.recv_timeout(PATIENCE) {
+            self.seen.push_str(&String::from_utf8_lossy(&bytes));
+        }
+        let saved = self.seen.rsplit("Trials saved: ");
+        let counts = saved.filter_map(|after| after.split('.').next()?.parse().ok());
+        counts.max().unwrap_or(0)
     }
 
     /// Checks that the output is append-only text.
@@ -356,8 +432,8 @@ fn lines_can_remark_correct_stop_pause_quit_and_resume() {
 #[test]
 fn a_pipe_that_ends_leaves_the_session_unfinished_and_everything_saved() {
     let folder = tempfile::tempdir().unwrap();
-    let protocol = crate::support::repository("protocols/turn-signal");
-    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_study"))
+    let protocol = repository("protocols/turn-signal");
+    let mut child = std::process::Command::new(program())
         .args(["run", &protocol, "--plain"])
         .current_dir(folder.path())
         .stdin(std::process::Stdio::piped())
@@ -455,4 +531,43 @@ fn typed_lines_have_an_author_and_a_way_back() {
         said.contains('3') && said.contains("Enter alone keeps"),
         "{said}"
     );
+}
+
+/// The build that `STUDY_TEST_PROGRAM` runs and the one that was built with the tests, by the
+/// same answers.
+#[test]
+#[ignore = "compares with another build: .ci/wine runs it"]
+fn another_build_writes_the_same_journal() {
+    let own = std::ffi::OsString::from(env!("CARGO_BIN_EXE_study"));
+    assert_ne!(program(), own, "STUDY_TEST_PROGRAM names the other build");
+    let short = [
+        PATIENT,
+        ("max_attempts = 3", "max_attempts = 50"),
+        ("repetitions = 3", "repetitions = 1"),
+        ("at_least_s = 60", "at_least_s = 1"),
+    ];
+    for name in ["turn-signal", "knob", "keyboard"] {
+        let text = fs::read_to_string(repository(&format!("protocols/{name}/protocol.toml")));
+        let text = text.unwrap();
+        let applied: Vec<_> = short
+            .into_iter()
+            .filter(|(old, _)| text.contains(old))
+            .filter(|&change| change != PATIENT || !text.contains("max_attempts"))
+            .collect();
+        let home = tempfile::tempdir().unwrap();
+        let protocol = home.path().join("protocol");
+        changed_protocol(name, &protocol, &applied);
+        let protocol = protocol.to_str().unwrap();
+        let [here, there] = [own.clone(), program()].map(|build| {
+            let folder = tempfile::tempdir().unwrap();
+            let run = ["run", protocol, "--plain"];
+            let mut lines = Lines::of(build, folder.path(), &run, Some(HURRY));
+            let end = lines.play(None);
+            assert!(end.starts_with("The session is finished"), "{}", lines.seen);
+            lines.child.wait().unwrap();
+            events_of(folder.path(), name)
+        });
+        assert!(here.len() > 20, "{name}");
+        assert_eq!(here, there, "{name}");
+    }
 }

@@ -205,7 +205,7 @@ fn answers(page: &Value) -> Value {
 
 impl Session {
     fn start(folder: &Path, protocol: &Path, more: &[&str]) -> Self {
-        let mut child = Command::new(env!("CARGO_BIN_EXE_study"))
+        let mut child = Command::new(crate::support::program())
             .arg("run")
             .arg(protocol)
             .args(["--plain", "--screen"])

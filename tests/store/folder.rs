@@ -169,6 +169,22 @@ fn an_id_like_an_option_is_refused_unless_it_exists() {
     run(&study, &real("x-1"), 3);
 }
 
+/// Windows has no folder of this name, and a results folder may be copied there.
+#[test]
+fn an_id_that_windows_keeps_for_a_device_is_refused_unless_it_exists() {
+    let results = tempfile::tempdir().unwrap();
+    let study = open(results.path());
+    for id in ["CON", "nul", "Com1"] {
+        let refused = study.claim(&real(id));
+        assert!(
+            matches!(refused, Err(StoreError::WindowsDevice { .. })),
+            "{refused:?}"
+        );
+    }
+    std::fs::create_dir_all(study.path().join("sessions/CON")).unwrap();
+    assert_eq!(run(&study, &real("CON"), 3), Seat::Row(1));
+}
+
 #[test]
 fn a_session_can_be_void_only_before_its_first_rating() {
     let results = tempfile::tempdir().unwrap();

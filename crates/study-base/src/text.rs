@@ -270,6 +270,19 @@ impl ParticipantId {
     pub fn is_like_option(&self) -> bool {
         self.0.starts_with('-')
     }
+
+    /// Whether Windows takes it for a device, such as `CON` or `com1`, and not for the name of
+    /// a folder.
+    pub fn is_windows_device(&self) -> bool {
+        let name = self.0.to_ascii_uppercase();
+        match name
+            .strip_prefix("COM")
+            .or_else(|| name.strip_prefix("LPT"))
+        {
+            Some(number) => number.len() == 1 && number.as_bytes()[0].is_ascii_digit(),
+            None => ["CON", "PRN", "AUX", "NUL"].contains(&name.as_str()),
+        }
+    }
 }
 
 identifier!(
@@ -290,6 +303,17 @@ identifier!(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn names_of_windows_devices_are_known() {
+        let is_device = |id: &str| ParticipantId::new(id).unwrap().is_windows_device();
+        for id in ["CON", "con", "nul", "Aux", "PRN", "COM0", "com9", "LPT1"] {
+            assert!(is_device(id), "{id}");
+        }
+        for id in ["P01", "COM", "COM10", "COMX", "CONSENT", "NUL-1", "LPT"] {
+            assert!(!is_device(id), "{id}");
+        }
+    }
 
     #[test]
     fn numbers_of_other_keyboards_are_read() {

@@ -51,7 +51,7 @@ impl Lines {
     }
 
     /// Whether Ctrl-Z was pressed since the last call.
-    pub(in crate::plain) fn take_suspend(&self) -> bool {
+    pub(in crate::plain) fn take_suspend(&mut self) -> bool {
         self.suspend.swap(false, Ordering::SeqCst)
     }
 
@@ -118,10 +118,7 @@ impl Lines {
             self.bytes.clear();
             return Some(Typed::Stop);
         }
-        let end = self.bytes.iter().position(|b| *b == b'\n')?;
-        let line: Vec<u8> = self.bytes.drain(..=end).collect();
-        let line = String::from_utf8_lossy(&line[..end]);
-        Some(Typed::Line(line.trim_end_matches('\r').to_owned()))
+        super::take_line(&mut self.bytes).map(Typed::Line)
     }
 }
 

@@ -17,9 +17,6 @@ use std::io;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
 
-/// Whether this platform can guarantee that a session ends in order.
-pub(super) const SUPPORTED: bool = true;
-
 /// Signals that end a session in order.
 const ENDING: [i32; 9] = [
     SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF,
@@ -157,6 +154,14 @@ pub(super) fn hung_up() -> bool {
     ];
     let polled = rustix::event::poll(&mut ends, Some(&Timespec::default()));
     polled.is_ok() && ends.iter().any(|end| end.revents().intersects(gone))
+}
+
+/// Whether the terminal can position text; what it calls itself, if not.
+pub(super) fn positions_text() -> Result<(), String> {
+    match std::env::var("TERM").unwrap_or_default() {
+        term if term.is_empty() || term == "dumb" => Err(term),
+        _ => Ok(()),
+    }
 }
 
 /// Lets a write past the limit of the file size fail with an error instead of ending

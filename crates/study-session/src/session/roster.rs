@@ -112,6 +112,7 @@ impl Roster {
                 None => "finished".to_owned(),
             },
             None if id.is_like_option() => "begins with -, like an option".to_owned(),
+            None if id.is_windows_device() => "the name of a device on Windows".to_owned(),
             None
             | Some(Known {
                 state: State::Void, ..

@@ -5,15 +5,15 @@
 //! the program. On Unix files are made 0600 and folders 0700, so that only their
 //! owner can read what participants said.
 
-#[cfg(any(not(unix), test))]
-mod other;
 #[cfg(unix)]
 mod unix;
+#[cfg(windows)]
+mod windows;
 
-#[cfg(not(unix))]
-use other as system;
 #[cfg(unix)]
 use unix as system;
+#[cfg(windows)]
+use windows as system;
 
 use std::any::Any;
 use std::fmt;
@@ -207,15 +207,15 @@ impl Disk for RealDisk {
     }
 
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
-        std::fs::rename(from, to)
+        system::rename(from, to)
     }
 
     fn remove_file(&self, path: &Path) -> io::Result<()> {
-        std::fs::remove_file(path)
+        system::remove_file(path)
     }
 
     fn remove_folder(&self, path: &Path) -> io::Result<()> {
-        std::fs::remove_dir(path)
+        system::remove_folder(path)
     }
 
     fn read(&self, path: &Path) -> io::Result<Vec<u8>> {
@@ -359,7 +359,7 @@ mod tests {
         assert!(
             disk.free_bytes(&folder)
                 .unwrap()
-                .is_none_or(|free| free > 0)
+                .is_some_and(|free| free > 0)
         );
         disk.remove_file(&folder.join("old")).unwrap();
         disk.remove_folder(&folder).unwrap();

@@ -229,6 +229,12 @@ pub enum StoreError {
         /// Requested id.
         given: ParticipantId,
     },
+    /// A new id that is the name of a device on Windows.
+    #[error("`{given}` cannot be a new participant's id: Windows keeps this name for a device")]
+    WindowsDevice {
+        /// Requested id.
+        given: ParticipantId,
+    },
     /// No row is free in the range of this rig.
     #[error("no row from {from} to {to} is free")]
     NoRow {
@@ -368,7 +374,7 @@ impl StoreError {
             Self::Collides { existing, .. } => {
                 format!("use `{existing}` if it is the same person")
             }
-            Self::LikeOption { .. } => "use a pseudonym, such as P01".to_owned(),
+            Self::LikeOption { .. } | Self::WindowsDevice { .. } => "use a pseudonym, such as P01".to_owned(),
             Self::NoRow { .. } => "give this rig a larger range with --rows".to_owned(),
             Self::OtherKind { .. } => "use another id".to_owned(),
             Self::SessionsMissing { path, .. } => format!(
@@ -395,6 +401,7 @@ impl StoreError {
                 | Self::OtherKind { .. }
                 | Self::Collides { .. }
                 | Self::LikeOption { .. }
+                | Self::WindowsDevice { .. }
                 | Self::NoRow { .. }
                 | Self::TooEarly { .. }
                 | Self::OtherGroup { .. }

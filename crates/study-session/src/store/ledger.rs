@@ -369,15 +369,20 @@ fn check_standing(
     }
 }
 
-/// Refuses a new id that a command would take for an option. Earlier releases accepted it.
+/// Refuses a new id that a command would take for an option, or Windows for a device: a results
+/// folder can be copied to every system. Earlier releases accepted both.
 ///
 /// # Errors
-/// [`StoreError::LikeOption`].
+/// [`StoreError::LikeOption`], [`StoreError::WindowsDevice`].
 pub fn check_new_id(id: &ParticipantId) -> Result<(), StoreError> {
-    match id.is_like_option() {
-        true => Err(StoreError::LikeOption { given: id.clone() }),
-        false => Ok(()),
+    let given = || id.clone();
+    if id.is_like_option() {
+        return Err(StoreError::LikeOption { given: given() });
     }
+    if id.is_windows_device() {
+        return Err(StoreError::WindowsDevice { given: given() });
+    }
+    Ok(())
 }
 
 fn check_kind(request: &ClaimRequest, seat: Seat) -> Result<(), StoreError> {
