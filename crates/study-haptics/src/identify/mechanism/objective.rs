@@ -4,6 +4,7 @@ use super::sensitivity::{HANDLE_KG, Sensitive};
 use super::{Layout, motion_between};
 use crate::identify::signal::{LowPass, SignalError, sampling_interval_s};
 use crate::recording::Recording;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use study_wire::mechanism::{MechanismView, State};
 
 /// Samples are averaged to at most this rate before they are compared, Hz.
@@ -52,6 +53,9 @@ pub(super) struct Compared<'r> {
     /// The averaged samples that count, and how far apart they are.
     rows: Vec<usize>,
     stride: usize,
+    /// Memory of the last derivative: a new one of tens of megabytes for each sum would cost as
+    /// much time as the sum.
+    spare: Mutex<Vec<f64>>,
 }
 
 /// The squared error and, if asked for, its normal equations.
@@ -102,6 +106,7 @@ impl<'r> Compared<'r> {
                 .step_by(stride)
                 .collect(),
             stride,
+            spare: Mutex::default(),
         })
     }
 
@@ -109,6 +114,10 @@ impl<'r> Compared<'r> {
     pub(super) fn keep(&mut self, counts: impl Fn(usize) -> bool) {
         let block = self.block;
         self.rows.retain(|row| counts(row * block));
+    }
+
+    fn spare(&self) -> MutexGuard<'_, Vec<f64>> {
+        self.spare.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Steps of the mechanism per sample so that none is longer than 1/`least_hz`.
@@ -158,7 +167,9 @@ impl<'r> Compared<'r> {
         let parameters = layout.parameters();
         let rows = self.force_n.len();
         // column by column, so that each is one signal
-        let mut jacobian = vec![0.0; parameters * rows];
+        let mut jacobian = std::mem::take(&mut *self.spare());
+        jacobian.clear();
+        jacobian.resize(parameters * rows, 0.0);
         let mut predicted = vec![0.0; rows];
         let mut by = vec![0.0; parameters];
         let mut state = Sensitive::new(&self.start(mechanism), parameters);
@@ -194,6 +205,7 @@ impl<'r> Compared<'r> {
                 self.rows.iter().map(|i| low[*i]).collect()
             })
             .collect();
+        *self.spare() = jacobian;
         let mut normal = vec![0.0; parameters * parameters];
         let mut gradient = vec![0.0; parameters];
         for (i, column) in columns.iter().enumerate() {
