@@ -315,6 +315,24 @@ fn bounds_cover_and_twice_the_bound_is_found() {
     }
 }
 
+/// The acceleration of the lever's encoder is mostly noise: a mass is found, without bias, and a table does not take it up; the output says both.
+#[test]
+fn a_mass_that_a_table_would_find_too_little_of_is_found_and_left_out() {
+    let [mut plant, mut noise] = ["plant", "noise"].map(|name| Stream::new(24, &[name]));
+    let recording = Condition::Lever.recording(&mut plant, &mut noise, [0.3, 0.0]);
+    let [mass, _] = evidence::of(&[&recording], recording.range_mm()).unwrap();
+    assert!(mass.found && !mass.carried, "{mass:?}");
+    assert!(mass.reliability < 0.8, "{mass:?}");
+    assert!(
+        (mass.value - 0.3).abs() < 3.0 * mass.standard_error,
+        "{mass:?}"
+    );
+    assert!(mass.standard_error < 0.1 * mass.value, "{mass:?}");
+    let text = mass.to_string();
+    let why = "left out, because a table would find too little of it";
+    assert!(text.contains(" g ± ") && text.contains(why), "{text}");
+}
+
 /// With a single press and release, slow or fast, nothing is found. The output says so; there is no bound of the mass, and that
 /// of the damping covers.
 #[test]

@@ -155,7 +155,7 @@ impl fmt::Display for Evidence {
                 ),
                 (false, false) => write!(
                     f,
-                    ", left out, because what was left out is predicted as well without it"
+                    ", left out, because the rest of the recordings is predicted as well without it"
                 ),
             };
         }
@@ -167,7 +167,7 @@ impl fmt::Display for Evidence {
         if self.carried {
             return write!(
                 f,
-                "; it is kept because it predicts what was left out, but friction that depends on the speed may look like it"
+                "; a table has it because it predicts, but friction that depends on the speed may look like it"
             );
         }
         match (self.enough_strokes, self.shows, self.upper_bound) {
@@ -207,6 +207,9 @@ pub fn of(recordings: &[&Recording], range_mm: [f64; 2]) -> Option<[Evidence; 2]
         .map(|r| &**r)
         .filter(|r| r.len() > 3)
         .collect();
+    if !enough(&averages) {
+        return None;
+    }
     let reference = Reference::new(&averages, range_mm, enough_strokes)?;
     let found = each_beside_the_other(
         |kept, term| reference.evidence(kept, term),
@@ -222,7 +225,7 @@ pub fn of(recordings: &[&Recording], range_mm: [f64; 2]) -> Option<[Evidence; 2]
         shown_from: found[term].shown_from,
         shows: found[term].shows,
         enough_strokes,
-        carried: carried[term].is_carried() && found[term].may_be_carried(),
+        carried: enough_strokes && carried[term].is_carried() && found[term].may_be_carried(),
         reliability: carried[term].reliability,
     }))
 }
@@ -246,6 +249,95 @@ fn each_beside_the_other<T: Copy>(
             let mut found = both;
             found[stronger] = alone(stronger)?;
             Some(found)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One that is bounded and would be found.
+    fn unknown(term: Term) -> Evidence {
+        Evidence {
+            term,
+            value: 0.001,
+            standard_error: 0.002,
+            found: false,
+            upper_bound: Some(0.012),
+            shown_from: Some(0.024),
+            shows: true,
+            enough_strokes: true,
+            carried: false,
+            reliability: 0.9,
+        }
+    }
+
+    #[test]
+    fn every_state_has_its_words() {
+        let mass = unknown(Term::Mass);
+        let none = Evidence {
+            upper_bound: None,
+            shown_from: None,
+            shows: false,
+            ..mass
+        };
+        let found = Evidence {
+            value: 0.05,
+            found: true,
+            ..mass
+        };
+        let damping = unknown(Term::Damping);
+        let few = Evidence {
+            enough_strokes: false,
+            shows: false,
+            ..damping
+        };
+        for (evidence, words) in [
+            (
+                mass,
+                "mass: not identified by the recordings, at most 12.00 g (99 %)",
+            ),
+            (
+                none,
+                "mass: not identified by the recordings and not bounded, because the acceleration is explained by position and direction \
+                 or stays below its noise; many strokes at several speeds, some of them fast, would show one",
+            ),
+            (
+                Evidence {
+                    shows: false,
+                    ..damping
+                },
+                "damping: not identified by the recordings, at most 1.20e-2 N·s/mm (99 %); no damping can be told from friction by this \
+                 motion; several strokes at different speeds would show one",
+            ),
+            (
+                few,
+                "damping: not identified by the recordings, at most 1.20e-2 N·s/mm (99 %); with fewer than 4 strokes a force that \
+                 depends on position and direction looks like any damping; several strokes at different speeds would show one",
+            ),
+            (
+                Evidence {
+                    carried: true,
+                    ..damping
+                },
+                "damping: not identified by the recordings, at most 1.20e-2 N·s/mm (99 %); a table has it because it predicts, but \
+                 friction that depends on the speed may look like it",
+            ),
+            (
+                Evidence {
+                    reliability: 0.3,
+                    ..found
+                },
+                "mass: 50.00 g ± 2.00 g, left out, because a table would find too little of it: only 30 % of the variance of the \
+                 acceleration is not noise; a filter or a sensor of the acceleration would help",
+            ),
+            (
+                found,
+                "mass: 50.00 g ± 2.00 g, left out, because the rest of the recordings is predicted as well without it",
+            ),
+        ] {
+            assert_eq!(evidence.to_string(), words);
         }
     }
 }

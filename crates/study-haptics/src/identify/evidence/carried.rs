@@ -6,6 +6,8 @@
 //! * the regressor, after everything that the other terms explain is removed, varies by more than its own noise: the reliability
 //!   κ = 1 − n σ² / S is at least [`LEAST_RELIABILITY`], with S the remaining sum of squares and σ² the noise of single samples, from third
 //!   differences. Least squares finds the share κ of a term;
+//! * what remains of the regressor is at least [`LEAST_SHARE`] of it: of strokes that are alike, the speed is a function of position and direction, and
+//!   what is left of it says nothing of other speeds;
 //! * the estimate is above [`LEAST_RATIO`] standard errors, from the sums over blocks of samples, which are allowed to be correlated;
 //! * the blocks are predicted better with the term than without it when they are left out.
 
@@ -15,6 +17,8 @@ use crate::recording::Recording;
 
 /// Least reliability of a regressor.
 pub(super) const LEAST_RELIABILITY: f64 = 0.8;
+/// Least share of the squares of a regressor that the other terms do not explain.
+const LEAST_SHARE: f64 = 0.05;
 /// Least ratio of an estimate to its standard error.
 const LEAST_RATIO: f64 = 3.0;
 
@@ -23,6 +27,8 @@ const LEAST_RATIO: f64 = 3.0;
 pub(super) struct Carried {
     /// The share of the regressor's variance, beside the other terms, that is not its noise: 0 to 1.
     pub(super) reliability: f64,
+    /// The share of the regressor's squares that the other terms do not explain.
+    share: f64,
     /// Estimate over standard error.
     ratio: f64,
     /// By which share the squared error on blocks left out is larger without the term.
@@ -32,7 +38,10 @@ pub(super) struct Carried {
 impl Carried {
     /// Whether a table takes it up.
     pub(super) fn is_carried(self) -> bool {
-        self.reliability >= LEAST_RELIABILITY && self.ratio > LEAST_RATIO && self.gain > 0.0
+        self.reliability >= LEAST_RELIABILITY
+            && self.share >= LEAST_SHARE
+            && self.ratio > LEAST_RATIO
+            && self.gain > 0.0
     }
 }
 
@@ -89,6 +98,7 @@ fn one(equations: &Equations, kept: [bool; 2], term: usize, noise: f64) -> Optio
     ];
     Some(Carried {
         reliability: (1.0 - noise * column[at]).clamp(0.0, 1.0),
+        share: 1.0 / (column[at] * equations.total.square[1 + term]),
         ratio: x[at] / (variance * blocks / (blocks - 1.0)).sqrt(),
         gain: without / with - 1.0,
     })

@@ -59,9 +59,9 @@ impl Found {
         self.is_determined && self.gain > 0.0 && found
     }
 
-    /// Whether a table may take the term up: the recordings show it, or they would show one and it predicts more than [`LITTLE`].
+    /// Whether a table may take the term up: the recordings show it, or it predicts more than [`LITTLE`].
     pub(super) fn may_be_carried(self) -> bool {
-        self.is_found() || self.shows && self.gain > LITTLE
+        self.is_found() || self.gain > LITTLE
     }
 }
 
