@@ -15,7 +15,7 @@ pub mod rehearsal;
 pub mod saver;
 
 use clock::Clock;
-use loading::end_of_slot;
+use loading::Slot;
 use saver::{Job, SaveEvent, Saver};
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::RangeInclusive;
@@ -136,6 +136,8 @@ pub struct Runner {
     copies: Option<Copies>,
     /// When the load under way was requested.
     load_began: Duration,
+    /// How long every load takes, from the first one on.
+    slot: Option<Slot>,
     /// When the session is told that the table is loaded.
     loaded_due: Option<Duration>,
     /// When the device last reported about the current playback.
@@ -173,6 +175,7 @@ impl Runner {
             receipt: None,
             copies: None,
             load_began: Duration::ZERO,
+            slot: None,
             loaded_due: None,
             last_report: None,
             codes,
@@ -388,6 +391,8 @@ impl Runner {
         };
         let at = self.device_time();
         self.load_began = at;
+        let planned = || Slot::planned(&self.setup, &self.limits);
+        self.slot = Some(self.slot.unwrap_or_else(planned));
         match self.setup.device.load(&stimulus, limits, at) {
             Ok(()) => {
                 self.send(Job::TelemetryBegin {
@@ -418,7 +423,8 @@ impl Runner {
             }
             let input = match report {
                 Report::Loaded => {
-                    self.loaded_due = Some(end_of_slot(self.load_began, at));
+                    let told = self.slot.map(|slot| slot.end(self.load_began, at));
+                    self.loaded_due = told.or(Some(at));
                     continue;
                 }
                 Report::Mount(code) => Input::DeviceMount(code),

@@ -17,6 +17,7 @@ use study_analysis::load::{Loaded, load};
 use study_base::limits::Limits;
 use study_base::text::ModelId;
 use study_device::faults::{FaultPlan, InjectedFault};
+use study_device::link::memory::Pace;
 use study_device::virtual_device::{Options, VirtualDevice};
 use study_device::{Device, DeviceError, Identity, Report, Stimulus};
 use study_plan::protocol::{
@@ -117,6 +118,7 @@ fn pages(
     entry: Entry,
     change: fn(&mut Protocol),
     fault: Option<InjectedFault>,
+    device: fn(Options) -> Box<dyn Device>,
 ) -> Vec<String> {
     let mut loaded = load(Path::new(&repository(name))).unwrap();
     let protocol = &mut loaded.protocol;
@@ -183,9 +185,20 @@ fn compare(
     fault: Option<InjectedFault>,
     reduce: fn(Vec<String>) -> Vec<String>,
 ) {
+    compare_on(device, entry, change, fault, reduce);
+}
+
+/// The same on another device.
+fn compare_on(
+    device: fn(Options) -> Box<dyn Device>,
+    entry: Entry,
+    change: fn(&mut Protocol),
+    fault: Option<InjectedFault>,
+    reduce: fn(Vec<String>) -> Vec<String>,
+) {
     for name in PROTOCOLS {
         let all = realizations(name);
-        let of = |id: &ModelId| reduce(pages(name, id, entry, change, fault));
+        let of = |id: &ModelId| reduce(pages(name, id, entry, change, fault, device));
         let expected = of(&all[0]);
         let seen = match fault {
             Some(_) => "DEVICE TROUBLE",
@@ -213,6 +226,28 @@ fn pages_and_their_durations_do_not_tell_realizations_apart() {
     }
 }
 
+/// A line of 115,200 baud over an adapter with its latency timer: a load of the finest table takes
+/// twice as long as that of the coarsest.
+fn on_a_slow_line(mut options: Options) -> Box<dyn Device> {
+    options.pace = Pace {
+        byte_time: Duration::from_secs(10) / 115_200,
+        adapter: Duration::from_millis(4),
+    };
+    options.device.watchdog_ms = 200;
+    device(options)
+}
+
+#[test]
+fn pages_and_their_durations_are_the_same_on_a_slow_line() {
+    compare_on(
+        on_a_slow_line,
+        Entry::Participant,
+        without_strokes,
+        None,
+        |pages| pages,
+    );
+}
+
 /// A realization from a bundle is as blind as one from a model file: nothing that identifies it or its
 /// bundle is on a page, each page is that of the model file, and all realizations have the same ones.
 #[test]
@@ -220,7 +255,9 @@ fn bundles_are_as_blind_as_model_files() {
     let folder = tempfile::tempdir().unwrap();
     let addresses = keyboard_of_bundles(folder.path());
     let own = folder.path().to_str().unwrap();
-    let of = |name: &str, id: &ModelId| pages(name, id, Entry::Experimenter, without_strokes, None);
+    let of = |name: &str, id: &ModelId| {
+        pages(name, id, Entry::Experimenter, without_strokes, None, device)
+    };
     let all = realizations(own);
     assert_eq!(all.len(), 8);
     let expected = of("protocols/keyboard", &all[0]);

@@ -14,11 +14,14 @@ mod clock;
 mod lateness;
 mod replies;
 mod stage;
+mod trips;
 pub(super) mod upload;
 
 pub use arrivals::Arrivals;
 pub use clock::DeviceClock;
 pub use lateness::Lateness;
+pub use trips::Trips;
+pub use upload::load_time;
 
 use super::{DeviceError, Identity, Report, Stimulus};
 use stage::Stage;
@@ -112,6 +115,8 @@ pub struct Health {
     pub samples_lost: u64,
     /// How late the host was, since it began.
     pub late: Lateness,
+    /// Round trips of heartbeats.
+    pub trips: Trips,
 }
 
 /// The host's side of a connection.

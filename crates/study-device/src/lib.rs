@@ -183,6 +183,12 @@ pub trait Device: Send {
         at: Duration,
     ) -> Result<(), DeviceError>;
 
+    /// How long a load of this stimulus usually takes, as far as the device and the rate of its
+    /// line tell; `None` if nothing tells.
+    fn load_time(&self, _what: &Stimulus<'_>, _limits: Limits) -> Option<Duration> {
+        None
+    }
+
     /// Starts playing the loaded stimulus; [`Report::Started`] follows.
     ///
     /// # Errors

@@ -18,7 +18,7 @@ pub mod relay;
 pub mod simulator;
 pub mod tcp;
 
-use super::host::{Health, Host, HostSettings};
+use super::host::{self, Health, Host, HostSettings};
 use super::{Device, DeviceError, Identity, Report, Stimulus};
 pub use priority::Priority;
 use std::fmt::Display;
@@ -83,6 +83,11 @@ pub trait Opener: Send {
 
     /// Where the links lead, for messages.
     fn address(&self) -> String;
+
+    /// The time that a byte takes, if the links have a rate; else zero.
+    fn byte_time(&self) -> Duration {
+        Duration::ZERO
+    }
 }
 
 /// Longest single wait of the thread.
@@ -193,6 +198,7 @@ pub struct LinkedDevice {
     /// Number of LIMP commands; reports from before the last one are outdated.
     epoch: u64,
     identity: Identity,
+    byte_time: Duration,
     /// Whether the end of the thread has been reported.
     end_reported: bool,
 }
@@ -205,6 +211,7 @@ impl LinkedDevice {
     /// [`DeviceError::Lost`] if there is no link, no answer, or an unsupported version.
     pub fn open(mut opener: Box<dyn Opener>, settings: HostSettings) -> Result<Self, DeviceError> {
         let address = opener.address();
+        let byte_time = opener.byte_time();
         let lost = |why: &dyn Display| DeviceError::Lost(format!("{address}: {why}"));
         let link = opener.open().map_err(|e| lost(&e))?;
         let shared = Arc::new(Shared {
@@ -252,6 +259,7 @@ impl LinkedDevice {
             reports,
             epoch: 0,
             identity,
+            byte_time,
             end_reported: false,
         })
     }
@@ -306,6 +314,12 @@ impl Device for LinkedDevice {
             limits,
         };
         self.send(Command::Load(Box::new(order)))
+    }
+
+    fn load_time(&self, what: &Stimulus<'_>, limits: Limits) -> Option<Duration> {
+        let status = self.status();
+        let trip = status.health.trips.usual()?;
+        host::load_time(&status.device?, what, limits, trip, self.byte_time)
     }
 
     fn start(&mut self, _: Duration) -> Result<(), DeviceError> {

@@ -15,6 +15,7 @@ pub use windows::SerialLink;
 
 use super::link::{Link, LinkError, Opener};
 use serialport::{SerialPortInfo, SerialPortType};
+use std::time::Duration;
 
 /// Default rate, bits per second: enough for telemetry of 20 bytes per sample at 1 kHz.
 pub const BAUD: u32 = 460_800;
@@ -73,5 +74,10 @@ impl Opener for SerialOpener {
 
     fn address(&self) -> String {
         self.path.clone()
+    }
+
+    /// With start and stop bit. USB is faster.
+    fn byte_time(&self) -> Duration {
+        Duration::from_secs(10) / self.baud.max(1)
     }
 }

@@ -11,8 +11,8 @@
 
 use super::faults::{FaultPlan, InjectedFault, PlannedFault};
 use super::firmware::{self, Firmware};
-use super::host::{Health, Host, HostSettings};
-use super::link::memory::{Line, Noise};
+use super::host::{self, Health, Host, HostSettings};
+use super::link::memory::{Line, Noise, Pace};
 use super::{Device, DeviceError, Identity, Report, Stimulus};
 use std::time::Duration;
 use study_base::limits::Limits;
@@ -38,6 +38,8 @@ pub struct Options {
     pub faults: FaultPlan,
     /// Injected faults of the line, in both directions.
     pub noise: Noise,
+    /// How fast the line is, in both directions.
+    pub pace: Pace,
     /// See [`HostSettings::supervision_timeout`].
     pub supervision_timeout: Option<Duration>,
 }
@@ -67,6 +69,7 @@ pub struct VirtualDevice {
     /// When the cable is plugged in again, or the line works again.
     dead_until: Option<Duration>,
     unplugged: bool,
+    pace: Pace,
     /// Current time of the simulation, [`POWER_UP_LEAD`] ahead of the caller's time.
     now: Duration,
     reports: Vec<Report>,
@@ -95,9 +98,12 @@ impl VirtualDevice {
             fault_at: None,
             dead_until: None,
             unplugged: false,
+            pace: options.pace,
             now: Duration::ZERO,
             reports: Vec::new(),
         };
+        device.to_device.set_pace(options.pace);
+        device.to_host.set_pace(options.pace);
         device.host.connected(device.now);
         device.pump();
         device.run(POWER_UP_LEAD);
@@ -250,6 +256,15 @@ impl Device for VirtualDevice {
             return Err(DeviceError::Refused("an injected fault".to_owned()));
         }
         self.command(at, |host, at| host.load(what, limits, at))
+    }
+
+    fn load_time(&self, what: &Stimulus<'_>, limits: Limits) -> Option<Duration> {
+        // The default line is faster than any slot.
+        if self.pace == Pace::default() {
+            return None;
+        }
+        let trip = self.host.health().trips.usual()?;
+        host::load_time(self.host.device()?, what, limits, trip, self.pace.byte_time)
     }
 
     fn start(&mut self, at: Duration) -> Result<(), DeviceError> {

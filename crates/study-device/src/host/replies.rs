@@ -267,6 +267,7 @@ impl Host {
         let (_, sent) = self.pending_heartbeats[index];
         self.pending_heartbeats.drain(..=index);
         self.health.clock.add(sent, at, pulse.clock_ms);
+        self.health.trips.add(at.saturating_sub(sent));
         // A heartbeat that was sent before a change does not reflect its result.
         let since = match self.stage {
             Stage::Loaded { since }

@@ -1,6 +1,9 @@
 //! Upload of a table or a mechanism as a sequence of requests.
 
+use super::HEARTBEAT_INTERVAL;
+use crate::Stimulus;
 use crate::table::{self, TableError};
+use std::time::Duration;
 use study_base::limits::Limits;
 use study_haptics::model::{Branch, Elements, Mechanism, Profile, Realization};
 use study_wire::elements::MAX_SPRINGS;
@@ -185,6 +188,33 @@ fn parameters(branch: &Branch, node: usize) -> [f64; 4] {
     ]
     .map(|values| values[node])
 }
+
+/// How long the upload of a stimulus takes on a line on which a round trip takes `trip` and a byte
+/// `byte_time`, with a heartbeat every 10 ms; `None` if the device refuses it.
+pub fn load_time(
+    device: &Identity,
+    what: &Stimulus<'_>,
+    limits: Limits,
+    trip: Duration,
+    byte_time: Duration,
+) -> Option<Duration> {
+    let limits = limits.capped_at(super::identity(device)?.limits);
+    let table = what.need_table().ok()?;
+    let upload = of(table, limits, what.allow_uncertified, device).ok()?;
+    // LIMP and REARM come first.
+    let trips = upload.requests.len() as u32 + 2;
+    let bytes: usize = (upload.requests.iter())
+        .map(|request| request.frame(0).as_bytes().len())
+        .sum();
+    let commit_ms = device.constants.map_or(50, |told| told.commit_ms);
+    let beats = byte_time.as_secs_f64() * HEARTBEAT_BYTES / HEARTBEAT_INTERVAL.as_secs_f64();
+    let alone = trip * trips + byte_time * bytes as u32;
+    let shared = alone.as_secs_f64() / (1.0 - beats).max(0.1);
+    Some(Duration::from_secs_f64(shared) + Duration::from_millis(u64::from(commit_ms)))
+}
+
+/// Bytes of the frame of a heartbeat.
+const HEARTBEAT_BYTES: f64 = 19.0;
 
 /// Describes a request in messages.
 pub(super) fn describe(request: &Request) -> &'static str {

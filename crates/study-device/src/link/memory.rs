@@ -39,6 +39,19 @@ pub struct Line {
     stream: Stream,
     queue: VecDeque<(Duration, Vec<u8>)>,
     dead: bool,
+    pace: Pace,
+    /// When the last byte that was sent has passed.
+    free_at: Duration,
+}
+
+/// How fast a line is.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Pace {
+    /// Time that a byte takes; zero for a line that is faster than all that is sent.
+    pub byte_time: Duration,
+    /// An adapter hands over what has arrived at multiples of this time only, as one with a
+    /// latency timer does; zero: at once.
+    pub adapter: Duration,
 }
 
 impl Line {
@@ -50,7 +63,14 @@ impl Line {
             stream: Stream::new(seed, &["line", name]),
             queue: VecDeque::new(),
             dead: false,
+            pace: Pace::default(),
+            free_at: Duration::ZERO,
         }
+    }
+
+    /// Changes how fast it is.
+    pub fn set_pace(&mut self, pace: Pace) {
+        self.pace = pace;
     }
 
     /// Changes the faults.
@@ -69,7 +89,13 @@ impl Line {
         if bytes.is_empty() || self.dead {
             return;
         }
-        let mut due = at + self.latency;
+        self.free_at = self.free_at.max(at) + self.pace.byte_time * bytes.len() as u32;
+        let mut due = self.free_at + self.latency;
+        if !self.pace.adapter.is_zero() {
+            let timer = self.pace.adapter.as_nanos();
+            let due_ns = due.as_nanos().div_ceil(timer) * timer;
+            due = Duration::from_nanos(u64::try_from(due_ns).unwrap_or(u64::MAX));
+        }
         let n = self.noise;
         let whole = (1.0 - n.corrupt) * (1.0 - n.byte_errors).powf(bytes.len() as f64);
         let drop = match bytes.len() {
@@ -150,6 +176,29 @@ mod tests {
         line.send(vec![5], 9 * MS);
         line.set_dead(false);
         assert!(line.arrived(99 * MS).is_empty());
+    }
+
+    /// Two bytes of 3 ms each, and an adapter that looks every 16 ms.
+    #[test]
+    fn a_slow_line_takes_its_time() {
+        let mut line = Line::new(MS, Noise::default(), 1, "c");
+        line.set_pace(Pace {
+            byte_time: 3 * MS,
+            adapter: Duration::ZERO,
+        });
+        line.send(vec![1, 2], MS);
+        line.send(vec![3], 2 * MS);
+        assert!(line.arrived(7 * MS).is_empty());
+        assert_eq!(line.arrived(8 * MS), [1, 2]);
+        assert!(line.arrived(10 * MS).is_empty());
+        assert_eq!(line.arrived(11 * MS), [3]);
+        line.set_pace(Pace {
+            byte_time: 3 * MS,
+            adapter: 16 * MS,
+        });
+        line.send(vec![4], 20 * MS);
+        assert!(line.arrived(31 * MS).is_empty());
+        assert_eq!(line.arrived(32 * MS), [4]);
     }
 
     #[test]
