@@ -4,10 +4,12 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::time::Duration;
-use study_device::check::{Commissioning, Connection, commission};
+use study_device::check::{Commissioning, Connection, Progress, Verdict, commission};
 use study_device::firmware::{Firmware, Flaw, Options};
 use study_device::link::LinkError;
 use study_device::link::memory::{Line, Noise};
+use study_wire::frame::{Decoder, Frame};
+use study_wire::message::kind;
 
 /// A simulated device on a line with a latency of half a millisecond.
 struct Bench {
@@ -15,7 +17,12 @@ struct Bench {
     there: Line,
     back: Line,
     now: Duration,
+    /// Changes the body of each message of the device.
+    change: Box<Change>,
 }
+
+/// Changes a body.
+type Change = dyn FnMut(&mut Vec<u8>);
 
 const TICK: Duration = Duration::from_micros(250);
 
@@ -27,8 +34,23 @@ impl Bench {
             there: line("there"),
             back: line("back"),
             now: Duration::from_secs(1),
+            change: Box::new(|_| ()),
         }
     }
+}
+
+/// The frames with changed bodies.
+fn changed(bytes: &[u8], change: &mut Change) -> Vec<u8> {
+    let mut decoder = Decoder::new();
+    let mut sent = Vec::new();
+    for byte in bytes {
+        if let Some(Ok(body)) = decoder.push(*byte) {
+            let mut body = body.to_vec();
+            change(&mut body);
+            sent.extend_from_slice(Frame::of(&body).unwrap().as_bytes());
+        }
+    }
+    sent
 }
 
 impl Connection for Bench {
@@ -43,7 +65,8 @@ impl Connection for Bench {
             self.now = (self.now + TICK).min(until);
             let came = self.there.arrived(self.now);
             self.firmware.receive(&came, self.now);
-            self.back.send(self.firmware.take_output(), self.now);
+            let sent = changed(&self.firmware.take_output(), &mut self.change);
+            self.back.send(sent, self.now);
             let came = self.back.arrived(self.now);
             if !came.is_empty() {
                 return Ok(came);
@@ -54,7 +77,15 @@ impl Connection for Bench {
 }
 
 fn check(options: Options) -> (Commissioning, Duration) {
+    check_changed(options, |_| ())
+}
+
+fn check_changed(
+    options: Options,
+    change: impl FnMut(&mut Vec<u8>) + 'static,
+) -> (Commissioning, Duration) {
     let mut bench = Bench::new(options);
+    bench.change = Box::new(change);
     let found = commission(&mut bench, 7, &mut |_| {});
     assert_eq!(bench.firmware.held_n(), 0.0, "it was left with force");
     (found, bench.now - Duration::from_secs(1))
@@ -80,7 +111,7 @@ fn the_simulated_device_passes_in_time() {
         assert!(
             found
                 .summary()
-                .starts_with("28 of 28 tests passed; round trip"),
+                .starts_with("30 of 30 tests passed; round trip"),
             "{}",
             found.summary()
         );
@@ -109,6 +140,138 @@ fn each_planted_defect_is_named_by_its_clause() {
         assert!(broken.contains(&expected), "{name} ({clause}): {broken:?}");
         assert!(!found.passes());
     }
+}
+
+/// Writes a number into a body, behind the header.
+fn write(body: &mut [u8], offset: usize, value: f64) {
+    body[4 + offset..4 + offset + 8].copy_from_slice(&value.to_le_bytes());
+}
+
+/// A device that answers wrongly is not one that does not answer.
+#[test]
+fn causes_are_named() {
+    type Wrong = fn(&mut Vec<u8>);
+    let cases: [(&str, &str, Wrong); 10] = [
+        (
+            "14.3",
+            "IDENTITY is malformed: its servo rate is not a number",
+            |body| {
+                if body[1] == kind::IDENTITY {
+                    write(body, 25, f64::NAN);
+                }
+            },
+        ),
+        (
+            "14.3",
+            "IDENTITY is malformed: its force limit is infinite",
+            |body| {
+                if body[1] == kind::IDENTITY {
+                    write(body, 41, f64::INFINITY);
+                }
+            },
+        ),
+        ("14.3", "IDENTITY has the sequence number", |body| {
+            if body[1] == kind::IDENTITY {
+                body[2] ^= 0x20;
+            }
+        }),
+        ("14.3", "IDENTITY is malformed: it has", |body| {
+            if body[1] == kind::IDENTITY {
+                body.pop();
+            }
+        }),
+        ("14.3", "its force limit is 1e300 N", |body| {
+            if body[1] == kind::IDENTITY {
+                write(body, 41, 1e300);
+            }
+        }),
+        ("14.3", "its serial number is empty", |body| {
+            if body[1] == kind::IDENTITY {
+                body[4 + 121..4 + 153].fill(0);
+            }
+        }),
+        (
+            "11.1",
+            "OUTCOME is malformed: its energy is not a number",
+            |body| {
+                if body[1] == kind::OUTCOME {
+                    write(body, 43, f64::NAN);
+                }
+            },
+        ),
+        ("7.7", "its slew limit is 20 N/s", |body| {
+            if body[1] == kind::IDENTITY && body.len() > 200 {
+                write(body, 216, 20.0);
+            }
+        }),
+        ("7.7", "its added damping is -0.02 N·s/mm", |body| {
+            if body[1] == kind::IDENTITY && body.len() > 200 {
+                write(body, 176, -0.02);
+            }
+        }),
+        ("7.7", "its ramp is 3 s", |body| {
+            if body[1] == kind::IDENTITY && body.len() > 200 {
+                write(body, 224, 3.0);
+            }
+        }),
+    ];
+    for (clause, cause, change) in cases {
+        let (found, _) = check_changed(Options::default(), change);
+        let broken: Vec<_> = found.verdicts.iter().filter(|v| !v.pass).collect();
+        let named = |v: &&&Verdict| v.clause == clause && v.seen.contains(cause);
+        assert!(broken.iter().any(|v| named(&v)), "{cause}: {broken:#?}");
+        assert!(
+            broken.iter().all(|v| !v.seen.contains("no answer")),
+            "{cause}: {broken:#?}"
+        );
+        assert!(broken.iter().all(|v| v.judged), "{cause}: {broken:#?}");
+    }
+}
+
+/// A REARM right after a LIMP, refused with `moving` (13), is executed: idle (1).
+#[test]
+fn a_device_that_is_armed_while_its_handle_moves_is_found() {
+    let mut after_limp = false;
+    let (found, _) = check_changed(Options::default(), move |body| match (body[1], body[4]) {
+        (kind::ACK, kind::LIMP) => after_limp = true,
+        (kind::ACK, kind::REARM) if after_limp && body[5] == 13 => (body[5], body[6]) = (0, 1),
+        (kind::IDENTITY, _) => after_limp = false,
+        _ => {}
+    });
+    assert_eq!(found.failed_clauses(), ["5.3"]);
+    let seen = |v: &Verdict| v.seen.contains("it is armed again at");
+    assert!(found.verdicts.iter().any(seen), "{found:#?}");
+}
+
+/// 20 ms are less than a third of a watchdog time of 200 ms.
+#[test]
+fn replies_that_leave_late_are_found_with_any_watchdog_time() {
+    let (found, _) = check(Options {
+        watchdog_ms: 200,
+        flaw: Some(Flaw::LateReplies),
+        ..Options::default()
+    });
+    assert!(found.failed_clauses().contains(&"11.1"), "{found:#?}");
+}
+
+/// Nobody moves the handle: nothing is said of the clause that needs it.
+#[test]
+fn a_clause_that_needs_a_motion_is_open_without_one() {
+    let mut bench = Bench::new(Options::default());
+    bench.firmware.hold_at(17.5);
+    let mut asked = Vec::new();
+    let found = commission(&mut bench, 7, &mut |progress| {
+        if let Progress::Ask(what) = progress {
+            asked.push(what.to_owned());
+        }
+    });
+    assert_eq!(found.failed_clauses(), Vec::<&str>::new());
+    assert_eq!(found.unjudged_clauses(), ["5.3"]);
+    assert!(!found.passes());
+    assert!(
+        asked.len() == 1 && asked[0].contains("move the handle"),
+        "{asked:?}"
+    );
 }
 
 #[test]

@@ -26,7 +26,7 @@ fn record(folder: &Path, hours: i64, firmware: &str, pass: bool) {
     let text = format!(
         r#"{{"format": "study-device-record/1", "kind": "check", "id": "the-check", "serial": "rig-2",
             "firmware": {firmware}, "simulated": false, "at": "{}", "pass": {pass},
-            "summary": "14 of 14", "parts": {{}}}}"#,
+            "summary": "14 of 14", "parts": {{"rendering": [{{"what": "mass alone", "result": "pass"}}]}}}}"#,
         at.to_rfc3339(),
     );
     let devices = folder.join("results/devices/rig-2");

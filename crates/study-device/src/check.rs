@@ -4,11 +4,14 @@
 //! a verdict for each clause that can be tested from outside. The connection provides the
 //! time, so the same test runs on a port and, in virtual time, on a simulated device.
 
+mod bounds;
 mod clauses;
 mod elements;
 pub(super) mod exchange;
 mod mechanism;
+mod moving;
 mod playing;
+mod strange;
 mod uploads;
 
 use super::link::LinkError;
@@ -36,6 +39,20 @@ pub trait Connection {
     /// # Errors
     /// [`LinkError`] if the link has ended.
     fn exchange(&mut self, bytes: &[u8], wait: Duration) -> Result<Vec<u8>, LinkError>;
+
+    /// The time that a byte takes on the line; zero where that is not known.
+    fn byte_time(&self) -> Duration {
+        Duration::ZERO
+    }
+}
+
+/// What a test tells while it runs.
+#[derive(Debug, Clone, Copy)]
+pub enum Progress<'a> {
+    /// What somebody at the device has to do now.
+    Ask(&'a str),
+    /// The verdict about a clause.
+    Judged(&'a Verdict),
 }
 
 /// Result of the test of one clause.
@@ -49,7 +66,8 @@ pub struct Verdict {
     pub pass: bool,
     /// Observation.
     pub seen: String,
-    /// Whether it was judged: not if this computer was late in every attempt.
+    /// Whether it was judged: not if this computer was late in every attempt, or nobody did
+    /// what had to be done.
     pub judged: bool,
 }
 
@@ -112,6 +130,9 @@ pub enum CheckFailure {
     /// The device no longer answers or is incompatible; no further test is possible.
     #[error("{0}")]
     Disconnected(String),
+    /// Nothing can be said, because nobody did what had to be done.
+    #[error("not judged: {0}")]
+    NotJudged(String),
 }
 
 impl CheckFailure {
@@ -133,19 +154,30 @@ struct Clause {
     clause: &'static str,
     what: &'static str,
     test: fn(&mut Exchange<'_>) -> ClauseResult,
+    /// What somebody has to do for it; empty if nothing.
+    ask: &'static str,
 }
 
-/// Tests a device. `report` receives each verdict at once; `nonce` has to differ between
-/// runs.
+/// Tests a device. `report` receives each verdict at once, and what somebody has to do; `nonce`
+/// has to differ between runs.
 pub fn commission(
     connection: &mut dyn Connection,
     nonce: u32,
-    report: &mut dyn FnMut(&Verdict),
+    report: &mut dyn FnMut(Progress<'_>),
 ) -> Commissioning {
     let mut exchange = Exchange::new(connection, nonce);
     let mut verdicts = Vec::new();
-    for Clause { clause, what, test } in clauses::ALL {
+    for Clause {
+        clause,
+        what,
+        test,
+        ask,
+    } in clauses::ALL
+    {
         let mut tries = 0;
+        if !ask.is_empty() {
+            report(Progress::Ask(ask));
+        }
         let (result, late) = loop {
             exchange.late = Duration::ZERO;
             tries += 1;
@@ -162,6 +194,7 @@ pub fn commission(
             }
         };
         let disconnected = matches!(result, Err(CheckFailure::Disconnected(_)));
+        let undone = matches!(result, Err(CheckFailure::NotJudged(_)));
         let pass = result.is_ok();
         let seen = result.unwrap_or_else(|failure| failure.to_string());
         let seen = match late {
@@ -176,9 +209,9 @@ pub fn commission(
             what,
             pass,
             seen,
-            judged: late.is_none(),
+            judged: late.is_none() && !undone,
         };
-        report(&verdict);
+        report(Progress::Judged(&verdict));
         verdicts.push(verdict);
         if disconnected || exchange.device.is_none() {
             break;

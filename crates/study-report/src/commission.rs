@@ -107,7 +107,7 @@ pub fn page(p: &Page<'_>) -> String {
                         }
                     }
                     p { "Signature: ______________________________" }
-                    p { small { "Written by study " (env!("CARGO_PKG_VERSION")) ". Telemetry can show none of this; `study device check --rendering` shows the rest." } }
+                    p { small { "Written by study " (env!("CARGO_PKG_VERSION")) ". Telemetry can show none of this; `study device check` shows the rest." } }
                 }
             }
         }

@@ -15,6 +15,9 @@ pub(crate) const HANDLE_KG: f64 = 0.25;
 /// The hand: a spring and a damper to where it wants to be, N/mm and N·s/mm.
 const GRIP_N_PER_MM: f32 = 1.0;
 const GRIP_N_S_PER_MM: f32 = 0.02;
+/// A shorter range is no realization, mm, and half of the stroke in it, mm.
+const SHORTEST_MM: f32 = 1.5;
+const LEAST_STROKE_MM: f32 = 14.0;
 /// Strokes of the hand, Hz.
 const STROKE_HZ: f32 = 0.7;
 /// Resolution of the encoder, counts per mm.
@@ -84,7 +87,12 @@ impl Mechanics {
         };
         *phase = (*phase + STROKE_HZ * self.period_s) % 1.0;
         let (sin, cos) = libm::sincosf(core::f32::consts::TAU * *phase);
-        let (middle, half) = (0.5 * (*low + *high), 0.4 * (*high - *low));
+        // It leaves a range that is shorter than a finger moves.
+        let half = match *high - *low > SHORTEST_MM {
+            true => 0.4 * (*high - *low),
+            false => LEAST_STROKE_MM,
+        };
+        let middle = 0.5 * (*low + *high);
         let wanted_mm = middle + half * sin;
         let wanted_mm_s = half * cos * core::f32::consts::TAU * STROKE_HZ;
         let hand_n =

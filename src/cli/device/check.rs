@@ -10,7 +10,7 @@ use crate::cli::device_selection::{
 use crate::cli::{Console, Failure, Kind};
 use std::path::{Path, PathBuf};
 use study_base::text::Untrusted;
-use study_device::check::{self, Commissioning, Verdict};
+use study_device::check::{self, Commissioning, Progress, Verdict};
 use study_device::host::{HostSettings, display_name};
 use study_device::link::{nonce, priority};
 use study_device::{Device, process};
@@ -31,9 +31,13 @@ pub(in crate::cli) struct InfoArgs {
 pub(in crate::cli) struct CheckArgs {
     #[command(flatten)]
     address: DeviceAddress,
-    /// Also play tables in which each term, look-up and direction rule counts, and judge each
-    /// playback as in a session; somebody moves the handle
+    /// Do not play tables in which each term, look-up and direction rule counts, and judge each
+    /// playback as in a session, while somebody moves the handle: a session for which the protocol
+    /// asks for a check does not accept it
     #[arg(long)]
+    without_rendering: bool,
+    /// The default since release 0.2
+    #[arg(long, hide = true, conflicts_with = "without_rendering")]
     rendering: bool,
     /// Print all messages of the wire format with their bytes, as JSON, and end
     #[arg(long, exclusive = true)]
@@ -204,10 +208,11 @@ pub(in crate::cli) fn check(args: &CheckArgs, console: &mut Console) -> Result<(
     }
     let json = args.json;
     let mut printed = Ok(());
-    let result = check::commission(&mut connection, nonce(), &mut |verdict| {
-        if !json && printed.is_ok() {
-            printed = console.out(line(verdict));
-        }
+    let result = check::commission(&mut connection, nonce(), &mut |progress| match progress {
+        _ if json => {}
+        Progress::Ask(what) => console.say(what),
+        Progress::Judged(verdict) if printed.is_ok() => printed = console.out(line(verdict)),
+        Progress::Judged(_) => {}
     });
     printed?;
     // The port can be opened only once at a time.
@@ -219,7 +224,11 @@ pub(in crate::cli) fn check(args: &CheckArgs, console: &mut Console) -> Result<(
         }
         _ => None,
     };
-    let rendering = match (args.rendering && result.passes(), &result.device) {
+    let rendering = match (!args.without_rendering && result.passes(), &result.device) {
+        (true, Some(told)) if !told.flags.telemetry => {
+            console.say("its rendering cannot be judged: it reports no samples");
+            None
+        }
         (true, Some(told)) => {
             let [low, high] = told.stroke_mm;
             let mut device = port.open_serial(HostSettings::default())?;
@@ -401,10 +410,12 @@ fn failed(address: &str, result: &Commissioning) -> Failure {
     let clauses = failed.join(", ");
     if clauses.is_empty() && !result.unjudged_clauses().is_empty() {
         return Failure::device(format!(
-            "{}: this computer was too late to judge every clause",
+            "{}: not every clause could be judged",
             Untrusted(address)
         ))
-        .hint("end other programs and repeat the check; the device is not accused");
+        .hint(
+            "end other programs, do what is asked and repeat the check; the device is not accused",
+        );
     }
     if clauses.is_empty() {
         return Failure::device(format!(

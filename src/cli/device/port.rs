@@ -10,6 +10,7 @@ use study_device::link::{Link, LinkError};
 /// An open port with a clock.
 pub(in crate::cli) struct PortConnection {
     link: Box<dyn Link>,
+    byte_time: Duration,
     start: Instant,
     /// Path of the port.
     pub(in crate::cli) address: String,
@@ -26,6 +27,7 @@ impl PortConnection {
         })?;
         Ok(Self {
             link,
+            byte_time: opener.byte_time(),
             start: Instant::now(),
             address: opener.address(),
         })
@@ -45,5 +47,9 @@ impl Connection for PortConnection {
         let n = self.link.read(&mut buffer, wait)?;
         buffer.truncate(n);
         Ok(buffer)
+    }
+
+    fn byte_time(&self) -> Duration {
+        self.byte_time
     }
 }

@@ -74,6 +74,15 @@ impl Record {
         }
     }
 
+    /// Whether the rendering was judged, and not only the clauses of the wire format.
+    fn judged_rendering(&self) -> bool {
+        let lines = self
+            .parts
+            .get("rendering")
+            .and_then(|lines| lines.as_array());
+        lines.is_some_and(|lines| !lines.is_empty())
+    }
+
     /// Writes it below a results folder; returns its path.
     pub(in crate::cli) fn save(&self, results: &Path) -> Result<PathBuf, Failure> {
         let folder = folder(results, &self.tested.serial);
@@ -107,7 +116,8 @@ pub(in crate::cli) fn last(results: &Path, serial: &str, kind: RecordKind) -> Op
 }
 
 /// Why the last check does not count: it failed, is of another firmware or,
-/// if the protocol says within how many hours, is missing or older. `None` if it does.
+/// if the protocol says within how many hours, is missing or older or did not judge the rendering.
+/// `None` if it does.
 pub(in crate::cli) fn doubt(
     last: Option<&Record>,
     firmware: Option<&str>,
@@ -125,6 +135,11 @@ pub(in crate::cli) fn doubt(
     if last.tested.firmware.as_deref() != firmware {
         return Some(format!(
             "its last check, of {at}, was of another firmware version"
+        ));
+    }
+    if within_h.is_some() && !last.judged_rendering() {
+        return Some(format!(
+            "its last check, of {at}, did not judge its rendering, and the protocol asks for one that did"
         ));
     }
     let age_h = (now - last.at).num_seconds() as f64 / 3600.0;
@@ -184,7 +199,7 @@ mod tests {
             tested,
             pass,
             "s".to_owned(),
-            serde_json::json!([]),
+            serde_json::json!({ "rendering": [{ "what": "mass alone", "result": "pass" }] }),
         )
     }
 
@@ -223,6 +238,21 @@ mod tests {
         ] {
             let why = of(last, firmware, within).unwrap();
             assert!(why.contains(word), "{why}");
+        }
+        for parts in [
+            serde_json::json!({}),
+            serde_json::json!({ "rendering": null }),
+            serde_json::json!({ "rendering": [] }),
+        ] {
+            let clauses_alone = Record {
+                parts,
+                ..record(true)
+            };
+            let of = |last, within| doubt(Some(last), Some("f1"), within, now);
+            let why = of(&clauses_alone, Some(6.0)).unwrap();
+            assert!(why.contains("did not judge its rendering"), "{why}");
+            // Where the protocol asks for nothing it counts.
+            assert_eq!(of(&clauses_alone, None), None);
         }
     }
 }

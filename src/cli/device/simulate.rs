@@ -45,7 +45,7 @@ pub(in crate::cli) struct Args {
     /// Planted defect, to try out `study device check`
     #[arg(long, value_name = "DEFECT", value_parser = flaw)]
     flaw: Option<Flaw>,
-    /// Wrong force, to try out sessions and `study device check --rendering`; with `@7` from the
+    /// Wrong force, to try out sessions and `study device check`; with `@7` from the
     /// seventh load on, with `@7-9` until the ninth
     #[arg(long, value_name = "HOW", value_parser = wrong)]
     wrong: Option<WrongLoads>,

@@ -25,7 +25,7 @@ pub(super) fn wrong_forces([wrong, all]: [usize; 2]) -> Option<String> {
     (wrong > 0).then(|| {
         format!(
             "warning: in {wrong} of {all} trials the force was not what the device was told; before the \
-             next session, `study device check --rendering` shows what it does wrong"
+             next session, `study device check` shows what it does wrong"
         )
     })
 }

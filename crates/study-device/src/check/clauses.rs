@@ -1,9 +1,11 @@
 //! The clauses that can be tested from outside, in the order of the tests: messages
 //! first, then uploads, then playbacks.
 
+use super::bounds;
 use super::elements;
 use super::exchange::{Exchange, unexpected};
 use super::mechanism;
+use super::moving;
 use super::playing;
 use super::uploads::Upload;
 use super::{CheckFailure, Clause, ClauseResult, fail, quantile};
@@ -15,17 +17,18 @@ use study_wire::message::{
 };
 
 macro_rules! clauses {
-    ($($clause:literal $what:literal $test:expr;)+) => {
+    ($($clause:literal $what:literal $test:expr $(, ask $ask:literal)?;)+) => {
         /// All tested clauses.
         pub(super) const ALL: &[Clause] = &[
-            $(Clause { clause: $clause, what: $what, test: $test },)+
+            $(Clause { clause: $clause, what: $what, test: $test, ask: concat!("" $(, $ask)?) },)+
         ];
     };
 }
 
 clauses! {
     "14.3" "HELLO is answered by a valid IDENTITY in a common version" handshake;
-    "11.1" "round trips are short enough for the watchdog time" latency;
+    "7.7" "the constants that the device tells are within their bounds" bounds::told;
+    "11.1" "replies leave in time, and round trips are short enough for the watchdog time" latency;
     "2.3" "a frame with a wrong CRC is dropped and counted" bad_frames;
     "2.4" "the next frame after noise is received" noise;
     "3.1" "a message of the wrong length is refused" malformed;
@@ -50,12 +53,20 @@ clauses! {
     "11.3" "STOP switches the force off at once" playing::stop;
     "5.1" "LIMP switches the force off at once" playing::limp;
     "12" "a playback ends after its longest duration" playing::longest;
+    "5.3" "REARM is refused while the handle moves" moving::rearm, ask "move the handle to and fro until the next line appears";
     "6.3" "without heartbeats the device goes limp in time and stays limp" playing::watchdog;
     "6.2" "heartbeats of a dead host expire at their deadline" playing::deadline;
 }
 
 /// Number of round trips that are measured.
 const TRIPS: usize = 300;
+/// Bytes of the frames of STATE and OUTCOME.
+const STATE_BYTES: usize = 113;
+/// Longest time from a request to its reply, ms (11.1).
+const REPLY_MS: f64 = 2.0;
+/// What an adapter or a USB port adds in both directions, ms: at most two frames of 1 ms each
+/// way.
+const ADAPTER_MS: f64 = 4.0;
 
 /// Makes the device limp, whatever it was doing, and identifies it.
 pub(super) fn identify(exchange: &mut Exchange<'_>) -> Result<Identity, CheckFailure> {
@@ -90,8 +101,10 @@ fn handshake(exchange: &mut Exchange<'_>) -> ClauseResult {
             "telemetry without a rate",
         ),
     ];
-    match requirements.iter().find(|(met, _)| !met) {
-        Some((_, what)) => fail(*what),
+    let unmet = requirements.iter().find(|(met, _)| !met);
+    let unmet = unmet.map(|(_, what)| (*what).to_owned());
+    match unmet.or_else(|| bounds::limits(&device)) {
+        Some(what) => fail(what),
         None => Ok(format!(
             "version {}, servo {} Hz, watchdog {} ms, {} N, {} mm/s, {} nodes",
             message::VERSION,
@@ -119,8 +132,13 @@ fn latency(exchange: &mut Exchange<'_>) -> ClauseResult {
     };
     exchange.latency_ms = Some([median, p99, max]);
     let allowed = f64::from(device.watchdog_ms) / 3.0;
+    let line_ms = 1e3 * exchange.line_time(STATE_BYTES).as_secs_f64();
     let seen = format!("median {median:.2} ms, 99 % {p99:.2} ms, at most {max:.2} ms");
-    if p99 <= allowed {
+    if median > REPLY_MS + line_ms + ADAPTER_MS {
+        fail(format!(
+            "{seen}: the line needs {line_ms:.1} ms and an adapter up to {ADAPTER_MS} ms, so that replies take more than the {REPLY_MS} ms of 11.1; set the latency timer of an FTDI adapter to 1 ms"
+        ))
+    } else if p99 <= allowed {
         Ok(seen)
     } else {
         fail(format!(
@@ -158,9 +176,8 @@ fn noise(exchange: &mut Exchange<'_>) -> ClauseResult {
         bytes.extend_from_slice(Request::State.frame(sequence).as_bytes());
         if exchange.send(&bytes, sequence, RETRY_INTERVAL)?.is_none() {
             let length = piece.len();
-            return fail(format!(
-                "no answer to the frame after {length} bytes of noise"
-            ));
+            let nothing = || format!("no answer to the frame after {length} bytes of noise");
+            return fail(exchange.take_malformed().unwrap_or_else(nothing));
         }
     }
     Ok(format!("{} kinds of noise", pieces.len()))

@@ -1,6 +1,6 @@
 //! An exchange of messages with a device whose answers may be wrong.
 
-use super::{CheckFailure, Connection, fail};
+use super::{CheckFailure, Connection, fail, strange};
 use crate::host::{DeviceClock, HEARTBEAT_INTERVAL, MAX_TRIES, RETRY_INTERVAL};
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -48,6 +48,8 @@ pub(crate) struct Exchange<'w> {
     /// How late this computer was at most since the last reset; with a simulated device also
     /// how long that stood still.
     pub(crate) late: Duration,
+    /// Why the last bytes were no reply, since the last request.
+    malformed: Option<String>,
     /// Arrival and clock of the first PULSE of the connection.
     first_pulse: Option<(Duration, u32)>,
 }
@@ -73,6 +75,7 @@ impl<'w> Exchange<'w> {
             latency_ms: None,
             playback: 0,
             late: Duration::ZERO,
+            malformed: None,
             first_pulse: None,
         }
     }
@@ -114,8 +117,9 @@ impl<'w> Exchange<'w> {
         for byte in received {
             if let Some(Ok(body)) = self.decoder.push(byte) {
                 let body = body.to_vec();
-                if let Ok((header, reply)) = Reply::decode(&body) {
-                    self.take(header.sequence, reply, body, at);
+                match Reply::decode(&body) {
+                    Ok((header, reply)) => self.take(header.sequence, reply, body, at),
+                    Err(error) => self.malformed = Some(strange::why(&body, error)),
                 }
             }
         }
@@ -215,15 +219,47 @@ impl<'w> Exchange<'w> {
     pub(crate) fn ask(&mut self, request: Request) -> Result<ReceivedReply, CheckFailure> {
         let sequence = self.next_sequence();
         let frame = request.frame(sequence);
+        let began = self.now();
+        self.malformed = None;
         for _ in 0..MAX_TRIES {
             if let Some(received) = self.send(frame.as_bytes(), sequence, RETRY_INTERVAL)? {
                 return Ok(received);
             }
         }
-        Err(CheckFailure::Disconnected(format!(
-            "no answer to {} after {MAX_TRIES} tries",
-            kind::name(request.kind())
-        )))
+        let why = self.without_answer(&request, sequence, began);
+        match (request, why) {
+            // Nothing else can be tested without an identity.
+            (Request::Hello(_), Some(why)) => Err(CheckFailure::Disconnected(why)),
+            (_, Some(why)) => fail(why),
+            (_, None) => Err(CheckFailure::Disconnected(format!(
+                "no answer to {} after {MAX_TRIES} tries",
+                kind::name(request.kind())
+            ))),
+        }
+    }
+
+    /// What came in place of the answer to a request, if anything did.
+    fn without_answer(&self, request: &Request, sequence: u16, began: Duration) -> Option<String> {
+        let stray = (self.replies.iter().rev())
+            .find(|other| other.at >= began && strange::answers(request, &other.reply));
+        let numbered = stray.map(|other| {
+            format!(
+                "{} has the sequence number {} and not {sequence} of the request (4.1)",
+                kind::name(other.reply.kind()),
+                other.sequence
+            )
+        });
+        numbered.or_else(|| self.malformed.clone())
+    }
+
+    /// Why the last bytes were no reply, if they were not.
+    pub(crate) fn take_malformed(&mut self) -> Option<String> {
+        self.malformed.take()
+    }
+
+    /// The time that these bytes take on the line.
+    pub(crate) fn line_time(&self, bytes: usize) -> Duration {
+        self.connection.byte_time() * bytes as u32
     }
 
     pub(crate) fn ack(&mut self, request: Request) -> Result<Ack, CheckFailure> {

@@ -15,14 +15,14 @@ const SECOND: Duration = Duration::from_secs(1);
 const CLOCK_RESOLUTION_MS: f64 = 2.0;
 
 /// A current playback.
-struct Playback {
+pub(super) struct Playback {
     number: u32,
     started: Ack,
     servo_hz: f64,
 }
 
 /// Plays a table of constant force for at most `longest_ms`.
-fn play(
+pub(super) fn play(
     exchange: &mut Exchange<'_>,
     force_n: f64,
     longest_ms: u32,
@@ -83,7 +83,7 @@ fn stop_request(playback: &Playback) -> Request {
 }
 
 /// Samples so far and the number of missing ones.
-fn samples(exchange: &Exchange<'_>, playback: &Playback) -> (Vec<TelemetrySample>, u64) {
+pub(super) fn samples(exchange: &Exchange<'_>, playback: &Playback) -> (Vec<TelemetrySample>, u64) {
     let mut all = Vec::new();
     let (mut due, mut missed) = (0u64, 0);
     for (_, telemetry) in &exchange.telemetry {

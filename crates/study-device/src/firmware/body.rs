@@ -12,6 +12,9 @@ const SPEED_HZ: f64 = 200.0;
 const RELEASE_S: f64 = 0.3;
 /// Speed of somebody who brings the handle to a place, mm/s.
 const GUIDED_MM_S: f64 = 40.0;
+/// A shorter range is no realization, mm, and half of the stroke of a hand in it, mm.
+const SHORTEST_MM: f64 = 1.5;
+const LEAST_STROKE_MM: f64 = 14.0;
 /// Initial position of the handle, mm.
 const MIDDLE_MM: f64 = 17.5;
 
@@ -118,8 +121,7 @@ impl Body {
                 to_mm,
             },
             (Some([low, high]), None) => {
-                let margin = (0.1 * (high - low)).min(1.5);
-                let hand = Hand::new(self.hand, [low + margin, high - margin], stream("hand"));
+                let hand = Hand::new(self.hand, ends(low, high), stream("hand"));
                 Holder::Hand {
                     hand: Box::new(hand),
                     left: None,
@@ -236,6 +238,17 @@ impl Body {
             Holder::Probe(contact) => contact.pass(period_s),
         }
     }
+}
+
+/// Between which places a hand moves the handle in this range, mm. It leaves a range that is
+/// shorter than a finger moves.
+fn ends(low: f64, high: f64) -> [f64; 2] {
+    let margin = (0.1 * (high - low)).min(1.5);
+    if high - low > SHORTEST_MM {
+        return [low + margin, high - margin];
+    }
+    let middle = 0.5 * (low + high);
+    [middle - LEAST_STROKE_MM, middle + LEAST_STROKE_MM]
 }
 
 impl ProbeContact {

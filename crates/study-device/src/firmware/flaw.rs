@@ -38,13 +38,15 @@ pub enum Flaw {
     LosesTelemetry,
     /// 11.1: answers after 50 ms.
     SlowReplies,
+    /// 11.1: answers after 20 ms.
+    LateReplies,
     /// 11.3: stops 200 ms after STOP.
     SlowStop,
 }
 
 impl Flaw {
     /// Every flaw with its name on the command line and its clause.
-    pub const ALL: [(Self, &'static str, &'static str); 13] = [
+    pub const ALL: [(Self, &'static str, &'static str); 14] = [
         (Self::TakesDamaged, "takes-damaged", "2.3"),
         (Self::OtherVersion, "other-version", "3.3"),
         (Self::DeafToLimp, "deaf-to-limp", "3.4"),
@@ -57,6 +59,7 @@ impl Flaw {
         (Self::TakesUncertified, "takes-uncertified", "8.4"),
         (Self::LosesTelemetry, "loses-telemetry", "9.1"),
         (Self::SlowReplies, "slow-replies", "11.1"),
+        (Self::LateReplies, "late-replies", "11.1"),
         (Self::SlowStop, "slow-stop", "11.3"),
     ];
 
@@ -70,6 +73,7 @@ impl Flaw {
 /// Actual watchdog time with [`Flaw::LateWatchdog`], ms.
 pub(super) const LATE_MS: u16 = 300;
 const SLOW_REPLY: Duration = Duration::from_millis(50);
+const LATE_REPLY: Duration = Duration::from_millis(20);
 const SLOW_STOP: Duration = Duration::from_millis(200);
 
 /// Changes messages according to a flaw.
@@ -207,10 +211,10 @@ impl FlawInjector {
                 continue;
             };
             let frame = reply.frame(sequence).as_bytes().to_vec();
-            if self.flaw == Flaw::SlowReplies {
-                self.held_out.push_back((at + SLOW_REPLY, frame));
-            } else {
-                sent.extend(frame);
+            match self.flaw {
+                Flaw::SlowReplies => self.held_out.push_back((at + SLOW_REPLY, frame)),
+                Flaw::LateReplies => self.held_out.push_back((at + LATE_REPLY, frame)),
+                _ => sent.extend(frame),
             }
         }
         while self.held_out.front().is_some_and(|(due, _)| *due <= at) {
