@@ -19,4 +19,5 @@ mod support;
 mod tables;
 mod target;
 mod turning;
+mod verdict;
 mod wrong;

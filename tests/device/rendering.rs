@@ -173,6 +173,11 @@ fn no_wrong_device_is_ok_where_telemetry_can_show_it() {
             wrong: *wrong,
             loads: [1, u32::MAX],
         });
+        if matches!(wrong, Wrong::FoldsBack | Wrong::RestsHigh) {
+            // It shows where somebody pushes and holds.
+            options.device.hand.rest_s = [0.8, 1.6];
+            options.device.hand.end_spread_mm = 10.0;
+        }
         let heard = play(options, &[(&first, limits), (&table, limits)], 6.0);
         let found = judged(&id, &table, limits, &heard, &others);
         let defects: Vec<&str> = found.defects.iter().map(|d| d.as_str()).collect();
@@ -182,7 +187,19 @@ fn no_wrong_device_is_ok_where_telemetry_can_show_it() {
             found.verdict.as_str(),
             defects.join(", "),
         );
-        if !wrong.is_physical() && !matches!(found.verdict, Verdict::Flag | Verdict::Fault) {
+        // What they do is within what the default rules allow: a delay of 3 ms, and a slew limit and a
+        // wall that this table and hand do not reach.
+        let allowed = matches!(
+            wrong,
+            Wrong::LowPass50 | Wrong::TellsSlew500 | Wrong::TellsPullingWall
+        );
+        let seen = match found.verdict {
+            Verdict::Flag | Verdict::Fault => true,
+            // It was not heard.
+            Verdict::TooLittle => wrong.is_unheard(),
+            _ => allowed,
+        };
+        if !wrong.is_physical() && !seen {
             unseen.push(format!("{name}: {found:?}"));
         }
         assert!(

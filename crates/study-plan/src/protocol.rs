@@ -306,6 +306,16 @@ pub struct RenderingRules {
     /// difference. Fingerprints of studies with the default are those of earlier releases.
     #[serde(skip_serializing_if = "is_default_share")]
     pub max_error_share: f64,
+    /// Largest mean size of the difference over 50 ms, of the commanded force from the table's
+    /// and of the measured one from the commanded, over the range of the table's forces.
+    #[serde(skip_serializing_if = "is_default_range_share")]
+    pub max_range_share: f64,
+    /// Largest share of the samples that may be lost, else there is no verdict.
+    #[serde(skip_serializing_if = "is_default_lost_share")]
+    pub max_lost_share: f64,
+    /// Least share of the time in which the force must be known, else there is no verdict.
+    #[serde(skip_serializing_if = "is_default_judged_share")]
+    pub min_judged_share: f64,
     /// Largest mean size of measured minus commanded force, N.
     pub max_measured_error_n: f64,
     /// What a wrong playback is; `None`: a fault if the force passed its limit, was that
@@ -313,14 +323,26 @@ pub struct RenderingRules {
     pub on_fault: Option<OnFault>,
 }
 
-const DEFAULT_ERROR_SHARE: f64 = 0.075;
+/// A rule that earlier releases did not have is absent from fingerprints where it has its default.
+macro_rules! later_rules {
+    ($($default:ident = $value:literal, $is:ident;)+) => {$(
+        const $default: f64 = $value;
 
-#[allow(
-    clippy::trivially_copy_pass_by_ref,
-    reason = "serde passes a reference"
-)]
-fn is_default_share(share: &f64) -> bool {
-    *share == DEFAULT_ERROR_SHARE
+        #[allow(
+            clippy::trivially_copy_pass_by_ref,
+            reason = "serde passes a reference"
+        )]
+        fn $is(value: &f64) -> bool {
+            *value == $default
+        }
+    )+};
+}
+
+later_rules! {
+    DEFAULT_ERROR_SHARE = 0.075, is_default_share;
+    DEFAULT_RANGE_SHARE = 0.1, is_default_range_share;
+    DEFAULT_LOST_SHARE = 0.1, is_default_lost_share;
+    DEFAULT_JUDGED_SHARE = 0.5, is_default_judged_share;
 }
 
 impl Default for RenderingRules {
@@ -332,6 +354,9 @@ impl Default for RenderingRules {
             max_delay_ms: 5.0,
             max_error_n: 0.5,
             max_error_share: DEFAULT_ERROR_SHARE,
+            max_range_share: DEFAULT_RANGE_SHARE,
+            max_lost_share: DEFAULT_LOST_SHARE,
+            min_judged_share: DEFAULT_JUDGED_SHARE,
             max_measured_error_n: 0.5,
             on_fault: None,
         }

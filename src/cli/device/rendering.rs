@@ -1,4 +1,4 @@
-//! `study device check --rendering`: tables in which each term, look-up and direction rule
+//! `study device check`: tables in which each term, look-up and direction rule
 //! counts are played, and each playback is judged as in a session.
 //!
 //! Somebody moves the handle; a simulated device has a hand. A playback with too little
@@ -34,6 +34,10 @@ const STEP_MM: f64 = 1.0;
 const FORCE_N: f64 = 9.0;
 /// A velocity limit that every hand passes, mm/s.
 const SLOW_MM_S: f64 = 3.0;
+/// Half of a range that every hand leaves, mm, and how far beyond it every device has to have
+/// tripped: the largest overtravel of docs/wire.md, 7.7.
+const NARROW_MM: f64 = 0.5;
+const BEYOND_MM: f64 = 10.0;
 
 /// The result of one playback.
 #[derive(Debug, Clone, Serialize)]
@@ -108,9 +112,16 @@ pub(super) fn check(
             return Ok(all);
         }
     }
-    let result = trip(device, middle_mm, &mut pace);
-    report(&result)?;
-    all.push(result);
+    // Where a program has to stop is not in docs/devices.md.
+    let wire = device.identity().servo.is_some();
+    for at in TRIPS
+        .iter()
+        .filter(|at| wire || at.fault == Fault::Velocity)
+    {
+        let result = trip(device, middle_mm, at, &mut pace);
+        report(&result)?;
+        all.push(result);
+    }
     Ok(all)
 }
 
@@ -268,12 +279,37 @@ fn one(device: &mut dyn Device, what: &str, table: &Realization, pace: &mut Pace
             Err(why) => return Rendered::new(what, "not judged", why.message),
         };
         last = judged(what, &found);
+        let [counted, seen] = [
+            playback.strokes,
+            strokes(&heard.samples, table.trained.x_mm),
+        ];
+        if last.result == "pass" && counted > seen + 1 {
+            let seen = format!("it counts {counted} full strokes, and its samples show {seen}");
+            last = Rendered::new(what, "fail", seen);
+        }
         last.fidelity = Some(found);
         if last.result != "not judged" {
             break;
         }
     }
     last
+}
+
+/// Full strokes in samples: from the outer fifth of the range at one side to that at the other.
+fn strokes(samples: &[Sample], [low, high]: [f64; 2]) -> u32 {
+    let fifth_mm = 0.2 * (high - low);
+    let mut from = None;
+    let mut count = 0;
+    for sample in samples {
+        let side = match sample.x_mm {
+            x if x <= low + fifth_mm => false,
+            x if x >= high - fifth_mm => true,
+            _ => continue,
+        };
+        count += u32::from(from.is_some_and(|from| from != side));
+        from = Some(side);
+    }
+    count
 }
 
 /// Waits some seconds until a lost device is there again.
@@ -318,6 +354,8 @@ fn in_words(defect: Defect) -> &'static str {
         Defect::Bias => "a constant force is added",
         Defect::Delay => "the force comes late",
         Defect::Error => "for a moment the force is another one",
+        Defect::Vibration => "a vibration or ticks are added",
+        Defect::Constants => "the constants that it tells make it another force than the table's",
         Defect::Measured => "the measured force is not the commanded one",
         Defect::Speed => "the reported speed is not the change of the position",
         Defect::Clock => "the time of the samples is not that of this computer",
@@ -325,33 +363,85 @@ fn in_words(defect: Defect) -> &'static str {
     }
 }
 
-/// A table whose velocity limit a moving hand passes: the device has to trip.
-fn trip(device: &mut dyn Device, middle_mm: f64, pace: &mut Pace) -> Rendered {
-    let what = "trip at the velocity limit";
-    let table = table(
-        middle_mm,
-        [0.0, 0.0, 0.0, 0.2],
-        Lookup::Linear,
-        Direction::Sign,
-    );
-    let mut last = Rendered::new(what, "not judged", "the limits are invalid");
-    let Ok(limits) = Limits::new(FORCE_N, SLOW_MM_S) else {
+/// A playback in which a moving hand makes the device trip.
+struct Trip {
+    what: &'static str,
+    fault: Fault,
+    /// Half of the range of the table, mm.
+    reach_mm: f64,
+    velocity_mm_s: f64,
+    /// Whether the motion of these samples has to trip, and what it was.
+    due: fn(&[Sample], middle_mm: f64) -> (bool, String),
+}
+
+const TRIPS: [Trip; 2] = [
+    Trip {
+        what: "trip at the velocity limit",
+        fault: Fault::Velocity,
+        reach_mm: REACH_MM,
+        velocity_mm_s: SLOW_MM_S,
+        due: |samples, _| {
+            let fastest = samples
+                .iter()
+                .fold(0.0, |most: f64, s| most.max(s.v_mm_s.abs()));
+            let seen = format!("at {fastest:.0} mm/s of {SLOW_MM_S} mm/s");
+            (fastest > 2.0 * SLOW_MM_S, seen)
+        },
+    },
+    Trip {
+        what: "trip beyond the range of the table",
+        fault: Fault::Stroke,
+        reach_mm: NARROW_MM,
+        velocity_mm_s: 1000.0,
+        due: |samples, middle_mm| {
+            let way = |s: &Sample| (s.x_mm - middle_mm).abs() - NARROW_MM;
+            let beyond_mm = samples.iter().map(way).fold(0.0, f64::max);
+            let seen = format!("{beyond_mm:.1} mm beyond the range");
+            (beyond_mm > BEYOND_MM, seen)
+        },
+    },
+];
+
+/// A table at whose limits a moving hand makes the device trip.
+fn trip(device: &mut dyn Device, middle_mm: f64, trip: &Trip, pace: &mut Pace) -> Rendered {
+    let table = Realization {
+        trained: Trained {
+            x_mm: [middle_mm - trip.reach_mm, middle_mm + trip.reach_mm],
+            v_mm_s: 300.0,
+        },
+        ..table(
+            middle_mm,
+            [0.0, 0.0, 0.0, 0.2],
+            Lookup::Linear,
+            Direction::Sign,
+        )
+    };
+    let mut last = Rendered::new(trip.what, "not judged", "the limits are invalid");
+    let Ok(limits) = Limits::new(FORCE_N, trip.velocity_mm_s) else {
         return last;
     };
+    // A program has its own words for a fault.
+    let wire = device.identity().servo.is_some();
     for _ in 0..TRIES {
         let heard = play(device, &table, limits, pace);
-        let fastest = (heard.samples.iter()).fold(0.0, |most: f64, s| most.max(s.v_mm_s.abs()));
-        let seen = format!("at {fastest:.0} mm/s of {SLOW_MM_S} mm/s");
+        let (due, seen) = (trip.due)(&heard.samples, middle_mm);
         last = match heard.ended {
             Err(PlaybackError::Reported(why)) if why.starts_with(Fault::Watchdog.as_str()) => {
-                Rendered::new(what, "not judged", why)
+                Rendered::new(trip.what, "not judged", why)
             }
-            Err(PlaybackError::Reported(why)) => return Rendered::new(what, "pass", why),
-            Ok(_) if fastest > 2.0 * SLOW_MM_S => {
-                return Rendered::new(what, "fail", format!("it goes on {seen}"));
+            Err(PlaybackError::Reported(why)) if !wire || why == trip.fault.as_str() => {
+                return Rendered::new(trip.what, "pass", why);
             }
-            Ok(_) => Rendered::new(what, "not judged", format!("too little motion: {seen}")),
-            Err(why) => Rendered::new(what, "not judged", why.to_string()),
+            Err(PlaybackError::Reported(why)) => Rendered::new(trip.what, "not judged", why),
+            Ok(_) if due => {
+                return Rendered::new(trip.what, "fail", format!("it goes on {seen}"));
+            }
+            Ok(_) => Rendered::new(
+                trip.what,
+                "not judged",
+                format!("too little motion: {seen}"),
+            ),
+            Err(why) => Rendered::new(trip.what, "not judged", why.to_string()),
         };
     }
     last
@@ -385,18 +475,23 @@ mod tests {
         let all = checked(None);
         let open: Vec<_> = all.iter().filter(|r| r.result != "pass").collect();
         assert!(open.is_empty(), "{open:?}");
-        assert_eq!(tally(&all), [14, 0, 0]);
+        assert_eq!(tally(&all), [15, 0, 0]);
     }
 
     /// A device that tells no constants, as a controller program.
-    struct Program(VirtualDevice);
+    struct Program {
+        device: VirtualDevice,
+        /// It counts so many strokes for each.
+        strokes: u32,
+        tells: bool,
+    }
 
     impl Device for Program {
         fn identity(&self) -> Identity {
             Identity {
-                servo: None,
+                servo: self.device.identity().servo.filter(|_| self.tells),
                 firmware: None,
-                ..self.0.identity()
+                ..self.device.identity()
             }
         }
 
@@ -406,23 +501,29 @@ mod tests {
             limits: Limits,
             at: Duration,
         ) -> Result<(), DeviceError> {
-            self.0.load(what, limits, at)
+            self.device.load(what, limits, at)
         }
 
         fn start(&mut self, at: Duration) -> Result<(), DeviceError> {
-            self.0.start(at)
+            self.device.start(at)
         }
 
         fn stop(&mut self, at: Duration) -> Result<(), DeviceError> {
-            self.0.stop(at)
+            self.device.stop(at)
         }
 
         fn limp(&mut self, at: Duration) {
-            self.0.limp(at);
+            self.device.limp(at);
         }
 
         fn poll(&mut self, at: Duration) -> Vec<Report> {
-            self.0.poll(at)
+            let mut reports = self.device.poll(at);
+            for report in &mut reports {
+                if let Report::Stopped(playback) = report {
+                    playback.strokes *= self.strokes;
+                }
+            }
+            reports
         }
     }
 
@@ -438,7 +539,11 @@ mod tests {
             });
             // the constants of a device that tells none
             options.device.least_mass_kg = 0.0;
-            let mut device = Program(VirtualDevice::new(options));
+            let mut device = Program {
+                device: VirtualDevice::new(options),
+                strokes: 1,
+                tells: false,
+            };
             let pace = Pace::Virtual(Duration::ZERO);
             let all = check(&mut device, 17.5, pace, &mut |_| Ok(())).unwrap();
             assert_eq!(all.len(), 14);
@@ -449,6 +554,21 @@ mod tests {
                 Some(_) => assert_eq!([passes, fails], [1, 13], "{all:#?}"),
             }
         }
+    }
+
+    /// `minimum_strokes` of a protocol would be reached with a third of them.
+    #[test]
+    fn a_device_that_counts_too_many_strokes_fails() {
+        let mut device = Program {
+            device: VirtualDevice::new(Options::seeded(5)),
+            strokes: 3,
+            tells: true,
+        };
+        let pace = Pace::Virtual(Duration::ZERO);
+        let all = check(&mut device, 17.5, pace, &mut |_| Ok(())).unwrap();
+        let [passed, failed, _] = tally(&all);
+        assert_eq!([passed, failed], [2, 13], "{all:#?}");
+        assert!(all[0].seen.contains("full strokes"), "{all:#?}");
     }
 
     /// A wrong device fails in the line that names what is wrong.

@@ -51,6 +51,22 @@ statistics! {
         max: Stat,
     }
 
+    /// Share of the time of a playback in which its force was judged.
+    pub struct JudgedShare {
+        /// mean over the playbacks
+        mean: Stat,
+        /// lowest
+        min: Stat,
+    }
+
+    /// Largest difference from the right force that lasted 20 ms in a playback, in just noticeable differences of a force.
+    pub struct ErrorJnd {
+        /// mean over the playbacks
+        mean: Stat,
+        /// highest
+        max: Stat,
+    }
+
     /// 1 − var(F − F̂)/var(F) on the validation recording, with F̂ the force that the table predicts there, times the gain of the playback and later by its delay (gain of the measured force where there is a sensor, else of the commanded one). With gain 1 and no delay it is the identified VAF. It needs `NAME.csv` beside the protocol, with NAME from `[analysis] vaf`, the hash in the model file and the VAF that the model file states.
     pub struct DeliveredVaf {
         /// mean over the playbacks
@@ -69,6 +85,10 @@ statistics! {
         gain: Gain,
         /// VAF of what was delivered
         delivered_vaf: DeliveredVaf,
+        /// share of the time that was judged
+        judged_share: JudgedShare,
+        /// largest difference, in just noticeable ones
+        error_jnd: ErrorJnd,
     }
 
     /// Whether the force was that of the table, where trials say what was felt.
@@ -177,6 +197,8 @@ fn all(own: &[&Felt], of: impl Fn(&Felt) -> Option<f64>) -> Vec<f64> {
 
 fn playbacks(own: &[&Felt]) -> Playbacks {
     let (vaf, gain) = (all(own, |f| f.rendered_vaf), all(own, |f| f.gain));
+    let (judged, jnd) = (all(own, |f| f.judged_share), all(own, |f| f.error_jnd));
+    let most = |x: &[f64]| x.iter().copied().reduce(f64::max);
     let least = |x: &[f64]| x.iter().copied().reduce(f64::min);
     let delivered = all(own, |f| f.delivered_vaf);
     let why = match delivered[..] {
@@ -192,16 +214,25 @@ fn playbacks(own: &[&Felt]) -> Playbacks {
         gain: Gain {
             mean: Stat::or(mean(&gain), NOT_JUDGED),
             min: Stat::or(least(&gain), NOT_JUDGED),
-            max: Stat::or(gain.iter().copied().reduce(f64::max), NOT_JUDGED),
+            max: Stat::or(most(&gain), NOT_JUDGED),
         },
         delivered_vaf: DeliveredVaf {
             mean: Stat::or(mean(&delivered), NO_RECORDING),
             sd: Stat::or(sd(&delivered), why),
         },
+        judged_share: JudgedShare {
+            mean: Stat::or(mean(&judged), NOT_KNOWN),
+            min: Stat::or(least(&judged), NOT_KNOWN),
+        },
+        error_jnd: ErrorJnd {
+            mean: Stat::or(mean(&jnd), NOT_KNOWN),
+            max: Stat::or(most(&jnd), NOT_KNOWN),
+        },
     }
 }
 
 const NOT_JUDGED: &str = "no playback was judged";
+const NOT_KNOWN: &str = "no playback was judged by a release that computes it";
 
 /// Why there is no delivered VAF.
 pub(super) const NO_RECORDING: &str = "no playback has a delivered VAF: it needs the validation recording in the folder of the protocol";

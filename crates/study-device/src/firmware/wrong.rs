@@ -4,6 +4,7 @@
 //! A wrong device changes the table on its way to the servo, the motion that the servo
 //! sees, or what is reported. It obeys docs/wire.md in everything else.
 
+mod felt;
 mod saboteur;
 
 pub(super) use saboteur::Saboteur;
@@ -100,6 +101,40 @@ wrongs! {
     ReversedSensor "reversed-sensor" "the measured force has the wrong sign";
     HalfSensor "half-sensor" "half of the commanded force is measured";
     StuckSensor "stuck-sensor" "3 N are measured, whatever is commanded";
+    LimpMoments "limp-moments" "the motor is limp for 50 ms of each second, its sensor shows it";
+    LimpEnd "limp-end" "the motor is limp after 3.3 s, its sensor shows it";
+    Saturated "saturated" "the motor gives at most 3 N, its sensor shows it";
+    Derated "derated" "the motor loses force as it heats up, its sensor shows it";
+    WeakLater "weak-later" "the motor gives 0.7 of the force after 2 s, its sensor shows it";
+    MotorBackwards "motor-backwards" "the motor gives 0.4 of the force for v < 0, its sensor shows it";
+    DeadZone "dead-zone" "the motor takes 0.9 N off each force, its sensor shows it";
+    CoarseMotor "coarse-motor" "the motor has steps of 2 N, its sensor shows them";
+    LowPass5 "low-pass-5" "the motor follows with a low-pass of 5 Hz, its sensor shows it";
+    LowPass20 "low-pass-20" "the motor follows with a low-pass of 20 Hz, its sensor shows it";
+    LowPass50 "low-pass-50" "the motor follows with a low-pass of 50 Hz, its sensor shows it";
+    TurnsLate "turns-late" "the motor keeps its force for 0.12 s after a turn, its sensor shows it";
+    Drifting "drifting" "the motor drifts by 0.4 N in a second, its sensor shows it";
+    SlackTransmission "slack-transmission" "the motor follows with a play of 1.8 N, its sensor shows it";
+    MotorHums "motor-hums" "the motor vibrates with 0.3 N at 250 Hz, its sensor shows it";
+    MotorTicks "motor-ticks" "the motor adds 4 N for 1 ms now and then, its sensor shows it";
+    Hums "hums" "0.3 N at 250 Hz are added";
+    Ticks "ticks" "4 N for 1 ms are added three times in a second";
+    FoldsBack "folds-back" "at rest the force falls to a fifth within 0.3 s";
+    RestsHigh "rests-high" "at rest 1.5 N are added";
+    Jitters "jitters" "each force comes 0 to 40 ms late";
+    EncoderScale "encoder-scale" "the servo gets 1.1 of the way from the middle";
+    HiddenInGaps "hidden-in-gaps" "one message of telemetry in 20 is lost, and then there is no force for 60 ms";
+    Unheard20 "unheard-20" "a fifth of the samples is lost, and the motor is limp meanwhile";
+    Unheard45 "unheard-45" "45 % of the samples are lost, and the motor is limp meanwhile";
+    Unheard75 "unheard-75" "three quarters of the samples are lost, and the motor is limp meanwhile";
+    TellsSlew20 "tells-slew-20" "at most 20 N/s, and it tells so";
+    TellsSlew100 "tells-slew-100" "at most 100 N/s, and it tells so";
+    TellsSlew500 "tells-slew-500" "at most 500 N/s, and it tells so";
+    TellsDamping "tells-damping" "0.05 N·s/mm are added, and it tells so";
+    TellsPush "tells-push" "−0.02 N·s/mm are added, and it tells so";
+    TellsLongRamp "tells-long-ramp" "a ramp of 3 s, and it tells so";
+    TellsSlowFilter "tells-slow-filter" "the acceleration is filtered at 1 Hz, and it tells so";
+    TellsPullingWall "tells-pulling-wall" "a wall of −5 N/mm, and it tells so";
     HalfPosition "half-position" "the position is half, everywhere: only a ruler shows it";
     ShiftedPosition "shifted-position" "the position is 3 mm off, everywhere: only a ruler shows it";
     Mirrored "mirrored" "position and motor are the wrong way round: only a ruler shows it";
@@ -127,31 +162,42 @@ impl Wrong {
         )
     }
 
-    /// The servo that it has, instead of the one that it tells.
-    pub(super) fn servo(self, told: ServoSettings) -> ServoSettings {
+    /// Whether most of what it does is lost with its telemetry.
+    pub fn is_unheard(self) -> bool {
+        matches!(self, Self::Unheard20 | Self::Unheard45 | Self::Unheard75)
+    }
+
+    /// The servo that it has, instead of that of a right device.
+    pub(super) fn servo(self, right: ServoSettings) -> ServoSettings {
+        let mut own = right;
         match self {
-            Self::NoRamp => ServoSettings {
-                ramp_s: 0.0,
-                ..told
-            },
-            Self::LongRamp => ServoSettings {
-                ramp_s: 3.0,
-                ..told
-            },
-            Self::SlowSlew => ServoSettings {
-                slew_n_s: 20.0,
-                ..told
-            },
-            Self::MoreDamping => ServoSettings {
-                damping_n_s_per_mm: 0.05,
-                ..told
-            },
-            Self::SlowFilter => ServoSettings {
-                acceleration_hz: 1.0,
-                ..told
-            },
-            _ => told,
+            Self::NoRamp => own.ramp_s = 0.0,
+            Self::LongRamp | Self::TellsLongRamp => own.ramp_s = 3.0,
+            Self::SlowSlew | Self::TellsSlew20 => own.slew_n_s = 20.0,
+            Self::TellsSlew100 => own.slew_n_s = 100.0,
+            Self::TellsSlew500 => own.slew_n_s = 500.0,
+            Self::MoreDamping | Self::TellsDamping => own.damping_n_s_per_mm = 0.05,
+            Self::TellsPush => own.damping_n_s_per_mm = -0.02,
+            Self::SlowFilter | Self::TellsSlowFilter => own.acceleration_hz = 1.0,
+            Self::TellsPullingWall => own.wall_n_per_mm = -5.0,
+            _ => {}
         }
+        own
+    }
+
+    /// Whether it tells the constants of its servo as they are.
+    pub(super) fn is_frank(self) -> bool {
+        matches!(
+            self,
+            Self::TellsSlew20
+                | Self::TellsSlew100
+                | Self::TellsSlew500
+                | Self::TellsDamping
+                | Self::TellsPush
+                | Self::TellsLongRamp
+                | Self::TellsSlowFilter
+                | Self::TellsPullingWall
+        )
     }
 }
 

@@ -361,6 +361,10 @@ table! {
             .optional().with_parts(),
         SessionId: text("session_id", "planned session, of `[[sessions]]`")
             .empty("a participant comes once").optional().with_parts(),
+        JudgedShare: number("judged_share", "share of the time in which the force was judged")
+            .empty("not judged").optional(),
+        ErrorJnd: number("error_jnd", "largest difference from the right force that lasted 20 ms, in just noticeable differences")
+            .empty("not known").optional(),
     }
 }
 
@@ -430,6 +434,8 @@ table! {
             .empty("no samples"),
         BeyondShare: number("beyond_share", "share of the time in motion that was faster or further than these recordings")
             .empty("the handle did not move"),
+        JudgedShare: RatingColumn::JudgedShare.column(),
+        ErrorJnd: RatingColumn::ErrorJnd.column(),
     }
 }
 

@@ -49,6 +49,16 @@ pub(crate) fn rendered(a: &Analysis) -> Table {
         .field(page("VAF, mean"), four, |(_, p)| &p.rendered_vaf.mean)
         .field(page("least"), four, |(_, p)| &p.rendered_vaf.min)
         .field(page("gain, mean"), three, |(_, p)| &p.gain.mean)
+        .field(
+            report("time judged").file("judged_share_mean"),
+            three,
+            |(_, p)| &p.judged_share.mean,
+        )
+        .field(
+            report("largest error, JND").file("error_jnd_max"),
+            one,
+            |(_, p)| &p.error_jnd.max,
+        )
         .field(page("delivered VAF"), four, |(_, p)| &p.delivered_vaf.mean)
         .number(report("identified VAF"), four, &|(m, _)| m.vaf)
         .done()
@@ -56,6 +66,10 @@ pub(crate) fn rendered(a: &Analysis) -> Table {
 
 fn four(x: f64) -> String {
     apa::number(x, 4)
+}
+
+fn one(x: f64) -> String {
+    apa::number(x, 1)
 }
 
 /// Verdicts of each participant.

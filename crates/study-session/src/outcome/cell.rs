@@ -310,6 +310,8 @@ row! {
             RenderedBiasN: rendered_bias_n,
             RenderedDelayMs: rendered_delay_ms,
             RenderedErrorN: rendered_error_n,
+            JudgedShare: judged_share,
+            ErrorJnd: error_jnd,
         }
     }
 }
@@ -359,6 +361,8 @@ row! {
             MotionShare: motion_share,
             SpeedFactor: speed_factor,
             BeyondShare: beyond_share,
+            JudgedShare: judged_share,
+            ErrorJnd: error_jnd,
         }
     }
 }

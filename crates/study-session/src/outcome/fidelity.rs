@@ -47,6 +47,10 @@ named! {
         Delay = "delay",
         /// For a moment the force was another one.
         Error = "error",
+        /// A vibration or tick that a hand feels was added.
+        Vibration = "vibration",
+        /// The constants that the device states make it another force than that of the table.
+        Constants = "constants",
         /// The measured force was not the commanded one.
         Measured = "measured",
         /// The reported speed was not the change of the reported position.
@@ -93,9 +97,27 @@ pub struct Fidelity {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rendered_error_n: Option<f64>,
     /// Largest rms difference of the two forces over rms force of the table: in the whole
-    /// playback, one direction, or a stretch of 2 s.
+    /// playback, one direction, at rest, or a stretch of 2 s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rendered_error_share: Option<f64>,
+    /// Share of the time in which the commanded force was judged.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub judged_share: Option<f64>,
+    /// Largest mean size of the difference over 50 ms, over the range of the table's forces.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error_range_share: Option<f64>,
+    /// Largest difference that lasted 20 ms, of the commanded force, of the measured one from the
+    /// commanded, or from the table with the constants of docs/wire.md, in just noticeable
+    /// differences of a force.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error_jnd: Option<f64>,
+    /// Largest vibration above 30 Hz that is not of the table, rms over 0.1 s, N.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub vibration_n: Option<f64>,
+    /// As `rendered_error_share`, with the constants of docs/wire.md in place of those that the
+    /// device states, if it states others.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub table_error_share: Option<f64>,
     /// Largest commanded or measured force, N.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_force_n: Option<f64>,
@@ -114,6 +136,16 @@ pub struct Fidelity {
     /// Mean size of the measured minus the commanded force, N.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub measured_error_n: Option<f64>,
+    /// How much later than commanded the measured force was, ms.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub measured_delay_ms: Option<f64>,
+    /// Largest rms difference of measured and commanded force, without its mean and the delay that
+    /// is allowed, over rms commanded force, in the same parts as `rendered_error_share`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub measured_error_share: Option<f64>,
+    /// As `vibration_n`, of the measured minus the commanded force.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub measured_vibration_n: Option<f64>,
     /// The realization of the study that explains the commanded force best. Never on a
     /// screen.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -103,6 +103,10 @@ pub struct Felt {
     pub gain: Option<f64>,
     /// VAF of what was delivered, for the validation recording.
     pub delivered_vaf: Option<f64>,
+    /// Share of the time in which the force was judged.
+    pub judged_share: Option<f64>,
+    /// Largest difference from the right force that lasted 20 ms, in just noticeable differences.
+    pub error_jnd: Option<f64>,
     /// Attempts at the trial that failed because of the force; 0 where the table of
     /// attempts was not read.
     pub failed: u32,
@@ -116,6 +120,8 @@ impl Felt {
             rendered_vaf: finite(fidelity.rendered_vaf),
             gain: finite(fidelity.rendered_gain),
             delivered_vaf: finite(fidelity.delivered_vaf),
+            judged_share: finite(fidelity.judged_share),
+            error_jnd: finite(fidelity.error_jnd),
             failed: 0,
         }
     }

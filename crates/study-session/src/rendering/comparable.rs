@@ -1,10 +1,11 @@
 //! Which samples of a playback are compared with the table, and whether they are enough.
 
 use super::moments::Moments;
-use super::predicted::{APART, Predicted, acceleration, predicted};
+use super::predicted::{APART, GAP_S, Predicted, acceleration, predicted};
 use super::scale::Scale;
-use super::{Played, REST_MM_S, ROUNDING_N};
-use crate::outcome::Sample;
+use super::{Played, REST_MM_S, ROUNDING_N, WINDOW_S};
+use crate::outcome::{Fidelity, Sample};
+use study_plan::protocol::RenderingRules;
 use study_wire::elements::Spring;
 use study_wire::predict::Direction;
 use study_wire::servo::Law;
@@ -15,8 +16,12 @@ const LEAST_S: f64 = 0.5;
 const LEAST_MOTION_S: f64 = 0.1;
 /// Telemetry with longer intervals is too slow for a verdict, s.
 pub(super) const SLOW_S: f64 = 0.0025;
+/// Mass of a hand with its handle that a force moves, kg: less is moved more.
+const HANDLE_KG: f64 = 0.3;
+/// A force that was wrong for a longer gap than this would not have been seen, s.
+const LONGEST_GAP_S: f64 = 0.06;
 /// Time after the ramp before forces are compared, s.
-const AFTER_RAMP_S: f64 = 0.05;
+pub(super) const AFTER_RAMP_S: f64 = 0.05;
 /// Why there is no verdict about a force that the steps of the position leave open.
 pub(super) const TOO_COARSE: &str = "the steps of the position are too coarse for this force";
 /// Largest doubt about the force, rms, as a share of its standard deviation, and N.
@@ -24,21 +29,48 @@ const MOST_DOUBT: (f64, f64) = (0.1, 0.5);
 
 /// The force at each sample, with what is not known about it: within the band of its
 /// filter the acceleration is open by half a step of the position, and by its change in a
-/// servo period; the deflection of a mechanism is open by half a step.
+/// servo period and among lost samples; the deflection of a mechanism is open by half a step.
 pub(super) fn with_doubt(played: &Played<'_>, samples: &[Sample]) -> Vec<Predicted> {
     let (what, servo) = (&played.what, played.servo);
     let mut forces = predicted(what, servo, samples, |_| 0.0);
     // The largest acceleration in that band within half a step.
     let band = std::f64::consts::TAU * servo.acceleration_hz;
     let half_mm = 0.5 * step_mm(samples);
-    let others = predicted(what, servo, samples, |i| {
-        1e-3 * half_mm * band * band + jerk(samples, i) / servo.servo_hz
-    });
+    let swings_n: Vec<f64> = forces.iter().map(|p| p.ends_n[1] - p.ends_n[0]).collect();
+    let more_m_s2 = |i: usize| {
+        1e-3 * half_mm * band * band
+            + jerk(samples, i) / servo.servo_hz
+            + among_lost_m_s2(samples, i, half_mm, swings_n[i])
+    };
+    let mut others = vec![predicted(what, servo, samples, more_m_s2)];
+    // At a limit of the force only one side shows.
+    if forces.iter().any(|p| p.after_gap) {
+        others.push(predicted(what, servo, samples, |i| -more_m_s2(i)));
+    }
     let deflection_n = half_mm * stiffness_n_per_mm(&what.law);
-    for (force, other) in forces.iter_mut().zip(&others) {
-        force.doubt_n = (other.force_n - force.force_n).abs() + deflection_n;
+    for (i, force) in forces.iter_mut().enumerate() {
+        let apart_n = others.iter().map(|o| (o[i].force_n - force.force_n).abs());
+        force.doubt_n = apart_n.fold(0.0, f64::max) + deflection_n;
     }
     forces
+}
+
+/// What the acceleration among the samples that were lost before this one may have been beside
+/// that between both ends, m/s²: the change from one to the other, which may have come at once,
+/// twice what the speeds tell of the mean, what two steps of the position in each millisecond do to
+/// them, and what the force did to the handle meanwhile.
+fn among_lost_m_s2(samples: &[Sample], i: usize, half_mm: f64, swing_n: f64) -> f64 {
+    let Some(before) = i.checked_sub(1) else {
+        return 0.0;
+    };
+    let gap_s = samples[i].t_s - samples[before].t_s;
+    if gap_s <= GAP_S {
+        return 0.0;
+    }
+    let ends = [before, i].map(|i| acceleration(samples, i));
+    let mean_m_s2 = 1e-3 * (samples[i].v_mm_s - samples[before].v_mm_s) / gap_s;
+    let apart_m_s2 = mean_m_s2 - 0.5 * (ends[0] + ends[1]);
+    (ends[1] - ends[0]).abs() + 2.0 * apart_m_s2.abs() + 4.0 * half_mm / gap_s + swing_n / HANDLE_KG
 }
 
 /// Size of the change of the acceleration, m/s³.
@@ -80,6 +112,23 @@ fn step_mm(samples: &[Sample]) -> f64 {
         .unwrap_or(0.0)
 }
 
+/// Why lost and unjudged samples leave a playback open, if they do.
+pub(super) fn too_much_lost(
+    fidelity: &Fidelity,
+    gap_s: f64,
+    rules: &RenderingRules,
+) -> Option<&'static str> {
+    if fidelity.lost_share > Some(rules.max_lost_share) {
+        Some("too many samples were lost")
+    } else if gap_s > LONGEST_GAP_S {
+        Some("the samples of too long a time were lost")
+    } else if fidelity.judged_share < Some(rules.min_judged_share) {
+        Some("the force of too many samples is not known")
+    } else {
+        None
+    }
+}
+
 /// Whether what is not known about the force is as much as a verdict excludes.
 pub(super) fn too_coarse(
     forces: &[Predicted],
@@ -105,9 +154,7 @@ pub(super) fn direction_known(
     if !by_sign(played) {
         return vec![true; samples.len()];
     }
-    let least_n = forces.iter().map(|p| p.force_n).fold(f64::MAX, f64::min);
-    let most_n = forces.iter().map(|p| p.force_n).fold(f64::MIN, f64::max);
-    let unknown_s = 1.5 * interval_s + (most_n - least_n) / played.servo.slew_n_s;
+    let unknown_s = unknown_s(played, forces, interval_s);
     let mut changed_s = f64::NEG_INFINITY;
     let mut before_mm_s = 0.0;
     let known = samples.iter().map(|s| {
@@ -120,7 +167,14 @@ pub(super) fn direction_known(
     known.collect()
 }
 
-fn by_sign(played: &Played<'_>) -> bool {
+/// For how long the force is not known after the direction has changed between two samples, s.
+pub(super) fn unknown_s(played: &Played<'_>, forces: &[Predicted], interval_s: f64) -> f64 {
+    let least_n = forces.iter().map(|p| p.force_n).fold(f64::MAX, f64::min);
+    let most_n = forces.iter().map(|p| p.force_n).fold(f64::MIN, f64::max);
+    1.5 * interval_s + (most_n - least_n) / played.servo.slew_n_s
+}
+
+pub(super) fn by_sign(played: &Played<'_>) -> bool {
     matches!(
         played.what.law,
         Law::Table {
@@ -167,11 +221,16 @@ pub(super) fn too_little(
             .map(|(s, _)| s)
     };
     let lasting = |n: usize, least_s: f64| n as f64 * interval_s >= least_s;
-    let moving = |sign: f64| compared().filter(|s| sign * s.v_mm_s > REST_MM_S).count();
-    let travel_mm: f64 = (samples.windows(2).zip(keep))
-        .filter(|(_, keep)| **keep)
-        .map(|(w, _)| (w[1].x_mm - w[0].x_mm).abs())
-        .sum();
+    // An encoder that trembles between two steps moves nothing.
+    let apart = ((WINDOW_S / interval_s) as usize).max(1);
+    let ways = samples.windows(apart + 1).zip(keep);
+    let ways = || {
+        ways.clone()
+            .filter(|(_, keep)| **keep)
+            .map(|(w, _)| w[apart].x_mm - w[0].x_mm)
+    };
+    let moving = |sign: f64| ways().filter(|mm| sign * mm > REST_MM_S * WINDOW_S).count();
+    let travel_mm = ways().map(f64::abs).sum::<f64>() / apart as f64;
     if interval_s > SLOW_S {
         Some("the device reports fewer than 400 samples per second")
     } else if !lasting(compared().count(), LEAST_S) {

@@ -59,6 +59,14 @@ impl Moments {
         Some(self.covariance()? / var_x)
     }
 
+    /// Where the least-squares line has x = 0, or the bias if x does not vary.
+    pub(super) fn intercept(&self) -> Option<f64> {
+        match self.slope() {
+            Some(slope) => Some((self.y - slope * self.x) / self.n),
+            None => self.bias(),
+        }
+    }
+
     /// Correlation; `None` if one of them does not vary.
     pub(super) fn correlation(&self) -> Option<f64> {
         let product = self.var_x()? * self.var_y()?;
@@ -148,6 +156,7 @@ mod tests {
         assert!((m.correlation().unwrap() - 1.0).abs() < 1e-12);
         // 1 − (1 − 0.5)² = 0.75; the mean of x is 49.5.
         assert!((m.vaf().unwrap() - 0.75).abs() < 1e-12);
+        assert!((m.intercept().unwrap() - 3.0).abs() < 1e-10);
         assert!((m.bias().unwrap() - (3.0 - 24.75)).abs() < 1e-12);
         assert_eq!(Moments::of([(1.0, 2.0), (1.0, 3.0)]).vaf(), None);
         assert_eq!(Moments::of([]).bias(), None);

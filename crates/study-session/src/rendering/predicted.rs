@@ -1,16 +1,22 @@
 //! The force that the table gives for the reported motion, by the device's own servo.
 
+use super::REST_MM_S;
 use crate::outcome::Sample;
 use study_wire::elements::{ElementsView, Spring};
 use study_wire::predict::{Direction, Motion};
 use study_wire::servo::{Law, Rendering, Servo, ServoSettings};
 
 /// After a longer pause between two samples the filters have to settle again, s.
-const GAP_S: f64 = 0.004;
+pub(super) const GAP_S: f64 = 0.004;
 /// Time in which filter and slew limit forget a gap, s.
 const SETTLING_S: f64 = 0.06;
 /// Only this much of a longer gap is calculated, in addition to the ramp, s.
 const LONGEST_GAP_S: f64 = 0.25;
+
+/// In a longer gap the hand may have turned twice, s: one message of samples at 400 Hz.
+const STEADY_S: f64 = 0.03;
+/// How far the way over a gap may differ from the mean of the two speeds, as a share.
+const STEADY_WAY: f64 = 0.25;
 
 /// Samples on each side of the second difference of the position.
 pub(super) const APART: usize = 4;
@@ -22,6 +28,13 @@ pub(super) struct Predicted {
     pub force_n: f64,
     /// Whether it is known well: the samples before it are complete.
     pub settled: bool,
+    /// Whether the state of its direction is known: the hand did not turn among lost samples,
+    /// or has moved farther since than the state depends on.
+    pub remembered: bool,
+    /// Whether samples were lost a short time ago.
+    pub after_gap: bool,
+    /// Least and largest force since the sample before, N.
+    pub ends_n: [f64; 2],
     /// By how much it may be another one because the position has steps and the servo
     /// periods, N.
     pub doubt_n: f64,
@@ -60,6 +73,7 @@ pub(super) fn predicted(
     let mut settled_from_s = 0.0;
     // Positions since the last gap, until they cover what the direction depends on.
     let mut since_gap: Option<[f64; 2]> = None;
+    let mut since_turn: Option<[f64; 2]> = None;
     let memory_mm = memory_mm(&what.law);
     for (i, sample) in samples.iter().enumerate() {
         let here = Motion {
@@ -73,12 +87,19 @@ pub(super) fn predicted(
         if before.is_some() && apart_s > GAP_S {
             settled_from_s = sample.t_s + SETTLING_S;
             since_gap = Some([sample.x_mm; 2]);
+            if may_have_turned(from, here, apart_s) {
+                since_turn = Some([sample.x_mm; 2]);
+            }
         }
-        since_gap = since_gap
-            .map(|[low, high]| [low.min(sample.x_mm), high.max(sample.x_mm)])
-            .filter(|[low, high]| high - low < memory_mm);
+        let covering = |places: Option<[f64; 2]>| {
+            places
+                .map(|[low, high]| [low.min(sample.x_mm), high.max(sample.x_mm)])
+                .filter(|[low, high]| high - low < memory_mm)
+        };
+        (since_gap, since_turn) = (covering(since_gap), covering(since_turn));
         let steps = (apart_s * hz).round().clamp(1.0, most) as u32;
         let mut force_n = 0.0;
+        let mut ends_n = [f64::INFINITY, f64::NEG_INFINITY];
         for step in 1..=steps {
             let part = f64::from(step) / f64::from(steps);
             let between = |a: f64, b: f64| a + part * (b - a);
@@ -90,15 +111,32 @@ pub(super) fn predicted(
                     a_m_s2: between(from.a_m_s2, here.a_m_s2),
                 },
             );
+            ends_n = [ends_n[0].min(force_n), ends_n[1].max(force_n)];
         }
         all.push(Predicted {
             force_n,
             settled: sample.t_s >= settled_from_s && since_gap.is_none(),
+            remembered: since_turn.is_none(),
+            after_gap: sample.t_s < settled_from_s,
+            ends_n,
             doubt_n: 0.0,
         });
         before = Some((sample.t_s, here));
     }
     all
+}
+
+/// Whether the hand may have turned between two samples: not if it moved on at the same speed, or
+/// rested at the same place.
+fn may_have_turned(from: Motion, to: Motion, apart_s: f64) -> bool {
+    let way_mm = to.x_mm - from.x_mm;
+    let due_mm = 0.5 * (from.v_mm_s + to.v_mm_s) * apart_s;
+    let moves = from.v_mm_s * to.v_mm_s > 0.0
+        && from.v_mm_s.abs().min(to.v_mm_s.abs()) > REST_MM_S
+        && (way_mm - due_mm).abs() < STEADY_WAY * due_mm.abs();
+    let rests = from.v_mm_s.abs().max(to.v_mm_s.abs()) < REST_MM_S
+        && way_mm.abs() < REST_MM_S * apart_s.min(STEADY_S);
+    !((moves || rests) && apart_s < STEADY_S)
 }
 
 /// The motion that an unknown motion before it has no influence on, mm: the hand may have
@@ -130,20 +168,24 @@ fn elements_memory_mm(what: &ElementsView<'_>) -> f64 {
     memories.fold(0.0, f64::max)
 }
 
+/// The second difference of the position around a sample, m/s²; `None` if samples are missing.
+fn bend_m_s2(samples: &[Sample], i: usize) -> Option<f64> {
+    let (before, after) = (samples.get(i.checked_sub(APART)?)?, samples.get(i + APART)?);
+    let here = &samples[i];
+    let [past_s, next_s] = [here.t_s - before.t_s, after.t_s - here.t_s];
+    let whole = (past_s - next_s).abs() < 0.1 * past_s && past_s < GAP_S * APART as f64;
+    let bend_mm = after.x_mm - 2.0 * here.x_mm + before.x_mm;
+    whole.then(|| 1e-3 * bend_mm / (past_s * next_s))
+}
+
 /// Acceleration at a sample, m/s²: the second difference of the position, in which the
-/// filter of the speed has no part; at the ends and beside gaps the difference of the
+/// filter of the speed has no part; where too few samples are there the difference of the
 /// speed.
 pub(super) fn acceleration(samples: &[Sample], i: usize) -> f64 {
-    let here = &samples[i];
-    let around = i
-        .checked_sub(APART)
-        .and_then(|before| Some((samples.get(before)?, samples.get(i + APART)?)));
-    if let Some((before, after)) = around {
-        let [past_s, next_s] = [here.t_s - before.t_s, after.t_s - here.t_s];
-        if (past_s - next_s).abs() < 0.1 * past_s && past_s < GAP_S * APART as f64 {
-            let bend_mm = after.x_mm - 2.0 * here.x_mm + before.x_mm;
-            return 1e-3 * bend_mm / (past_s * next_s);
-        }
+    // Beside a gap that of the nearest sample with enough samples around it.
+    let near = (0..=APART).flat_map(|by| [i.checked_sub(by), Some(i + by)]);
+    if let Some(a_m_s2) = near.flatten().find_map(|i| bend_m_s2(samples, i)) {
+        return a_m_s2;
     }
     let before = &samples[i.saturating_sub(1)];
     let after = &samples[(i + 1).min(samples.len() - 1)];

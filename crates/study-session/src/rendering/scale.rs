@@ -2,7 +2,11 @@
 //! realization, so that a key of 4 mm and 0.6 N is judged as well as a lever of 35 mm and 9 N,
 //! down to what the device resolves.
 
-use super::Played;
+use super::moments::Moments;
+use super::predicted::Predicted;
+use super::{Played, is_inside};
+use crate::outcome::Sample;
+use study_base::perception::force_jnd_n;
 use study_wire::elements;
 use study_wire::predict::{self, Motion};
 use study_wire::servo::Law;
@@ -27,21 +31,47 @@ pub(super) struct Scale {
     pub(super) force_n: f64,
     /// Least distance, mm.
     pub(super) travel_mm: f64,
+    /// Range of the forces of the realization, N: at its trained speed, but no less than twice
+    /// the standard deviation in this playback, so that a mass alone has one, and half of the
+    /// greatest force, so that a constant force has one. Within the limit of the playback.
+    pub(super) range_n: f64,
+    /// What the device resolves, N.
+    pub(super) resolved_n: f64,
+    /// Just noticeable difference in force, N.
+    pub(super) jnd_n: f64,
 }
 
 impl Scale {
-    pub(super) fn of(played: &Played<'_>) -> Self {
+    /// What the realization of a playback asks for; `forces` are those expected in it.
+    pub(super) fn of(played: &Played<'_>, samples: &[Sample], forces: &[Predicted]) -> Self {
         let [low, high] = played.what.range_mm;
-        let floor_n = RESOLVED * played.servo.force_n;
+        let limit_n = played.servo.force_n;
+        let resolved_n = RESOLVED * limit_n;
+        let [least_n, most_n] = forces_n(played);
+        // The wall beyond the range is not of the realization.
+        let own_n = || {
+            (samples.iter().zip(forces))
+                .filter(|(s, _)| is_inside(played, s))
+                .map(|(_, p)| p.force_n)
+        };
+        let greatest_n = own_n().fold(least_n.abs().max(most_n.abs()), |most, n| most.max(n.abs()));
+        let varying = Moments::of(own_n().map(|n| (n, 0.0)));
+        let twice_sd_n = 2.0 * varying.var_x().unwrap_or(0.0).sqrt();
+        let within_n = |force_n: f64| force_n.min(limit_n).max(-limit_n);
         Self {
-            force_n: (OF_RANGE * range_n(played)).clamp(floor_n.min(LEAST_N), LEAST_N),
+            force_n: (OF_RANGE * (most_n - least_n)).clamp(resolved_n.min(LEAST_N), LEAST_N),
             travel_mm: LEAST_TRAVEL_MM.min(OF_TRAVEL * (high - low)),
+            range_n: (within_n(most_n) - within_n(least_n))
+                .max(twice_sd_n)
+                .max(0.5 * greatest_n.min(limit_n)),
+            resolved_n,
+            jnd_n: force_jnd_n(greatest_n).max(resolved_n),
         }
     }
 }
 
-/// The range of the forces at the trained speed in both directions, N.
-fn range_n(played: &Played<'_>) -> f64 {
+/// The least and the largest force at the trained speed in both directions, N.
+fn forces_n(played: &Played<'_>) -> [f64; 2] {
     let [low, high] = played.what.range_mm;
     let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
     for place in 0..=PLACES {
@@ -73,5 +103,5 @@ fn range_n(played: &Played<'_>) -> f64 {
             (least, most) = (least.min(force_n), most.max(force_n));
         }
     }
-    most - least
+    [least, most]
 }

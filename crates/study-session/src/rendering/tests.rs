@@ -6,6 +6,7 @@ use study_wire::predict::{BranchView, Direction, Lookup, Motion, TableView};
 use study_wire::servo::{Law, Rendering, Servo};
 
 mod parts;
+mod whole;
 
 const HZ: f64 = 4000.0;
 /// Position about which the hand moves, amplitude, mm, and frequency, Hz.
@@ -530,7 +531,7 @@ fn the_protocol_says_what_fails() {
         |_| (),
         |rules| {
             (rules.gain, rules.min_vaf, rules.max_error_n) = ([0.4, 1.2], 0.7, 5.0);
-            rules.max_error_share = 0.6;
+            (rules.max_error_share, rules.max_range_share) = (0.6, 0.2);
         },
     );
     assert_eq!(wide.verdict, Verdict::Ok, "{wide:?}");

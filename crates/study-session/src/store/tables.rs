@@ -71,6 +71,8 @@ mod tests {
                 verdict: self.of(&verdicts),
                 rendered_vaf: self.maybe(Self::number),
                 delivered_vaf: self.maybe(Self::number),
+                judged_share: self.maybe(Self::number),
+                error_jnd: self.maybe(Self::number),
                 nearest_model: self.maybe(Self::model),
                 ..Fidelity::default()
             }

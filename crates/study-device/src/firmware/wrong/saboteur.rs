@@ -1,9 +1,10 @@
 //! What a wrong device changes.
 
 use super::super::replies;
+use super::felt::{Felt, hum_n, tick_n};
 use super::{Wrong, WrongLoads};
 use std::collections::VecDeque;
-use study_wire::frame::Decoder;
+use study_wire::frame::{Decoder, crc32};
 use study_wire::handler::Drive;
 use study_wire::message::{
     Commit, FixedVec, Node, Play, Reply, Request, TableBegin, TableChunk, Telemetry,
@@ -34,6 +35,10 @@ pub(in crate::firmware) struct Saboteur {
     /// Commanded forces of the last samples, µN, with their periods.
     forces: VecDeque<(u32, i32)>,
     held: Option<TelemetrySample>,
+    /// What its sensor measures.
+    felt: Felt,
+    /// Since when the handle rests, s.
+    rests_s: Option<f64>,
     /// Direction of the motion, and the place farthest in it, mm.
     side: f64,
     turned_mm: Option<f64>,
@@ -63,6 +68,8 @@ impl Saboteur {
             periods: 0,
             forces: VecDeque::new(),
             held: None,
+            felt: Felt::default(),
+            rests_s: None,
             side: 1.0,
             turned_mm: None,
         }
@@ -142,6 +149,7 @@ impl Saboteur {
                 self.periods = 0;
                 self.forces.clear();
                 self.held = None;
+                (self.felt, self.rests_s) = (Felt::default(), None);
                 self.turned_mm = None;
                 Request::Play(Play {
                     crc: self.crcs.1,
@@ -308,6 +316,11 @@ impl Saboteur {
                 let step = (motion.x_mm / 3.0).round() * 3.0;
                 position(step + (motion.x_mm - step).clamp(-1.5, 1.5).powi(5) / 5.0625)
             }
+            Wrong::EncoderScale => {
+                let [low, high] = self.begin.map_or([0.0; 2], |begin| begin.range_mm);
+                let middle_mm = 0.5 * (low + high);
+                position(middle_mm + 1.1 * (motion.x_mm - middle_mm))
+            }
             Wrong::AccelerationTimesThree => acceleration(3.0),
             Wrong::AccelerationReversed => acceleration(-1.0),
             Wrong::HalfPosition => Motion {
@@ -339,10 +352,13 @@ impl Saboteur {
         let mut sent = Vec::new();
         for (sequence, reply) in replies(bytes) {
             let reply = match reply {
+                Reply::Telemetry(telemetry) if self.is_unheard(&telemetry) => continue,
                 Reply::Telemetry(telemetry) => Reply::Telemetry(self.telemetry(telemetry)),
                 Reply::Identity(mut identity) => {
                     // It tells the constants of a right device.
-                    if let Some(constants) = &mut identity.constants {
+                    if let Some(constants) = &mut identity.constants
+                        && !self.how.wrong.is_frank()
+                    {
                         constants.ramp_s = self.told.ramp_s;
                         constants.slew_n_s = self.told.slew_n_s;
                         constants.damping_n_s_per_mm = self.told.damping_n_s_per_mm;
@@ -355,6 +371,18 @@ impl Saboteur {
             sent.extend_from_slice(reply.frame(sequence).as_bytes());
         }
         sent
+    }
+
+    /// Whether a message of telemetry is lost, as the device means it to be.
+    fn is_unheard(&self, telemetry: &Telemetry) -> bool {
+        let message = telemetry.first / 10;
+        match self.wrong() {
+            Some(Wrong::HiddenInGaps) => message % 20 == 10,
+            Some(Wrong::Unheard20) => message % 20 < 4,
+            Some(Wrong::Unheard45) => message % 9 < 4,
+            Some(Wrong::Unheard75) => message % 4 < 3,
+            _ => false,
+        }
     }
 
     fn telemetry(&mut self, telemetry: Telemetry) -> Telemetry {
@@ -433,16 +461,34 @@ impl Saboteur {
             }
             Wrong::SlowClock => changed.tick = (0.8 * f64::from(sample.tick)) as u32,
             Wrong::FastClock => changed.tick = (1.25 * f64::from(sample.tick)) as u32,
-            Wrong::LimpSensor => changed.measured_un = Some(0),
-            Wrong::ReversedSensor => changed.measured_un = Some(-sample.command_un),
-            Wrong::HalfSensor => changed.measured_un = Some(sample.command_un / 2),
-            Wrong::StuckSensor => changed.measured_un = Some(3_000_000),
+            Wrong::Hums => changed.command_un = command(newtons + hum_n(t_s)),
+            Wrong::Ticks => changed.command_un = command(newtons + tick_n(t_s)),
+            Wrong::FoldsBack | Wrong::RestsHigh => {
+                let rests = sample.v_um_s.abs() < 5000;
+                let since_s = *self.rests_s.get_or_insert(t_s);
+                self.rests_s = self.rests_s.filter(|_| rests);
+                let left = (1.0 - (t_s - since_s) / 0.3 * 0.8).max(0.2);
+                changed.command_un = match (rests, wrong) {
+                    (false, _) => sample.command_un,
+                    (true, Wrong::FoldsBack) => command(left * newtons),
+                    (true, _) => command(newtons + 1.5),
+                };
+            }
+            Wrong::Jitters => {
+                let ms = f64::from(crc32(&(sample.tick / 20).to_le_bytes()) % 40);
+                changed.command_un = ago(&self.forces, ms);
+            }
+            // After the message that is lost.
+            Wrong::HiddenInGaps if (110..170).contains(&(sample.tick / 4 % 200)) => {
+                changed.command_un = 0;
+            }
             // The reported motion is the true one.
             Wrong::SpeedHalfInside => changed.v_um_s = sample.v_um_s.saturating_mul(2),
             Wrong::SpeedLate
             | Wrong::SpeedClipped
             | Wrong::DirectionLate
             | Wrong::PositionLate
+            | Wrong::EncoderScale
             | Wrong::PositionCoarse => {
                 let since = self.periods.saturating_sub(sample.tick as usize);
                 let at = self.motions.len().checked_sub(since);
@@ -453,6 +499,9 @@ impl Saboteur {
             }
             _ => {}
         }
+        let v_mm_s = f64::from(sample.v_um_s) * 1e-3;
+        let measured_n = self.felt.measured_n(wrong, t_s, v_mm_s, newtons);
+        changed.measured_un = measured_n.map(command).or(changed.measured_un);
         self.held = Some(changed);
         changed
     }

@@ -42,6 +42,15 @@ const RENDERING: &[Key] = keys! {
     /// Largest difference of commanded and table's force as a share of the table's force, both
     /// root mean squares: of the whole playback, of each direction and of each stretch of 2 s.
     "max_error_share": Kind::positive(""), "0.15", default("0.075");
+    /// Largest mean size of the difference over 50 ms, of the commanded force from the table's
+    /// and of the measured one from the commanded, as a share of the range of the table's forces.
+    "max_range_share": Kind::positive(""), "0.2", default("0.1");
+    /// Largest share of the samples that may be lost. Of a playback that lost more nothing is
+    /// said.
+    "max_lost_share": Kind::Number(AT_MOST_1, ""), "0.05", default("0.1");
+    /// Least share of the time in which the force must be known. Of a playback with less nothing
+    /// is said.
+    "min_judged_share": Kind::Number(AT_MOST_1, ""), "0.8", default("0.5");
     /// Largest mean size of measured minus commanded force.
     "max_measured_error_n": Kind::positive("N"), "1.0", default("0.5");
     /// What a wrong playback is. Without this key it fails if the force passed its limit, was
@@ -126,6 +135,9 @@ fn rendering(mut section: Section<'_, '_>) -> Option<RenderingRules> {
         max_delay_ms: section.number("max_delay_ms")?,
         max_error_n: section.number("max_error_n")?,
         max_error_share: section.number("max_error_share")?,
+        max_range_share: section.number("max_range_share")?,
+        max_lost_share: section.number("max_lost_share")?,
+        min_judged_share: section.number("min_judged_share")?,
         max_measured_error_n: section.number("max_measured_error_n")?,
         on_fault: section.word("on_fault"),
     })

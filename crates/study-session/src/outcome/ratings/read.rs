@@ -344,6 +344,8 @@ impl Positions {
             rendered_vaf: number(C::RenderedVaf)?,
             gain: number(C::RenderedGain)?,
             delivered_vaf: number(C::DeliveredVaf)?,
+            judged_share: number(C::JudgedShare)?,
+            error_jnd: number(C::ErrorJnd)?,
             failed: 0,
         }))
     }

@@ -104,7 +104,7 @@ fn a_turn_among_lost_samples_accuses_nobody() {
         let what = with_rule(rule);
         // It turns each half second.
         let kept: Vec<Sample> = (played(&what, AMPLITUDE_MM, 5.0).into_iter())
-            .filter(|s| (s.t_s + 0.06).rem_euclid(0.5) > 0.1)
+            .filter(|s| (s.t_s + 0.0225).rem_euclid(0.5) > 0.045)
             .collect();
         let said = |samples: &[Sample]| {
             verdict(
@@ -114,7 +114,7 @@ fn a_turn_among_lost_samples_accuses_nobody() {
                         unreachable!("it is a table");
                     };
                     *own = rule;
-                    played.lost = 1000;
+                    played.lost = 450;
                 },
                 |_| (),
             )
