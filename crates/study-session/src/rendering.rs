@@ -3,7 +3,7 @@
 //! [`judge`] is a pure function of the table and limits that were sent, the telemetry
 //! and the rules of the protocol. The expected force comes from the code that a device
 //! runs ([`study_wire::servo`]), stepped through the reported motion. Every sample is judged
-//! ([`band`]) or counted as unjudged ([`Fidelity::judged_share`]).
+//! (`band`) or counted as unjudged ([`Fidelity::judged_share`]).
 //!
 //! Not visible in telemetry: a wrong scale or origin of the position, a wrong motor
 //! constant without a force sensor, a wrong clock that is consistent. `study device
