@@ -138,11 +138,26 @@ fn retest(part: &PartAnalysis) -> Option<String> {
     ))
 }
 
-/// The thresholds of each condition.
+/// The thresholds of each condition: those learned together, or the means of those that are not.
 fn thresholds(part: &PartAnalysis) -> Vec<String> {
-    let all = part.results.over.psy_group.iter();
+    let over = &part.results.over;
+    let pooled = |condition: &str| over.psy_population.as_ref()?.threshold.get(condition);
+    let all = over.psy_group.iter();
     all.filter_map(|(condition, found)| {
         let found = &found.posterior_threshold;
+        if let Some(pooled) = pooled(condition.as_str())
+            && let Some(median) = pooled.median.number()
+        {
+            return Some(format!(
+                "{}: the threshold of the population was {}{} (n = {}; without pooling the geometric mean was {}{}).",
+                condition.as_str(),
+                apa::plain(median),
+                ci(pooled.ci95.ends(), apa::plain),
+                found.n.number()?,
+                apa::or_dash(found.geometric_mean.number(), apa::plain),
+                ci(found.ci95.ends(), apa::plain),
+            ));
+        }
         Some(format!(
             "{}: the geometric mean of the thresholds was {}{} (n = {}).",
             condition.as_str(),
@@ -251,6 +266,15 @@ pub(super) fn methods(part: &PartAnalysis) -> String {
              (Schütt et al., 2016), at half the height between guesses and lapses.",
             shapes(part)
         ));
+    }
+    if let Some(model) = &over.psy_population {
+        text.push(match model.has_converged() {
+            true => "Thresholds of the population are posterior medians of a hierarchical model: participants' thresholds and \
+                     widths as draws, lapses shared, their functions integrated out by quadrature and the population's \
+                     parameters drawn by importance sampling."
+                .to_owned(),
+            false => "A hierarchical model of all participants did not converge, and was not used.".to_owned(),
+        });
     }
     if let Some((_, how)) = questionnaire(part) {
         text.push(how.to_owned());

@@ -384,6 +384,8 @@ fn by_condition<R>(
 }
 
 fn thresholds(name: &str, part: &PartAnalysis) -> Option<Drawn> {
+    let population = part.results.over.psy_population.as_ref();
+    let population = population.filter(|model| model.has_converged());
     let panels = by_condition(
         &part.results.psy,
         |function| {
@@ -392,16 +394,23 @@ fn thresholds(name: &str, part: &PartAnalysis) -> Option<Drawn> {
             (found.median.as_ref().and_then(|m| m.number()), ci95)
         },
         |condition| {
+            if let Some(model) = population {
+                let found = model.threshold.get(condition)?;
+                return Some((found.median.number(), found.ci95.ends()));
+            }
             let found = &part.results.over.psy_group.get(condition)?;
             let found = &found.posterior_threshold;
             Some((found.geometric_mean.number(), found.ci95.ends()))
         },
     );
-    let caption = "Thresholds (posterior medians) with 95 % intervals. Diamond: geometric mean over \
-                   participants with its t interval.";
+    let mean = match population {
+        Some(_) => "threshold of the population, learned from all participants together",
+        None => "geometric mean over participants with its t interval",
+    };
+    let caption = format!("Thresholds (posterior medians) with 95 % intervals. Diamond: {mean}.");
     let label = format!("threshold, {}", level_label(part));
     let title = "Thresholds by participant";
-    forest(name, (title, caption.to_owned(), &label), panels, None)
+    forest(name, (title, caption, &label), panels, None)
 }
 
 fn sensitivities(name: &str, part: &PartAnalysis) -> Option<Drawn> {

@@ -1,6 +1,7 @@
 //! The tables of thresholds, sensitivities and preferences: the same on the terminal, in
 //! the report and as CSV.
 
+mod population;
 mod scales;
 
 use crate::apa::{self, bare_p, interval_or_dash, listing, name, or_dash, plain, two};
@@ -8,7 +9,8 @@ use crate::table::{Builder, Head, Table, page};
 use scales::{items, magnitudes, ratings, scores};
 use std::collections::BTreeMap;
 use study_analysis::analyze::psychophysics::results::{
-    Ability, CellName, ConditionModel, Contrast, Function, PartResults, Sensitivity,
+    Ability, CellName, ConditionModel, Contrast, Function, PartResults, PopulationModel,
+    Sensitivity,
 };
 use study_analysis::analyze::results::{Number as _, PairName, RealizationName};
 use study_base::text::Untrusted;
@@ -17,8 +19,10 @@ use study_base::text::Untrusted;
 type Kind = (&'static str, fn(&PartResults) -> Table);
 
 /// All tables, in the order of a page; those without rows and notes are left out of it.
-pub(crate) const KINDS: [Kind; 14] = [
+pub(crate) const KINDS: [Kind; 16] = [
     ("part_thresholds.csv", thresholds),
+    ("part_population.csv", population::population),
+    ("part_population_contrasts.csv", population::contrasts),
     ("part_conditions.csv", conditions),
     ("part_contrasts.csv", contrasts),
     ("part_comparisons.csv", comparisons),
@@ -69,6 +73,9 @@ fn thresholds(results: &PartResults) -> Table {
         let staircase = results.track.get(cell)?.staircase.as_ref()?;
         staircase.estimate.number()
     };
+    let model = results.over.psy_population.as_ref();
+    let pooled = |cell: &CellName| model?.participant.get(cell);
+    let is_pooled = model.is_some_and(PopulationModel::has_converged);
     let interval = |head: &str| page("95 %").file(head);
     let table = of_cells::<Function>("Thresholds", results.psy.iter())
         .field(column("trials", "n_trials"), count, |c| {
@@ -81,6 +88,16 @@ fn thresholds(results: &PartResults) -> Table {
         .ends(interval("threshold_ci95"), plain, &|c| {
             c.1.posterior.threshold.ci95.as_ref()?.ends()
         })
+        .number(
+            column("pooled", "pooled_threshold").when(is_pooled),
+            plain,
+            &|c| pooled(c.0)?.median.number(),
+        )
+        .ends(
+            interval("pooled_threshold_ci95").when(is_pooled),
+            plain,
+            &|c| pooled(c.0)?.ci95.ends(),
+        )
         .field(column("width", "width"), plain, |c| {
             &c.1.posterior.width.mean
         })
@@ -99,6 +116,13 @@ fn thresholds(results: &PartResults) -> Table {
     }
     let logarithms = results.psy.values().any(|f| f.trials.log_scale.is_some());
     let mut notes = vec![threshold_note(logarithms, staircases)];
+    if is_pooled {
+        notes.push(
+            "Pooled: the median in the model of all participants, which draws thresholds of few trials towards \
+             those of the others."
+                .to_owned(),
+        );
+    }
     let mut reasons: BTreeMap<&str, Vec<String>> = BTreeMap::new();
     for (cell, function) in &results.psy {
         if let Some(why) = function.ml.threshold.reason() {

@@ -4,11 +4,13 @@ use super::again::again;
 use super::detection::Sensitivity;
 use super::over_participants::{Measured, Threshold, Told, mixed, sensitivities};
 use super::part_data::{Found, LevelData, PartData, StudyData, chosen, groups, sessions_of};
+use super::population::{ConditionFit, PopulationCell, population};
 use super::results::PartResults;
 use super::tracks::of_session;
 use super::trials::{Asked, TrialCount, TrialSettings, discrimination, level};
 use crate::analyze::keys::CellName;
 use crate::analyze::record::Number as _;
+use crate::analyze::warning::Warning;
 use std::collections::{BTreeMap, BTreeSet};
 use study_base::text::PartId;
 use study_plan::protocol::Protocol;
@@ -31,6 +33,7 @@ pub(super) fn of_tracks(
     let (mut told, mut thresholds, mut measured) = (Vec::new(), Vec::new(), Vec::new());
     let (mut warnings, mut data) = (Vec::new(), PartData::default());
     let mut names = Vec::new();
+    let (mut together, mut settings_of) = (Vec::new(), BTreeMap::new());
     let groups = groups(rows);
     let sessions = sessions_of(protocol, part);
     for (rules, session) in (tracks.iter()).flat_map(|t| sessions.iter().map(move |s| (*t, *s))) {
@@ -74,12 +77,27 @@ pub(super) fn of_tracks(
                     above_chance,
                 });
             }
-            data.levels.extend(levels(
+            let own = levels(
                 asked,
                 (participant, condition),
                 &counts,
                 protocol.fit(rules),
-            ));
+            );
+            if let (Some(own), Some((experiment, _))) = (&own, asked.experiment()) {
+                together.push(PopulationCell {
+                    name: cell,
+                    levels: own.levels.clone(),
+                });
+                let settings = settings(protocol, rules);
+                let fit = ConditionFit {
+                    core: settings.core,
+                    spacing: settings.spacing,
+                    experiment,
+                    priors: settings.priors,
+                };
+                settings_of.insert(condition.clone(), fit);
+            }
+            data.levels.extend(own);
         }
         results.psy.extend(found.psy);
         results.pooled.extend(found.pooled);
@@ -109,6 +127,20 @@ pub(super) fn of_tracks(
     let ratios = !thresholds.is_empty() && have_ratios(protocol, tracks);
     if !thresholds.is_empty() {
         results.over.psy_mixed = mixed(&over_sessions(&measured, ratios), ratios);
+    }
+    // Participants of different groups are no draws from one population.
+    if protocol.groups.is_none() {
+        let seed = protocol.study.seed;
+        results.over.psy_population = population(&together, &settings_of, seed, part.id.as_str());
+        if let Some(model) = &results.over.psy_population
+            && !model.has_converged()
+        {
+            let why = model.sd_participant.median.reason().unwrap_or_default();
+            warnings.push(Warning {
+                code: "not-pooled",
+                text: format!("thresholds were not learned together: {why}"),
+            });
+        }
     }
     let ids: Vec<&str> = sessions.iter().flatten().map(|s| s.as_str()).collect();
     results.over.again = again(&measured, &ids, ratios);
@@ -268,6 +300,66 @@ pub(crate) fn settings(protocol: &Protocol, track: &TrackRules) -> TrialSettings
 mod tests {
     use super::*;
     use crate::analyze::record::Stat;
+
+    /// A study of one track over a ladder with this scale, from `low` to 2, above this standard.
+    fn study(scale: &str, low: f64, standard: f64) -> Protocol {
+        let text = format!(
+            r#"
+format = "study-protocol/2"
+study = {{ id = "example", title = "An example", seed = 1 }}
+design = {{ participants = 10 }}
+device = {{ kind = "simulated", limits = {{ force_n = 12.0, velocity_mm_s = 1000.0 }} }}
+analysis = {{ primary = "more" }}
+
+[[families]]
+id = "friction"
+from = "static.toml"
+vary = "friction"
+range = [{low}, 2.0]
+steps = 20
+scale = "{scale}"
+
+[[parts]]
+id = "more"
+kind = "discrimination"
+text = "Two switches."
+prompt = "Which one had more friction?"
+tracks = ["only"]
+
+[[tracks]]
+id = "only"
+method = "2ifc"
+family = "friction"
+standard = {standard:?}
+procedure = {{ rule = "staircase", up = 1, down = 3, start = 1.0, scale = "lin", steps = [0.1], stop = {{ reversals = 8, max_trials = 60 }}, estimate_last = 6 }}
+"#
+        );
+        let parsed = study_plan::protocol::file::parse("protocol.toml", &text);
+        let shown = parsed.findings.render(false);
+        parsed.protocol.unwrap_or_else(|| panic!("{shown}"))
+    }
+
+    /// The prior of a width follows from the scale of the ladder and from the standard.
+    #[test]
+    fn a_track_has_the_prior_of_its_ladder() {
+        let of = |scale: &str, low: f64, standard: f64| {
+            let protocol = study(scale, low, standard);
+            let track = protocol
+                .track(&PartId::new("only").unwrap())
+                .unwrap()
+                .clone();
+            settings(&protocol, &track).priors
+        };
+        assert_eq!(of("log", 0.1, 0.0).width, WidthPrior::OfRatios);
+        assert_eq!(of("lin", 0.1, 0.0).width, WidthPrior::FromOrigin(0.0));
+        assert_eq!(of("lin", 0.3, 0.3).width, WidthPrior::FromOrigin(0.3));
+        // A standard within the ladder is no origin: there are thresholds on both sides.
+        assert_eq!(of("lin", 0.1, 0.5).width, WidthPrior::Even);
+        let support = of("log", 0.1, 0.0).support.unwrap();
+        assert!((support.low - 0.1f64.ln()).abs() < 1e-12);
+        assert!((support.high - 2f64.ln()).abs() < 1e-12);
+        assert_eq!(of("lin", 0.1, 0.0).lapse, 30.0);
+    }
 
     /// Tracks are compared, not tracks in a session.
     #[test]
