@@ -216,8 +216,17 @@ fn right_devices(from: usize, to: usize) {
         "{counts:#?}\n{open:#?}\nerror N, of range, share, vibration N, measured share, vibration N, unjudged: {most:.4?}"
     );
     assert!(accused.is_empty(), "{}: {accused:#?}", accused.len());
-    let lost = open.iter().filter(|(why, _)| !why.contains("too coarse"));
-    assert_eq!(lost.count(), 0, "{open:#?}");
+    // A mechanism is not known again after lost samples until the hand has moved it: one that holds
+    // it where they were lost gives too little.
+    let coarse = |why: &str| why.contains("too coarse");
+    let others: BTreeMap<_, _> = open.iter().filter(|(why, _)| !coarse(why)).collect();
+    let by_enough = (KINDS.iter().filter(|kind| kind.enough))
+        .any(|kind| others.keys().any(|why| why.starts_with(kind.name)));
+    assert!(!by_enough, "{open:#?}");
+    assert!(
+        others.into_values().sum::<usize>() * 500 <= to - from,
+        "{open:#?}"
+    );
 }
 
 /// `STUDY_PLAYBACKS` is another number of playbacks.

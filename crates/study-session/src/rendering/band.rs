@@ -12,6 +12,10 @@ use crate::outcome::Sample;
 use study_wire::predict::{BranchView, TableView};
 use study_wire::servo::{Law, Rendering};
 
+/// Share of the slew limit from which the force at a sample depends on what was between it and the
+/// one before.
+const STEEP: f64 = 0.25;
+
 /// The forces that are right at a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Band {
@@ -66,6 +70,11 @@ pub(super) fn bands(
             let [least_n, most_n] = force.ends_n;
             let slewed_s = (most_n - least_n) / played.servo.slew_n_s;
             open = Some((force.ends_n, sample.t_s + slewed_s));
+        }
+        // Where it changes about as fast as it can, it depends on the speed between the samples.
+        let [least_n, most_n] = force.ends_n;
+        if most_n - least_n > STEEP * played.servo.slew_n_s * interval_s {
+            (low, high) = (low.min(least_n), high.max(most_n));
         }
         open = open.filter(|(_, until_s)| sample.t_s <= *until_s);
         if let Some(([least_n, most_n], _)) = open {
