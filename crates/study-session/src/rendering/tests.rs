@@ -296,18 +296,22 @@ fn a_missing_term_is_named_as_another_shape() {
     assert_ne!(found.verdict, Verdict::Ok, "{found:?}");
 }
 
-/// 0.8 N too much within 0.7 mm of one place: the variance
-/// hardly changes.
-#[test]
-fn a_wrong_force_at_one_place_is_an_error() {
-    let bumpy = forced(&right(), |s| {
+/// 0.8 N too much within 0.7 mm of one place.
+fn bumpy() -> Vec<Sample> {
+    forced(&right(), |s| {
         let bump = if (s.x_mm - 20.0).abs() < 0.7 {
             0.8
         } else {
             0.0
         };
         s.force_command_n + bump
-    });
+    })
+}
+
+/// The variance hardly changes.
+#[test]
+fn a_wrong_force_at_one_place_is_an_error() {
+    let bumpy = bumpy();
     // Less than the wrong force changes the share of variance that counts.
     let found = verdict(&bumpy, |_| (), |rules| rules.min_vaf = 0.985);
     assert_eq!(found.defects, [Defect::Error], "{found:?}");

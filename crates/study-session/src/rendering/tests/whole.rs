@@ -321,14 +321,7 @@ fn vibration_and_ticks_that_are_felt_are_found() {
 /// 0.1 N for forces above 1 N.
 #[test]
 fn errors_are_told_in_just_noticeable_differences() {
-    let bumpy = forced(&right(), |s| {
-        let bump = if (s.x_mm - 20.0).abs() < 0.7 {
-            0.8
-        } else {
-            0.0
-        };
-        s.force_command_n + bump
-    });
+    let bumpy = bumpy();
     let found = verdict_of(&bumpy);
     near(found.error_jnd, 8.0, 0.5);
     near(found.rendered_error_n, 0.8, 0.05);

@@ -223,20 +223,7 @@ impl<'a> Model<'a> {
         let theta = &self.tables.theta;
         let variance = theta.variance() + nodes.sd.powi(2);
         let n = nodes.nodes.len();
-        // By θ, then by node, of each condition.
-        let kernels: Vec<Vec<f64>> = (of.means.iter())
-            .map(|mean| {
-                let places = (0..theta.n).map(|k| theta.at(k) - mean);
-                places
-                    .flat_map(|x| {
-                        nodes
-                            .nodes
-                            .iter()
-                            .map(move |(b, _)| normal(x - b, variance))
-                    })
-                    .collect()
-            })
-            .collect();
+        let kernels = kernels(of, theta, nodes, variance);
         let of_cell = |(cell, profile): (&CellTable, &Vec<f64>)| {
             let mut values = vec![0.0; n];
             let kernel = &kernels[cell.condition][cell.first * n..];
@@ -275,19 +262,7 @@ impl<'a> Model<'a> {
         // A distribution between two nodes would be missed.
         let variance = nodes.sd.powi(2).max((0.4 * fine.step).powi(2));
         let n = nodes.nodes.len();
-        let kernels: Vec<Vec<f64>> = (of.means.iter())
-            .map(|mean| {
-                let places = (0..fine.n).map(|f| fine.at(f) - mean);
-                places
-                    .flat_map(|x| {
-                        nodes
-                            .nodes
-                            .iter()
-                            .map(move |(b, _)| normal(x - b, variance))
-                    })
-                    .collect()
-            })
-            .collect();
+        let kernels = kernels(of, &fine, &nodes, variance);
         // The densities of the tables at even and odd nodes.
         let density = |halves: usize| {
             let x = halves as f64 / 2.0 * theta.step;
@@ -326,6 +301,20 @@ impl<'a> Model<'a> {
             }
         }
     }
+}
+
+/// For each condition, by place of θ, then by node of b: the density of θ given b, with this
+/// variance.
+fn kernels(of: &Parameters, places: &Axis, nodes: &Nodes, variance: f64) -> Vec<Vec<f64>> {
+    let of_mean = |mean: &f64| {
+        let places = (0..places.n).map(|k| places.at(k) - mean);
+        let at_nodes = |x: f64| {
+            let nodes = nodes.nodes.iter();
+            nodes.map(move |(b, _)| normal(x - b, variance))
+        };
+        places.flat_map(at_nodes).collect()
+    };
+    of.means.iter().map(of_mean).collect()
 }
 
 /// The density at x of a normal distribution about 0; 0 beyond ten standard deviations.
