@@ -66,13 +66,8 @@ mod tests {
     use super::*;
     use study_haptics::model::{Provenance, Trained, Units};
 
-    #[test]
-    fn the_document_has_every_number() {
-        let elements = Elements {
-            mass_kg: 0.02,
-            x_mm: vec![0.0, 10.0],
-            force_n: vec![0.5, -0.5],
-            damping_n_s_per_mm: [vec![0.01, 0.02], vec![0.03, 0.0]],
+    fn with_every_spring() -> Elements {
+        Elements {
             springs: vec![
                 Spring::Stop { slip_mm: 0.2 },
                 Spring::Maxwell {
@@ -85,6 +80,18 @@ mod tests {
                 },
             ],
             spring_n: vec![vec![0.1, 0.12], vec![14.0, 14.0], vec![0.0, 3.5]],
+            ..Elements::default()
+        }
+    }
+
+    #[test]
+    fn the_document_has_every_number() {
+        let elements = Elements {
+            mass_kg: 0.02,
+            x_mm: vec![0.0, 10.0],
+            force_n: vec![0.5, -0.5],
+            damping_n_s_per_mm: [vec![0.01, 0.02], vec![0.03, 0.0]],
+            ..with_every_spring()
         };
         assert_eq!(
             json(&elements),
@@ -109,19 +116,7 @@ mod tests {
             x_mm: vec![0.0, 10.0],
             force_n: vec![0.0; 2],
             damping_n_s_per_mm: [vec![0.0; 2], vec![0.0; 2]],
-            springs: vec![
-                Spring::Stop { slip_mm: 0.2 },
-                Spring::Maxwell {
-                    slip_mm: 10.0,
-                    relaxation_s: 0.07,
-                },
-                Spring::Latch {
-                    rearm_mm: 5.0,
-                    break_mm: 6.2,
-                },
-            ],
-            spring_n: vec![vec![0.1, 0.12], vec![14.0, 14.0], vec![0.0, 3.5]],
-            ..Elements::default()
+            ..with_every_spring()
         };
         let trained = Trained {
             x_mm: [0.0, 10.0],
