@@ -16,6 +16,9 @@ use std::path::Path;
 /// energy that goes to and fro in it.
 const ROUNDING: [f64; 2] = [1e-6, 1e-4];
 
+/// How far beyond the range the hand may go, mm.
+const BEYOND_MM: [f64; 3] = [0.0, 0.02, 0.5];
+
 /// A motion of an adversary and what came of it.
 #[derive(Debug, Clone, Copy)]
 struct Outcome {
@@ -144,8 +147,15 @@ fn forgets_mm(law: &Law<'_>, encoder_mm: f64) -> f64 {
     }
 }
 
-/// One motion on a realization; `None` if the device does not render it.
-fn motion(of: &Realization, device: Device, kind: usize, draw: &mut Stream) -> Option<Outcome> {
+/// One motion on a realization, which may go as far beyond its range, where the wall of the device
+/// is; `None` if the device does not render it.
+fn motion(
+    of: &Realization,
+    device: Device,
+    kind: usize,
+    beyond_mm: f64,
+    draw: &mut Stream,
+) -> Option<Outcome> {
     let certificate = of.certificate();
     if certificate.rendered_n_per_mm() > device.stiffness_n_per_mm {
         return None;
@@ -163,11 +173,14 @@ fn motion(of: &Realization, device: Device, kind: usize, draw: &mut Stream) -> O
     if memory_mm > 0.9 * (high - low) {
         return None;
     }
-    let begin_mm = low + memory_mm + draw.unit() * (high - low - memory_mm);
+    let mut begin_mm = low + memory_mm + draw.unit() * (high - low - memory_mm);
+    if beyond_mm > 0.0 && draw.unit() < 0.7 {
+        begin_mm = high;
+    }
     let from_mm = begin_mm - memory_mm;
     let mut hand = Hand {
         play: search.play(from_mm),
-        range_mm: [low, high],
+        range_mm: [low - beyond_mm, high + beyond_mm],
         top_mm_s: search.fast_mm_s(),
         way: 1.0,
         reversals: 0,
@@ -272,14 +285,15 @@ fn attack(motions: usize, random: usize) -> (usize, f64) {
             ..Device::default()
         };
         let kind = (turn + n) % 9;
-        let Some(outcome) = motion(what, device, kind, &mut draw) else {
+        let beyond_mm = BEYOND_MM[(n / 9 + turn) % BEYOND_MM.len()];
+        let Some(outcome) = motion(what, device, kind, beyond_mm, &mut draw) else {
             continue;
         };
         played += 1;
         share = share.max(outcome.drawn_mj / outcome.most_mj);
         assert!(
             outcome.drawn_mj <= outcome.most_mj,
-            "{name}, motion {kind}, {servo_hz} Hz, {encoder_mm} mm: {outcome:?}"
+            "{name}, motion {kind}, {servo_hz} Hz, {encoder_mm} mm, {beyond_mm} mm beyond: {outcome:?}"
         );
     }
     (played, share)
@@ -323,7 +337,7 @@ fn the_bound_of_a_reversal_is_needed_and_holds() {
         };
         let (mut most_mj, mut share) = (0.0_f64, 0.0_f64);
         for i in 0..60 {
-            let found = motion(&what, device, i % 6, &mut draw).unwrap();
+            let found = motion(&what, device, i % 6, 0.0, &mut draw).unwrap();
             most_mj = most_mj.max(found.drawn_mj / f64::from(found.reversals));
             share = share.max(found.drawn_mj / found.most_mj);
         }
