@@ -88,7 +88,10 @@ fn sentence(p: Printed, comparison: &Comparison) -> String {
         Some(next) => {
             let (next, ratio) = (name(next), rms_n(next) / rms_n(best));
             match ratio {
-                1.0.. => format!("{ratio:.2} times less than that of {next}, the next best"),
+                1.005.. => {
+                    format!("and that of {next}, the next best, is {ratio:.2} times as large")
+                }
+                1.0.. => format!("as small as that of {next}, the next best"),
                 _ => format!("hardly more than that of {next}, and it is preferred to {next}"),
             }
         }
