@@ -165,9 +165,10 @@ def latin_line(n, line):
     return [(line + place) % n for place in range(n)]
 
 
-def order_of(seed, n, repetitions, order, max_run, min_distance, kind, number):
+def order_of(seed, n, repetitions, order, max_run, min_distance, kind, number, part=None):
     what, limit = rule(repetitions, max_run, min_distance)
-    stream = Stream(seed, "schedule", kind, str(number))
+    path = ("schedule",) if part is None else ("schedule", "part", part)
+    stream = Stream(seed, *path, kind, str(number))
     if order == "blocked":
         return blocked(stream, n, repetitions, limit if what == "distance" else 1)
     if order == "shuffled":
@@ -180,31 +181,197 @@ def order_of(seed, n, repetitions, order, max_run, min_distance, kind, number):
         return list(range(n)) * repetitions
     line_of = {"williams": williams_line, "latin-square": latin_line}[order]
     symbols = list(range(n))
-    Stream(seed, "schedule", "symbols").shuffle(symbols)
+    Stream(seed, *path, "symbols").shuffle(symbols)
     first = repetitions * (number - 1)
     return [symbols[s] for r in range(repetitions) for s in line_of(n, first + r)]
+
+
+# The sequences of intervals with a signal, the catch trials, and the answers with
+# the sequences for which each is right.
+METHODS = {
+    "2ifc": (["CS", "SC"], [], [["CS"], ["SC"]]),
+    "3ifc": (["CSS", "SCS", "SSC"], [], [["CSS"], ["SCS"], ["SSC"]]),
+    "same-different": (["SC", "CS"], ["SS", "CC"], [["SS", "CC"], ["SC", "CS"]]),
+    "abx": (["SCS", "SCC", "CSC", "CSS"], [], [["SCS", "CSC"], ["SCC", "CSS"]]),
+    "odd-one-out": (
+        ["SSC", "SCS", "CSS", "CCS", "CSC", "SCC"],
+        [],
+        [["CSS", "SCC"], ["SCS", "CSC"], ["SSC", "CCS"]],
+    ),
+    "yes-no": (["C"], ["S"], [["C"], ["S"]]),
+}
+
+
+def some_places(stream, n, k):
+    """One in each of k stretches of n places."""
+    starts = [i * n // k for i in range(k + 1)] if k else []
+    return {a + stream.below(b - a) for a, b in zip(starts, starts[1:])}
+
+
+class Track:
+    def __init__(self, text):
+        self.id, self.method, m, catch, easy = text.split(":")
+        self.m, catch, easy = int(m), float(catch), float(easy)
+        s = self.m / (1 - catch - easy)
+        self.c, self.e = int(s * catch + 0.5), int(s * easy + 0.5)
+
+    def trials(self, stream, version):
+        return self.version_1(stream) if version == 1 else self.version_2(stream)
+
+    def version_1(self, stream):
+        signal, without, _ = METHODS[self.method]
+
+        def blocks(of, n):
+            taken = []
+            while len(taken) < n and of:
+                block = of + of
+                stream.shuffle(block)
+                taken += block
+            return iter(taken[:n])
+
+        ruled, catch, easy = blocks(signal, self.m), blocks(without, self.c), blocks(signal, self.e)
+        are_easy = some_places(stream, self.m + self.e, self.e)
+        are_catch = some_places(stream, self.m + self.e + self.c, self.c)
+        trials, of_signal = [], 0
+        for place in range(self.m + self.e + self.c):
+            if place in are_catch:
+                trials.append((next(catch), False))
+            else:
+                is_easy = of_signal in are_easy
+                trials.append((next(easy if is_easy else ruled), is_easy))
+                of_signal += 1
+        return trials
+
+    def version_2(self, stream):
+        _, without, answers = METHODS[self.method]
+        are_easy = some_places(stream, self.m + self.e, self.e)
+        weights = [1] * len(answers)
+        if without:
+            weights = [self.c if a[0] in without else self.m + self.e for a in answers]
+        total = sum(weights)
+        lists = [[] for _ in answers]
+        trials, of_signal = [], 0
+        while True:
+            right = []
+            for _ in range(24):
+                u, a = stream.below(total), 0
+                while u >= weights[a]:
+                    u, a = u - weights[a], a + 1
+                right.append(a)
+            if any(
+                abs(right.count(a) * total - 24 * weights[a]) > 4 * total
+                for a in range(len(answers))
+            ):
+                continue
+            for a in right:
+                if not lists[a]:
+                    lists[a] = answers[a] * 2
+                    stream.shuffle(lists[a])
+                sequence = lists[a].pop(0)
+                is_catch = sequence in without
+                trials.append((sequence, not is_catch and of_signal in are_easy))
+                of_signal += not is_catch
+                if of_signal == self.m + self.e:
+                    return trials
+
+
+def tracks_of(seed, part, tracks, version, kind, number):
+    seat = ("schedule", "part", part, kind, str(number))
+    left = [track.trials(Stream(seed, *seat, track.id), version) for track in tracks]
+    passes = Stream(seed, *seat, ".passes")
+    while any(left):
+        order = list(range(len(tracks)))
+        passes.shuffle(order)
+        for at in order:
+            if left[at]:
+                sequence, is_easy = left[at].pop(0)
+                yield f"{tracks[at].id},{sequence},{'true' if is_easy else 'false'}"
+
+
+def pairs_of(seed, part, pairs, order, repetitions, interval_order, version, kind, number):
+    seat = ("schedule", "part", part, kind, str(number))
+    drawn = Stream(seed, *seat, "intervals")
+    if version == 1:
+        stream = Stream(seed, "schedule", "part", part, "intervals")
+        once = [stream.below(2) for _ in pairs]
+        first = [once] * repetitions
+    else:
+        two = ("schedule", "part", part, kind, "two", str((number + 1) // 2), "intervals")
+        stream, first = Stream(seed, *two), []
+        for _ in range((repetitions + 1) // 2):
+            first += [[stream.below(2) for _ in pairs]] * 2
+    times = [0] * len(pairs)
+    for at in order:
+        times[at] += 1
+        draw, r = drawn.below(2), times[at]
+        if interval_order == "balanced":
+            draw = (first[r - 1][at] + number + r) % 2
+        a, b = pairs[at]
+        yield f"{b},{a}" if draw else f"{a},{b}"
+
+
+def constant_levels(seed, track, levels, repetitions, kind, number):
+    stream = Stream(seed, "track", track, kind, str(number))
+    for _ in range(repetitions):
+        once = list(levels)
+        stream.shuffle(once)
+        yield from once
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seed", type=int, required=True)
-    parser.add_argument("--models", required=True, help="ids by comma, practice left out")
-    parser.add_argument("--repetitions", type=int, required=True)
-    parser.add_argument("--order", required=True)
+    what = parser.add_mutually_exclusive_group(required=True)
+    what.add_argument("--models", help="ids by comma, practice left out")
+    what.add_argument("--pairs", help="such as a/b,a/c, of a part")
+    what.add_argument("--track", action="append", help="ID:METHOD:TRIALS:CATCH:EASY, of a part")
+    what.add_argument("--constant", help="ID:LEVELS:REPETITIONS, levels by comma")
+    parser.add_argument("--part", help="its id")
+    parser.add_argument("--repetitions", type=int)
+    parser.add_argument("--order", help="blocked, shuffled, williams, latin-square or fixed")
     parser.add_argument("--max-run", type=int)
     parser.add_argument("--min-distance", type=int)
+    parser.add_argument("--interval-order", default="balanced", choices=["balanced", "random"])
+    parser.add_argument("--order-version", type=int, default=1, choices=[1, 2])
     parser.add_argument("--kind", default="row", choices=["row", "pilot", "simulated"])
     parser.add_argument("--numbers", default="1", help="7 or 1-40")
     a = parser.parse_args()
-    models = a.models.split(",")
-    first, _, last = a.numbers.partition("-")
-    print("kind,number,position,model")
-    for number in range(int(first), int(last or first) + 1):
-        order = order_of(
-            a.seed, len(models), a.repetitions, a.order, a.max_run, a.min_distance, a.kind, number
+
+    def order(n, kind, number):
+        return order_of(
+            a.seed, n, a.repetitions, a.order, a.max_run, a.min_distance, kind, number, a.part
         )
-        for position, m in enumerate(order, 1):
-            print(f"{a.kind},{number},{position},{models[m]}")
+
+    if a.models:
+        head, models = "model", a.models.split(",")
+
+        def lines(number):
+            return (models[m] for m in order(len(models), a.kind, number))
+    elif a.pairs:
+        head, pairs = "first,second", [pair.split("/") for pair in a.pairs.split(",")]
+
+        def lines(number):
+            own = order(len(pairs), a.kind, number)
+            how = (a.repetitions, a.interval_order, a.order_version)
+            return pairs_of(a.seed, a.part, pairs, own, *how, a.kind, number)
+    elif a.track:
+        head, tracks = "track,intervals,easy", [Track(text) for text in a.track]
+
+        def lines(number):
+            return tracks_of(a.seed, a.part, tracks, a.order_version, a.kind, number)
+    else:
+        track, levels, repetitions = a.constant.split(":")
+        head = "level"
+
+        def lines(number):
+            of = (track, levels.split(","), int(repetitions))
+            return constant_levels(a.seed, *of, a.kind, number)
+
+    first, _, last = a.numbers.partition("-")
+    print(f"kind,number,position,{head}")
+    for number in range(int(first), int(last or first) + 1):
+        for position, line in enumerate(lines(number), 1):
+            print(f"{a.kind},{number},{position},{line}")
 
 
 if __name__ == "__main__":

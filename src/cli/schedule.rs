@@ -28,7 +28,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "RANGE", value_parser = parse_rows)]
     rows: Option<RangeInclusive<u32>>,
     /// Print CSV: row,trial,block,position,model,repetition,practice; with parts also
-    /// part,first,second,track,intervals
+    /// part,first,second,track,intervals,easy
     #[arg(long)]
     csv: bool,
     /// Replay the tracks with the answers of a CSV, [track,]answer[,presented][,easy]: the
@@ -264,7 +264,7 @@ fn csv(header: bool, plans: &[(u32, Vec<Trial>)]) -> Result<String, Failure> {
         "practice",
     ];
     /// Further columns of a study with parts.
-    const OF_PARTS: [&str; 5] = ["part", "first", "second", "track", "intervals"];
+    const OF_PARTS: [&str; 6] = ["part", "first", "second", "track", "intervals", "easy"];
     let has_parts = plans
         .iter()
         .any(|(_, plan)| plan.iter().any(|t| t.part.is_some()));
@@ -289,16 +289,18 @@ fn csv(header: bool, plans: &[(u32, Vec<Trial>)]) -> Result<String, Failure> {
                     Stimuli::Pair { pair: [a, b] } => (a.to_string(), b.to_string()),
                     _ => (String::new(), String::new()),
                 };
-                let intervals = match &t.stimuli {
-                    Stimuli::Track { intervals, .. } => parts::intervals(intervals),
-                    _ => String::new(),
+                let (intervals, easy) = match &t.stimuli {
+                    Stimuli::Track {
+                        intervals, easy, ..
+                    } => (parts::intervals(intervals), easy.to_string()),
+                    _ => (String::new(), String::new()),
                 };
                 let part = t
                     .part
                     .as_ref()
                     .map_or_else(String::new, ToString::to_string);
                 let track = t.track().map_or_else(String::new, ToString::to_string);
-                record.extend([part, first, second, track, intervals]);
+                record.extend([part, first, second, track, intervals, easy]);
             }
             out.write_record(record).map_err(|e| broken(&e))?;
         }

@@ -6,6 +6,8 @@ mod command;
 mod designs;
 mod faults;
 mod golden;
+mod guessing;
+mod parts;
 mod reproduced;
 mod requeue;
 mod second;

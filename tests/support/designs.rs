@@ -33,6 +33,7 @@ pub(crate) fn design(models: usize, repetitions: u32, order: Order) -> Protocol 
             breaks: None,
             max_attempts: 3,
             parts_order: PartsOrder::Fixed,
+            order_version: OrderVersion::Balanced,
         },
         session: SessionRules {
             entry: Entry::Participant,

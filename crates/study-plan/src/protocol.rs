@@ -18,6 +18,7 @@ pub mod fingerprint;
 pub mod groups;
 pub mod keys;
 pub mod kinds;
+pub mod pairs;
 pub mod parts;
 pub mod phrases;
 pub mod plan;
@@ -33,9 +34,10 @@ pub use answer::{Answer, Given, Refusal};
 pub use control::{Control, Pick};
 pub use groups::{Assign, Assigned, GroupRules, Groups, SessionPlan};
 pub use kinds::QuestionKind;
+pub use pairs::{IntervalOrder, Pairs};
 pub use parts::{
-    Compared, Exposure, FamilyRules, FitRules, Interval, IntervalOrder, Method, Mushra, Pairs,
-    Part, Presentations, Task, TrackRules, Vary,
+    Compared, Exposure, FamilyRules, FitRules, Interval, Method, Mushra, Part, Presentations, Task,
+    TrackRules, Vary,
 };
 pub use plan::{Seat, Stimuli, Trial};
 pub use question::Question;
@@ -53,6 +55,8 @@ use study_base::text::{ModelId, QuestionId};
 pub const FORMAT: &str = "study-protocol/1";
 /// The format that `[[parts]]`, `[[families]]`, `[[tracks]]`, `[groups]` and `[[sessions]]` need.
 pub const FORMAT_2: &str = "study-protocol/2";
+/// The format that the keys of [`file::OF_FORMAT_3`] need.
+pub const FORMAT_3: &str = "study-protocol/3";
 
 /// A whole study file.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -205,6 +209,28 @@ pub struct Design {
     pub max_attempts: u32,
     /// The order of the parts.
     pub parts_order: PartsOrder,
+    /// How the intervals of tracks and pairs are ordered.
+    pub order_version: OrderVersion,
+}
+
+/// How the intervals of a trial are ordered; `docs/schedule.md` specifies both.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub enum OrderVersion {
+    /// Every sequence of intervals twice in each block: the last ones can be guessed.
+    #[default]
+    Balanced,
+    /// As balanced as is possible without an answer that can be guessed.
+    Unguessable,
+}
+
+impl OrderVersion {
+    /// Its number in the protocol file.
+    pub fn number(self) -> u32 {
+        match self {
+            Self::Balanced => 1,
+            Self::Unguessable => 2,
+        }
+    }
 }
 
 words! {

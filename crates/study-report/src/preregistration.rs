@@ -14,7 +14,8 @@ use study_analysis::preregister::{
 };
 use study_analysis::study::{describe_realizations, is_rated};
 use study_base::text::{Untrusted, capital, counted, escaped_json};
-use study_plan::protocol::parts::{IntervalOrder, Part, Presentations, Task};
+use study_plan::protocol::pairs::IntervalOrder;
+use study_plan::protocol::parts::{Part, Presentations, Task};
 use study_plan::protocol::{
     Assign, Order, Protocol, Question, Role, Scale, SessionPlan, Unfinished,
 };

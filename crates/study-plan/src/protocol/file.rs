@@ -30,7 +30,7 @@ pub use orders::parse_orders;
 
 use super::keys::{Key, Kind, Variants, Word, keys};
 use super::section::Section;
-use super::{FORMAT, FORMAT_2, Protocol, Question};
+use super::{FORMAT, FORMAT_2, FORMAT_3, Protocol, Question};
 use agree::Sections;
 use models::PartialModel;
 use questions::PartialQuestion;
@@ -99,10 +99,17 @@ pub static QUESTIONS: &Variants = &questions::QUESTIONS;
 const FORMATS: &[Word] = &[
     Word::new(FORMAT, "A study of ratings."),
     Word::new(FORMAT_2, "A study of parts, such as pairs and thresholds."),
+    Word::new(
+        FORMAT_3,
+        "The same, with keys that older programs do not know.",
+    ),
 ];
 
 /// Sections that need [`FORMAT_2`].
 const OF_FORMAT_2: [&str; 5] = ["parts", "families", "tracks", "groups", "sessions"];
+
+/// Keys that need [`FORMAT_3`], without the places in lists.
+pub const OF_FORMAT_3: [&str; 1] = ["design.order_version"];
 
 /// Largest protocol file that is read, bytes.
 pub const MAX_FILE_BYTES: usize = 1024 * 1024;
@@ -165,12 +172,18 @@ pub fn parse(path: &str, text: &str) -> Parsed {
     let document = Document::parse(text);
     let broken = document.fault_count();
     let mut named = Vec::new();
-    let known = format_is_known(&document, broken > 0);
-    let protocol = known
-        .then(|| read(&document, broken > 0, &mut named))
-        .flatten();
+    let version = format_version(&document, broken > 0);
+    let protocol = version.and_then(|_| read(&document, broken > 0, &mut named));
     let read = document.finish();
     findings.faults = read.faults;
+    if version.is_some_and(|version| version < 3) {
+        let newer = read.spans.iter().filter(|(place, _)| is_of_format_3(place));
+        (findings.faults).extend(newer.map(|(place, span)| {
+            Fault::error(format!("`{place}` needs the format `{FORMAT_3}`"))
+                .at(Some(span.clone()))
+                .hint(format!("write format = \"{FORMAT_3}\" in the first line"))
+        }));
+    }
     drop_echoes(&mut findings.faults, broken);
     findings.sort();
     Parsed {
@@ -179,6 +192,17 @@ pub fn parse(path: &str, text: &str) -> Parsed {
         spans: read.spans,
         named,
     }
+}
+
+/// Whether a place such as `tracks[0].id` is a key of [`OF_FORMAT_3`].
+fn is_of_format_3(place: &str) -> bool {
+    let mut inside = false;
+    let without_places = place.chars().filter(|c| {
+        inside = (inside || *c == '[') && *c != ']';
+        !inside && *c != ']'
+    });
+    let key: String = without_places.collect();
+    OF_FORMAT_3.contains(&key.as_str())
 }
 
 /// Removes faults at the places of syntax errors (the first `broken` faults): they are
@@ -200,9 +224,9 @@ fn drop_echoes(faults: &mut Vec<Fault>, broken: usize) {
     });
 }
 
-/// Checks the format. A file of another format is not read any further, because every
-/// key would be a fault.
-fn format_is_known(document: &Document<'_>, broken: bool) -> bool {
+/// The version of the format, the newest if it is not there. A file of another format is not
+/// read any further, because every key would be a fault.
+fn format_version(document: &Document<'_>, broken: bool) -> Option<u32> {
     let mut root = document.root();
     let Some(value) = root.value("format") else {
         if !broken {
@@ -211,10 +235,10 @@ fn format_is_known(document: &Document<'_>, broken: bool) -> bool {
                     .hint(format!("its first line has to be: format = \"{FORMAT}\"")),
             );
         }
-        return true;
+        return Some(3);
     };
     let Some(format) = value.text() else {
-        return true;
+        return Some(3);
     };
     if format == FORMAT {
         for name in OF_FORMAT_2 {
@@ -229,23 +253,26 @@ fn format_is_known(document: &Document<'_>, broken: bool) -> bool {
                 );
             }
         }
-        return true;
+        return Some(1);
     }
     if format == FORMAT_2 {
-        return true;
+        return Some(2);
+    }
+    if format == FORMAT_3 {
+        return Some(3);
     }
     let version =
         |format: &str| -> Option<u32> { format.strip_prefix("study-protocol/")?.parse().ok() };
     let given = Untrusted(&format);
-    value.fault(match (version(&format), version(FORMAT_2)) {
+    value.fault(match (version(&format), version(FORMAT_3)) {
         (Some(theirs), Some(ours)) if theirs > ours => Fault::error(format!(
-            "the format `{given}` is newer than this program, which reads `{FORMAT_2}`"
+            "the format `{given}` is newer than this program, which reads `{FORMAT_3}`"
         ))
         .hint("use a newer version of study"),
         _ => Fault::error(format!("`{given}` is not a format of a protocol"))
             .label(format!("`{FORMAT}` is")),
     });
-    false
+    None
 }
 
 /// Reads all sections; `None` if a part is faulty, which has been reported.

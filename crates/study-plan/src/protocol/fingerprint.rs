@@ -121,6 +121,7 @@ pub fn parts(
         breaks,
         max_attempts,
         parts_order,
+        order_version,
     } = design;
     let super::TrialRules {
         reference,
@@ -166,6 +167,9 @@ pub fn parts(
     // Absent from the fingerprints of protocols without it.
     if *exposure != super::Exposure::default() {
         stimulus["trial"]["exposure"] = json!(exposure);
+    }
+    if *order_version != super::OrderVersion::default() {
+        stimulus["design"]["order_version"] = json!(order_version.number());
     }
     // A study without parts has the fingerprint that it had before there were any.
     if !parts.is_empty() {
@@ -409,6 +413,10 @@ mod tests {
         assert_eq!(changed(&|p| p.study.seed += 1), [true, false, false]);
         assert_eq!(
             changed(&|p| p.design.order = Order::Shuffled),
+            [true, false, false]
+        );
+        assert_eq!(
+            changed(&|p| p.design.order_version = crate::protocol::OrderVersion::Unguessable),
             [true, false, false]
         );
         assert_eq!(

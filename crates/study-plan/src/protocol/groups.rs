@@ -119,10 +119,7 @@ impl Protocol {
                         let stays = |m: &ModelId| models.contains(m) || self.level_of(m).is_some();
                         task.models.retain(stays);
                     }
-                    Task::Pairs(task) => {
-                        task.pairs
-                            .retain(|pair| pair.iter().all(|m| models.contains(m)));
-                    }
+                    Task::Pairs(task) => task.keep(models),
                     // The hidden reference stays, whatever the group rates.
                     Task::Mushra(task) => {
                         let hidden = |m: &ModelId| {

@@ -6,7 +6,7 @@
 //! [`crate::procedure`].
 
 use super::keys::words;
-use super::{Answer, Design, Order, Protocol, Seat};
+use super::{Answer, Design, Order, Pairs, Protocol, Seat};
 use crate::procedure::{Ladder, ProcedureError, Rule, Track};
 use serde::{Deserialize, Serialize};
 use study_base::rng::Stream;
@@ -94,31 +94,6 @@ impl Task {
                 None
             }
         }
-    }
-}
-
-/// Which realizations are compared.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Pairs {
-    /// The pairs, no two alike.
-    pub pairs: Vec<[ModelId; 2]>,
-    /// How the order is made; never from a file.
-    pub order: Order,
-    /// Trials of each pair.
-    pub repetitions: u32,
-    /// Whether "no difference" is an answer.
-    pub tie: bool,
-    /// Which of a pair comes first.
-    pub interval_order: IntervalOrder,
-}
-
-words! {
-    /// Which realization of a pair comes first.
-    IntervalOrder {
-        /// Each in turn over the repetitions; the first time by row, so that two rows have both orders.
-        Balanced = "balanced",
-        /// Drawn for each trial.
-        Random = "random",
     }
 }
 

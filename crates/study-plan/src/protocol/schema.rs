@@ -32,9 +32,10 @@ pub fn json_schema() -> Value {
     schema["$schema"] = json!("https://json-schema.org/draft/2020-12/schema");
     schema["title"] = json!("study protocol");
     schema["description"] = json!(format!(
-        "The protocol file of a study, {} or {}.",
+        "The protocol file of a study, {}, {} or {}.",
         super::FORMAT,
-        super::FORMAT_2
+        super::FORMAT_2,
+        super::FORMAT_3
     ));
     schema["$defs"] = json!({ "questions": questions });
     schema

@@ -2,7 +2,7 @@
 
 use super::sequence::Sequence;
 use super::{Planned, ScheduleError};
-use crate::protocol::{Design, IntervalOrder, Pairs, Seat, Stimuli};
+use crate::protocol::{Design, IntervalOrder, OrderVersion, Pairs, Seat, Stimuli};
 use study_base::rng::Stream;
 use study_base::text::{ModelId, PartId};
 
@@ -13,7 +13,9 @@ pub(super) struct PairOrders {
     part: PartId,
     sequence: Sequence,
     pairs: Vec<[ModelId; 2]>,
+    repetitions: u32,
     interval_order: IntervalOrder,
+    version: OrderVersion,
 }
 
 impl PairOrders {
@@ -28,7 +30,9 @@ impl PairOrders {
             part: part.clone(),
             sequence: Sequence::new(seed, Some(part), design, rules.pairs.len(), None)?,
             pairs: rules.pairs.clone(),
+            repetitions: rules.repetitions,
             interval_order: rules.interval_order,
+            version: design.order_version,
         })
     }
 
@@ -46,9 +50,7 @@ impl PairOrders {
             "intervals",
         ];
         let mut drawn = Stream::new(self.seed, &path);
-        // Which of each pair comes first in row 1; the same for all seats.
-        let mut first = Stream::new(self.seed, &["schedule", "part", part, "intervals"]);
-        let first: Vec<u64> = self.pairs.iter().map(|_| first.below(2)).collect();
+        let first = self.first(seat);
         let mut repetitions = vec![0u32; self.pairs.len()];
         let trial = |at: usize| {
             repetitions[at] += 1;
@@ -58,7 +60,9 @@ impl PairOrders {
             let swap = match self.interval_order {
                 IntervalOrder::Random => draw,
                 IntervalOrder::Balanced => {
-                    first[at] + u64::from(seat.number()) + u64::from(repetition)
+                    let two = (repetition as usize - 1) / 2;
+                    let first = first[two.min(first.len() - 1)][at];
+                    first + u64::from(seat.number()) + u64::from(repetition)
                 }
             };
             let [a, b] = self.pairs[at].clone();
@@ -80,6 +84,36 @@ impl PairOrders {
         };
         Ok(order.into_iter().map(trial).collect())
     }
+
+    /// Which of each pair comes first, for each two repetitions or once for all of them, when
+    /// number of the seat and repetition are both odd or both even.
+    fn first(&self, seat: Seat) -> Vec<Vec<u64>> {
+        let part = self.part.as_str();
+        let drawn = |stream: &mut Stream| self.pairs.iter().map(|_| stream.below(2)).collect();
+        match self.version {
+            // The same for all seats.
+            OrderVersion::Balanced => {
+                let path = ["schedule", "part", part, "intervals"];
+                vec![drawn(&mut Stream::new(self.seed, &path))]
+            }
+            // Two seats have it in common, so that they have both orders.
+            OrderVersion::Unguessable => {
+                let two = seat.number().div_ceil(2).to_string();
+                let path = [
+                    "schedule",
+                    "part",
+                    part,
+                    seat.stream(),
+                    "two",
+                    &two,
+                    "intervals",
+                ];
+                let mut stream = Stream::new(self.seed, &path);
+                let twos = self.repetitions.div_ceil(2).max(1);
+                (0..twos).map(|_| drawn(&mut stream)).collect()
+            }
+        }
+    }
 }
 
 #[cfg(test)]
@@ -93,16 +127,23 @@ mod tests {
     }
 
     /// How often each order of each pair occurs in some rows.
-    fn counts(repetitions: u32, interval_order: IntervalOrder, rows: u32) -> BTreeMap<String, u32> {
+    fn counts(
+        version: OrderVersion,
+        repetitions: u32,
+        interval_order: IntervalOrder,
+        rows: u32,
+    ) -> BTreeMap<String, u32> {
         let rules = Pairs {
             pairs: vec![[id("a"), id("b")], [id("a"), id("c")], [id("b"), id("c")]],
             order: Order::Blocked,
             repetitions,
             tie: false,
             interval_order,
+            neighbors: false,
         };
         let mut design = example::protocol(3, repetitions).design;
         design.order = Order::Blocked;
+        design.order_version = version;
         let part = PartId::new("p").unwrap();
         let orders = PairOrders::new(7, &part, &rules, &design).unwrap();
         let mut counts = BTreeMap::new();
@@ -119,16 +160,21 @@ mod tests {
 
     #[test]
     fn each_pair_comes_in_both_orders_over_its_repetitions_and_over_two_rows() {
-        let twice = counts(2, IntervalOrder::Balanced, 1);
-        assert_eq!(twice.len(), 6);
-        assert!(twice.values().all(|n| *n == 1), "{twice:?}");
-        let once = counts(1, IntervalOrder::Balanced, 2);
-        assert_eq!(once, twice);
+        for version in [OrderVersion::Balanced, OrderVersion::Unguessable] {
+            let twice = counts(version, 2, IntervalOrder::Balanced, 1);
+            assert_eq!(twice.len(), 6);
+            assert!(twice.values().all(|n| *n == 1), "{twice:?}");
+            let once = counts(version, 1, IntervalOrder::Balanced, 2);
+            assert_eq!(once, twice);
+            // An odd number of repetitions, too.
+            let thrice = counts(version, 3, IntervalOrder::Balanced, 4);
+            assert!(thrice.values().all(|n| *n == 6), "{thrice:?}");
+        }
     }
 
     #[test]
     fn a_random_order_has_both_but_is_not_balanced() {
-        let random = counts(1, IntervalOrder::Random, 400);
+        let random = counts(OrderVersion::Balanced, 1, IntervalOrder::Random, 400);
         assert_eq!(random.len(), 6);
         assert!(
             random.values().all(|n| (150..250).contains(n)),

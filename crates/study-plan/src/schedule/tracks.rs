@@ -3,12 +3,22 @@
 //! the levels follow from the answers.
 
 use super::{MAX_TRIALS, Planned, ScheduleError};
-use crate::protocol::{Interval, Method, Protocol, Seat, Stimuli};
+use crate::protocol::{Interval, Method, OrderVersion, Protocol, Seat, Stimuli};
 use study_base::rng::Stream;
 use study_base::text::PartId;
 
 /// How often each sequence of intervals occurs in a block.
 const OF_EACH: usize = 2;
+
+/// Trials of a track over which its right answers are in balance, where they cannot be guessed.
+const STRETCH: usize = 24;
+
+/// How often more or less than its share an answer is right in a stretch, at most.
+///
+/// Somebody who is told the right answer after each trial and knows all of this is right in
+/// 0.513 of the trials with two answers and in 0.349 of those with three. A smaller number would
+/// exceed chance by 0.02.
+const SLACK: usize = 4;
 
 /// Makes the orders of a part of tracks.
 #[derive(Debug)]
@@ -16,6 +26,7 @@ pub(super) struct TrackOrders {
     seed: u64,
     part: PartId,
     tracks: Vec<Planning>,
+    version: OrderVersion,
 }
 
 /// What of a track is planned.
@@ -67,6 +78,7 @@ impl TrackOrders {
             seed,
             part: part.clone(),
             tracks,
+            version: protocol.design.order_version,
         })
     }
 
@@ -82,10 +94,14 @@ impl TrackOrders {
         let mut tracks: Vec<_> = (self.tracks.iter())
             .map(|track| {
                 let mut stream = self.stream(seat, track.id.as_str());
-                sequences(track, &mut stream).into_iter()
+                let sequences = match self.version {
+                    OrderVersion::Balanced => sequences(track, &mut stream),
+                    OrderVersion::Unguessable => unguessable(track, &mut stream),
+                };
+                sequences.into_iter()
             })
             .collect();
-        let most = self.tracks.iter().map(Planning::trials).max().unwrap_or(0);
+        let most = tracks.iter().map(ExactSizeIterator::len).max().unwrap_or(0);
         let methods = self.tracks.iter().map(|t| t.method.sequences().len());
         let block = OF_EACH * methods.max().unwrap_or(1);
         let mut passes = self.stream(seat, ".passes");
@@ -135,6 +151,99 @@ fn sequences(track: &Planning, stream: &mut Stream) -> Vec<(Vec<Interval>, bool)
         }
     };
     is_catch.into_iter().filter_map(next).collect()
+}
+
+/// The same, so that nobody can guess the right answer: see [`SLACK`].
+fn unguessable(track: &Planning, stream: &mut Stream) -> Vec<(Vec<Interval>, bool)> {
+    let signals = track.ruled + track.easy;
+    let mut kinds = spread(signals, track.easy, stream).into_iter().peekable();
+    let mut answers: Vec<Answer> = (track.method.answers().iter())
+        .map(|answer| Answer::new(answer, track))
+        .collect();
+    let mut found = Vec::new();
+    while kinds.peek().is_some() {
+        for at in stretch(&answers, stream) {
+            let Some(intervals) = answers[at].next(stream) else {
+                continue;
+            };
+            if track.method.is_catch(&intervals) {
+                found.push((intervals, false));
+            } else if let Some(easy) = kinds.next() {
+                found.push((intervals, easy));
+            }
+            if kinds.peek().is_none() {
+                break;
+            }
+        }
+    }
+    found
+}
+
+/// A possible answer to the trials of a track.
+struct Answer {
+    /// How often it is the right one, compared with the others.
+    weight: u64,
+    /// The sequences of intervals to which it is the right answer.
+    sequences: Vec<&'static [Interval]>,
+    /// Those that come next.
+    next: Vec<&'static [Interval]>,
+}
+
+impl Answer {
+    fn new(answer: &str, track: &Planning) -> Self {
+        let method = track.method;
+        let all = method.sequences().iter().chain(method.catch_sequences());
+        let right = all.filter(|sequence| method.correct(sequence) == Some(answer));
+        let sequences: Vec<&[Interval]> = right.copied().collect();
+        let is_catch = sequences.iter().any(|s| method.is_catch(s));
+        Self {
+            weight: match is_catch {
+                true => track.catch as u64,
+                false if method.catch_sequences().is_empty() => 1,
+                false => (track.ruled + track.easy) as u64,
+            },
+            sequences,
+            next: Vec::new(),
+        }
+    }
+
+    /// Its next sequence: each twice, in random order, then again.
+    fn next(&mut self, stream: &mut Stream) -> Option<Vec<Interval>> {
+        if self.next.is_empty() {
+            let each = std::iter::repeat_n(&self.sequences, OF_EACH);
+            self.next = each.flatten().copied().collect();
+            stream.shuffle(&mut self.next);
+            self.next.reverse();
+        }
+        self.next.pop().map(<[Interval]>::to_vec)
+    }
+}
+
+/// The right answers of a stretch, by place among `answers`: each drawn by its weight, and all of
+/// them again until each occurs nearly as often as its share.
+fn stretch(answers: &[Answer], stream: &mut Stream) -> Vec<usize> {
+    let all: u64 = answers.iter().map(|answer| answer.weight).sum();
+    loop {
+        let mut counts = vec![0u64; answers.len()];
+        let drawn = (0..STRETCH).map(|_| {
+            let mut u = stream.below(all);
+            let at = answers.iter().position(|answer| {
+                let found = u < answer.weight;
+                u = u.saturating_sub(answer.weight);
+                found
+            });
+            let at = at.unwrap_or(0);
+            counts[at] += 1;
+            at
+        });
+        let drawn: Vec<usize> = drawn.collect();
+        let in_balance = counts.iter().zip(answers).all(|(n, answer)| {
+            (n * all).abs_diff(STRETCH as u64 * answer.weight) <= SLACK as u64 * all
+        });
+        if in_balance {
+            return drawn;
+        }
+    }
 }
 
 /// `n` sequences: in each block every one equally often, in random order.

@@ -6,7 +6,8 @@ use study_analysis::analyze::psychophysics::PartAnalysis;
 use study_base::text::counted;
 use study_plan::procedure::Rule;
 use study_plan::protocol::Protocol;
-use study_plan::protocol::parts::{Compared, IntervalOrder, Part, Task, TrackRules};
+use study_plan::protocol::pairs::IntervalOrder;
+use study_plan::protocol::parts::{Compared, Part, Task, TrackRules};
 
 /// Figures and sentences on the trials of each part.
 pub(super) fn part_reports(protocol: &Protocol, parts: &[PartAnalysis]) -> Vec<PartReport> {

@@ -2,7 +2,7 @@
 
 use crate::protocol::keys::{Key, Kind, Word, Words, keys};
 use crate::protocol::section::Section;
-use crate::protocol::{Breaks, Design, Order, PartsOrder};
+use crate::protocol::{Breaks, Design, Order, OrderVersion, PartsOrder};
 use study_base::diagnostic::Fault;
 
 pub(super) const DESIGN: &[Key] = keys! {
@@ -28,6 +28,13 @@ pub(super) const DESIGN: &[Key] = keys! {
     "max_attempts": Kind::COUNT, "5", default("3");
     /// The order of the `[[parts]]`.
     "parts_order": Kind::Word(PartsOrder::WORDS), r#""williams""#, default(r#""fixed""#);
+    /// How the intervals of tracks and pairs are ordered: 1, every sequence of intervals twice in
+    /// each block, so that somebody who counts can guess the last ones; 2, drawn so that no way
+    /// of guessing is right more often than chance by more than 0.02, even if every answer is
+    /// followed by feedback. With 2, a group with some of the realizations of a part with
+    /// `pairs = "adjacent"` compares the neighbors among its own. Needs the format
+    /// `study-protocol/3`; `study new` writes 2.
+    "order_version": Kind::Whole(1, 2), "2", default("1");
 };
 
 /// Keys of `[design]` that each part has for itself.
@@ -108,6 +115,10 @@ pub(super) fn read(mut section: Section<'_, '_>, has_parts: bool) -> Option<Desi
         (repetitions, order) = (Some(1), Some(Order::Fixed));
     }
     let parts_order = section.word("parts_order");
+    let order_version = match section.whole::<u32>("order_version")? {
+        1 => OrderVersion::Balanced,
+        _ => OrderVersion::Unguessable,
+    };
     let max_run = section.whole("max_run");
     let min_distance = section.whole("min_distance");
     let practice = section.model_ids("practice");
@@ -123,6 +134,7 @@ pub(super) fn read(mut section: Section<'_, '_>, has_parts: bool) -> Option<Desi
         breaks,
         max_attempts: max_attempts?,
         parts_order: parts_order?,
+        order_version,
     })
 }
 

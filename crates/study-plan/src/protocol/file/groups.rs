@@ -163,11 +163,9 @@ pub(super) fn agree(
                     (task.models.clone(), own.count())
                 }
                 Task::Pairs(task) => {
-                    let own = task
-                        .pairs
-                        .iter()
-                        .filter(|p| p.iter().all(|m| models.contains(m)));
-                    (task.pairs.concat(), own.count())
+                    let mut own = task.clone();
+                    own.keep(models);
+                    (task.pairs.concat(), own.pairs.len())
                 }
                 Task::Mushra(task) => {
                     let all = &task.presentations.models;

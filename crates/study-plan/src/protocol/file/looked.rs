@@ -2,6 +2,7 @@
 
 use super::agree::{Sections, at, unknown};
 use super::parts::RawPairs;
+use crate::protocol::pairs::neighbors;
 use crate::protocol::{DeviceKind, FamilyRules, Presentations, Role};
 use study_base::diagnostic::Fault;
 use study_base::diagnostic::table::Document;
@@ -217,9 +218,7 @@ impl Looked<'_> {
                 let all = (0..models.len()).flat_map(from);
                 all.map(|(i, b)| [models[i].clone(), b.clone()]).collect()
             }
-            RawPairs::Adjacent => (models.windows(2))
-                .map(|w| [w[0].clone(), w[1].clone()])
-                .collect(),
+            RawPairs::Adjacent => neighbors(&models),
             RawPairs::Versus(one) => {
                 if !models.contains(one) {
                     let known = models.iter().map(ModelId::as_str);

@@ -5,14 +5,14 @@ use super::agree::{Sections, at, collision, unknown};
 use super::families::PartialFamily;
 use super::grids::Grids;
 use super::looked::Looked;
-use super::parts::{RawPart, RawTask};
+use super::parts::{RawPairs, RawPart, RawTask};
 use super::questions::PartialQuestion;
 use super::tracks::{RawRule, RawTrack};
 use super::{Content, Named};
 use crate::procedure::{Constant, Ladder, QuestPlus, Rule, Staircase, Track};
 use crate::protocol::{
-    Compared, FamilyRules, Method, Mushra, Pairs, Part, Presentations, QuestionKind, Task,
-    TrackRules, kinds,
+    Compared, FamilyRules, Method, Mushra, OrderVersion, Pairs, Part, Presentations, QuestionKind,
+    Task, TrackRules, kinds,
 };
 use study_base::diagnostic::Fault;
 use study_base::diagnostic::table::Document;
@@ -286,6 +286,10 @@ impl Raw {
                     repetitions: *repetitions,
                     tie: *tie,
                     interval_order: *interval_order,
+                    neighbors: matches!(pairs, RawPairs::Adjacent)
+                        && looked.sections.design.is_some_and(|design| {
+                            design.order_version == OrderVersion::Unguessable
+                        }),
                 };
                 (Task::Pairs(task), *gap_s)
             }

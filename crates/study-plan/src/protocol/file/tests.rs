@@ -460,11 +460,11 @@ fn seed_and_counts_are_whole_and_not_negative() {
 
 #[test]
 fn another_format_is_one_clear_fault() {
-    let newer = LEAST.replace("study-protocol/1", "study-protocol/3") + "[[new_things]]\n";
+    let newer = LEAST.replace("study-protocol/1", "study-protocol/4") + "[[new_things]]\n";
     assert_eq!(
         messages(&newer),
         [
-            "the format `study-protocol/3` is newer than this program, which reads `study-protocol/2`"
+            "the format `study-protocol/4` is newer than this program, which reads `study-protocol/3`"
         ]
     );
     let foreign = LEAST.replace("study-protocol/1", "study-model/1");
@@ -474,6 +474,21 @@ fn another_format_is_one_clear_fault() {
     );
     let none = LEAST.replace("format = \"study-protocol/1\"", "");
     assert_eq!(messages(&none), ["the file has no `format`"]);
+}
+
+#[test]
+fn newer_keys_need_the_newer_format() {
+    let with_key = LEAST.replace("[design]\n", "[design]\norder_version = 2\n");
+    assert_eq!(
+        messages(&with_key),
+        ["`design.order_version` needs the format `study-protocol/3`"]
+    );
+    let newer = with_key.replace("study-protocol/1", "study-protocol/3");
+    assert_eq!(messages(&newer), [""; 0]);
+    // Without the key, orders are as they were before there was one.
+    let of = |text: &str| parse("p.toml", text).protocol.unwrap().design.order_version;
+    assert_eq!(of(LEAST), crate::protocol::OrderVersion::Balanced);
+    assert_eq!(of(&newer), crate::protocol::OrderVersion::Unguessable);
 }
 
 #[test]

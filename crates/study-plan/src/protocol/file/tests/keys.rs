@@ -59,7 +59,8 @@ fn least() -> Table {
     let mut document = Table::new();
     for key in ROOT {
         let value: Value = match key.kind {
-            Kind::Word(words) => words[0].word.into(),
+            // The newest format has every key.
+            Kind::Word(words) => words[words.len() - 1].word.into(),
             Kind::Table(keys) => with_examples(required(keys)).into(),
             Kind::Tables(keys) => vec![Value::from(with_examples(&keys[..2]))].into(),
             Kind::Variants(variants) if key.name == "questions" => {
