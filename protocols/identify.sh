@@ -34,24 +34,24 @@ record() {
 
 identify() {
     run identify "$recordings/training.csv" --validate "$recordings/validation-1.5hz.csv" \
-        --resample point --lookup linear --start cold --sort ascending --without-coverage \
-        --force "$@"
+        --resample point --lookup linear --start cold --sort ascending --force "$@"
 }
 
 record training 1
 record validation-1.5hz 2
 
-identify --lambda 0.9991,0.9993,0.9995,0.9997,0.9999 --dx 1 \
+# The files of the first two protocols are from before model files had coverage.
+identify --lambda 0.9991,0.9993,0.9995,0.9997,0.9999 --dx 1 --without-coverage \
     --id 'lambda-{lambda}' --out "$protocols/turn-signal/models"
 
 extended=$protocols/turn-signal-extended/models
-identify --lambda 0.9991,0.9995,0.9999,0.99995,0.99998 --dx 1 --out "$extended"
-identify --lambda 0.999 --dx 0.5 --out "$extended"
-identify --lambda 0.9991 --dx 2 --out "$extended"
-identify --lambda 0.9993 --dx 4 --out "$extended"
-identify --lambda 0.9997 --dx 0.5 --id 'practice-lambda-{lambda}-dx-{dx}' --out "$extended"
-identify --method static --dx 1 --id static --out "$extended"
-identify --method spring --out "$extended"
+identify --without-coverage --lambda 0.9991,0.9995,0.9999,0.99995,0.99998 --dx 1 --out "$extended"
+identify --without-coverage --lambda 0.999 --dx 0.5 --out "$extended"
+identify --without-coverage --lambda 0.9991 --dx 2 --out "$extended"
+identify --without-coverage --lambda 0.9993 --dx 4 --out "$extended"
+identify --without-coverage --lambda 0.9997 --dx 0.5 --id 'practice-lambda-{lambda}-dx-{dx}' --out "$extended"
+identify --without-coverage --method static --dx 1 --id static --out "$extended"
+identify --without-coverage --method spring --out "$extended"
 
 passive=$protocols/turn-signal-passive/models
 identify --lambda 0.9991,0.9993,0.9995,0.9997,0.9999 --dx 1 --id 'lambda-{lambda}' --out "$passive"
@@ -72,7 +72,7 @@ done
 identify_knob() {
     run identify "$recordings/knob-training.csv" --validate "$recordings/knob-validation.csv" \
         --columns 't=time,x=angle:deg,v=rate:deg/s,a=accel:deg/s²,f=torque:N·m' --lever $lever \
-        --without-coverage --force --out "$protocols/knob/models" "$@"
+        --force --out "$protocols/knob/models" "$@"
 }
 
 

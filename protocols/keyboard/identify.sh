@@ -21,8 +21,7 @@ run() {
 switch() {
     run import force-curve "$curves/$2.csv" -o "$work/$1.csv" \
         --credit "measured by ThereminGoat (theremingoat.com)"
-    run identify "$work/$1.csv" --method passive --dx 0.05 --id "$1" --out "$models" --force \
-        --without-coverage
+    run identify "$work/$1.csv" --method passive --dx 0.05 --id "$1" --out "$models" --force
 }
 
 switch jwk-bluey JWK_Bluey

@@ -41,6 +41,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     };
     let sources = Sources {
         training: read(&args.training)?,
+        dynamic: read(&args.dynamic)?,
         validate: read(&args.validate)?,
         test: read(&args.test)?,
         repeat: read(&args.repeat)?,

@@ -5,6 +5,7 @@ mod bounds;
 mod cli;
 mod compare;
 mod doubtful;
+mod elsewhere;
 mod estimators_switches;
 mod estimators_tables;
 mod evidence;

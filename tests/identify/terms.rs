@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that fails says where")]
 
 use crate::estimators_tables::{identified, motion, target};
+use assert_cmd::Command;
 use study_haptics::identify::evidence::Term;
 use study_haptics::identify::grid::{self, Plan};
 use study_haptics::identify::method::{Start, Terms, Window};
@@ -150,4 +151,53 @@ fn the_scan_goes_below_a_hundredth_of_the_travel_while_the_error_falls() {
     };
     assert_eq!((mass.term, mass.found), (Term::Mass, false));
     assert_eq!(found.realization.positive.m_kg[0], 0.0);
+}
+
+/// A table without mass and damping is recommended for this key; what is known of both is said all the same, and a statement of another origin is refused.
+#[test]
+fn a_recommended_static_table_says_what_is_known_of_mass_and_damping() {
+    let dir = tempfile::tempdir().unwrap();
+    let study = || {
+        let mut command = Command::cargo_bin("study").unwrap();
+        command.current_dir(dir.path());
+        command
+    };
+    let curve = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/tests/data/switches/Haimu_x_Geon_HG_Silent_Red.csv"
+    );
+    study()
+        .args(["import", "force-curve", curve, "-o", "key.csv"])
+        .assert()
+        .success();
+    let identify = study()
+        .args(["identify", "key.csv", "--out", "m", "--id", "key"])
+        .assert()
+        .success();
+    let said = String::from_utf8_lossy(&identify.get_output().stdout);
+    assert!(said.contains("\n*   static"), "{said}");
+    for term in [
+        "warning: mass: not identified by the recordings and not bounded",
+        "warning: damping: not identified by the recordings, at most ",
+    ] {
+        assert!(said.contains(term), "{said}");
+    }
+    let document = study().args(["identify", "key.csv", "--json"]).assert();
+    let document: serde_json::Value =
+        serde_json::from_slice(&document.get_output().stdout).unwrap();
+    let cells = document["cells"].as_array().unwrap();
+    let cell = cells.iter().find(|cell| cell["method"] == "static");
+    let terms = cell.unwrap()["terms"].as_array().unwrap();
+    assert_eq!(terms.len(), 2, "{terms:?}");
+    assert!(terms[0]["upper_bound"].is_null(), "{terms:?}");
+    assert!(terms[1]["upper_bound"].as_f64() > Some(0.1), "{terms:?}");
+    let text = std::fs::read_to_string(dir.path().join("m/key.toml")).unwrap();
+    let bounded = "[terms.b_n_s_per_mm]\nupper_bound = ";
+    assert!(text.contains(bounded), "{text}");
+    let foreign = text.replace(
+        bounded,
+        "[terms.b_n_s_per_mm]\norigin = \"guessed\"\nupper_bound = ",
+    );
+    let faults = study_haptics::model::file::parse("key", &foreign).1;
+    assert!(format!("{faults:?}").contains("guessed"), "{faults:?}");
 }

@@ -30,6 +30,7 @@ pub mod constrained;
 pub mod coverage;
 pub mod delivery;
 mod direction_state;
+pub mod elsewhere;
 pub mod evidence;
 mod features;
 pub mod folds;
@@ -87,6 +88,7 @@ pub use two_sided::{TwoSided, Width};
 use crate::model::{Branch, Provenance, Realization, Trained};
 use crate::recording::{Recording, range};
 use compare::Trials;
+use elsewhere::Elsewhere;
 use evidence::{Evidence, Term};
 use method::Setting;
 use resample::Resampled;
@@ -108,6 +110,8 @@ pub struct Training<'r> {
     top_speed_mm_s: f64,
     /// Of mass and damping, computed when first asked for.
     evidence: OnceLock<Option<[Evidence; 2]>>,
+    /// Where mass and damping are from, if not from these recordings.
+    elsewhere: Elsewhere,
 }
 
 impl<'r> Training<'r> {
@@ -163,7 +167,14 @@ impl<'r> Training<'r> {
             }),
             top_speed_mm_s: (recordings.iter().map(|r| r.top_speed_mm_s())).fold(0.0, f64::max),
             evidence: OnceLock::new(),
+            elsewhere: Elsewhere::default(),
         })
+    }
+
+    /// With mass and damping from elsewhere, which [`grid::run`] puts into each realization.
+    #[must_use]
+    pub fn with_elsewhere(self, elsewhere: Elsewhere) -> Self {
+        Self { elsewhere, ..self }
     }
 
     /// The recordings.
@@ -183,16 +194,36 @@ impl<'r> Training<'r> {
         Some(plus?.min(minus?))
     }
 
+    /// Where both directions have samples, mm: there a table has nodes.
+    pub fn range_mm(&self) -> [f64; 2] {
+        self.range_mm
+    }
+
     /// What the recordings say about mass and damping; `None` if they are too short.
     pub fn evidence(&self) -> Option<&[Evidence; 2]> {
         let of = || evidence::of(&self.recordings, self.range_mm);
         self.evidence.get_or_init(of).as_ref()
     }
 
-    /// The method without the terms that the recordings do not carry, if it asks for that, and
-    /// what they say of each.
+    /// The method without the terms that the recordings do not carry, if it asks for that, and without those from elsewhere; and
+    /// what the recordings say of each term that it has, or that a table without dynamics does not have.
     fn carried(&self, mut method: Method) -> (Method, Vec<Evidence>) {
+        let [mass, damping] = self.elsewhere.terms();
         let mut asked = Vec::new();
+        if method.is_static() {
+            let all = self.evidence().into_iter().flatten();
+            let here = all
+                .zip(self.elsewhere.terms())
+                .filter(|(_, elsewhere)| !elsewhere);
+            asked.extend(here.map(|(evidence, _)| Evidence {
+                carried: false,
+                ..*evidence
+            }));
+        }
+        if let Some(terms) = method.terms_mut() {
+            terms.m &= !mass;
+            terms.b &= !damping;
+        }
         if let Some(terms) = method.terms_mut().filter(|terms| terms.only_carried) {
             terms.only_carried = false;
             for evidence in self.evidence().into_iter().flatten() {
@@ -234,9 +265,9 @@ impl<'r> Training<'r> {
         setting: Setting<'_>,
     ) -> Result<Identified, IdentifyError> {
         method.check()?;
-        let (method, terms) = self.carried(method);
-        let mut identified = method.identify(self, setting)?;
-        identified.add_terms(terms);
+        let (carried, terms) = self.carried(method);
+        let mut identified = carried.identify(self, setting)?;
+        identified.add_terms(carried, terms);
         Ok(identified)
     }
 
@@ -342,9 +373,10 @@ pub struct Identified {
 
 impl Identified {
     /// What the recordings say of terms, and a warning for each that is left out, or that is there without being shown.
-    fn add_terms(&mut self, evidence: Vec<Evidence>) {
+    fn add_terms(&mut self, method: Method, evidence: Vec<Evidence>) {
         self.terms.extend(evidence.iter().map(Estimate::from));
         let warning = |evidence: Evidence| match (evidence.carried, evidence.found) {
+            _ if method.is_static() => Some(Warning::Without(evidence)),
             (true, true) => None,
             (true, false) => Some(Warning::Ambiguous(evidence)),
             (false, _) => Some(Warning::LeftOut(evidence)),

@@ -12,6 +12,7 @@ mod comparison;
 mod coverage;
 mod displacement;
 mod elements;
+mod elsewhere;
 mod first;
 mod json;
 mod loops;

@@ -5,6 +5,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use std::path::{Path, PathBuf};
 use study_base::text::Untrusted;
 use study_haptics::identify::ESTIMATORS;
+use study_haptics::identify::elsewhere::Stated;
 use study_haptics::identify::identification::Request;
 use study_haptics::identify::method::{Options, Rule, Sort, Start, TermName, Window};
 use study_haptics::identify::resample::Resample;
@@ -120,6 +121,18 @@ pub(in crate::cli) struct Args {
     /// The training recordings: CSV files with t_s, x_mm, f_n (and v_mm_s, a_m_s2)
     #[arg(value_name = "TRAINING", required = true)]
     pub(super) training: Vec<NamedPath>,
+
+    /// Dynamic recordings of the same target: mass and damping are identified from them, and the force by position from TRAINING alone, such as slow force curves
+    #[arg(long, value_name = "REC", num_args = 1..)]
+    pub(super) dynamic: Vec<NamedPath>,
+
+    /// Mass that you state, such as that of a handle that was weighed: it is not identified, and every output says so
+    #[arg(long, value_name = "KG", value_parser = positive)]
+    pub(super) mass_kg: Option<f64>,
+
+    /// Damping that you state: it is not identified, and every output says so
+    #[arg(long, value_name = "N_S_PER_MM", value_parser = positive)]
+    pub(super) damping_n_s_per_mm: Option<f64>,
 
     /// Recordings on which lambda and dx are selected, needed for more than one realization; NAME=PATH sets the name in model files
     #[arg(long, value_name = "REC", num_args = 1..)]
@@ -432,6 +445,10 @@ impl Args {
             active: self.active,
             turned: self.units(),
             without_coverage: self.without_coverage,
+            stated: Stated {
+                m_kg: self.mass_kg,
+                b_n_s_per_mm: self.damping_n_s_per_mm,
+            },
         }
     }
 }

@@ -145,6 +145,8 @@ pub fn run(
                         left_out: trials.left_out(&cell, method, dx_mm),
                         cell,
                     }),
+                    // another target, for whatever method
+                    Err(error @ IdentifyError::OtherForce(_)) => return Err(error),
                     Err(error) if !candidates.is_empty() => {
                         not_tried.push((name, error.to_string()))
                     }

@@ -3,7 +3,7 @@
 use super::evidence::Term;
 use super::folds::strokes;
 use super::problem::{Estimate, Warning};
-use crate::model::coverage::{Coverage, Determined};
+use crate::model::coverage::{Coverage, Determined, Origin};
 use crate::model::{Mechanism, Realization};
 use crate::recording::Recording;
 use std::collections::BTreeMap;
@@ -15,8 +15,8 @@ const CLASSES: usize = 6;
 /// Share of the range at either side that is its end, as for the full strokes of a playback.
 const END: f64 = 0.2;
 
-/// What recordings say of mass and damping, by the names in a model file, without a value where they do not
-/// show the term: nothing is known of one that they do not bound either.
+/// What is known of mass and damping, by the names in a model file, without a value where recordings do not
+/// show the term and nobody stated it: nothing is known of one that they do not bound either.
 pub(super) fn determined(terms: &[Estimate]) -> BTreeMap<String, Determined> {
     let of = |term: Term| {
         let found = terms.iter().find(|of| of.name == term.as_str())?;
@@ -25,9 +25,10 @@ pub(super) fn determined(terms: &[Estimate]) -> BTreeMap<String, Determined> {
             Term::Damping => "b_n_s_per_mm",
         };
         let known = Determined {
-            value: found.identified.then_some(found.value),
+            value: (found.identified || found.origin == Origin::Stated).then_some(found.value),
             standard_error: found.standard_error.filter(|_| found.identified),
             upper_bound: found.upper_bound,
+            origin: found.origin,
         };
         Some((key.to_owned(), known))
     };
@@ -37,7 +38,7 @@ pub(super) fn determined(terms: &[Estimate]) -> BTreeMap<String, Determined> {
 /// A note with what recordings do not bound, and why.
 pub(super) fn note(note: Option<String>, warnings: &[Warning]) -> Option<String> {
     let unbounded = warnings.iter().filter_map(|warning| match warning {
-        Warning::LeftOut(evidence) | Warning::Ambiguous(evidence) => {
+        Warning::LeftOut(evidence) | Warning::Ambiguous(evidence) | Warning::Without(evidence) => {
             (evidence.upper_bound.is_none()).then(|| evidence.to_string())
         }
         _ => None,

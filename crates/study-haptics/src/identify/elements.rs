@@ -78,6 +78,10 @@ impl Estimator for Elements {
         self.terms.write(f, false)
     }
 
+    fn is_table(&self) -> bool {
+        false
+    }
+
     fn claim(&self) -> Claim {
         Claim::Passive
     }

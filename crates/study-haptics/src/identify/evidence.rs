@@ -42,6 +42,12 @@
 //! References for the instruments: Fuller, Measurement Error Models, 1987, section 1.4; for the bound: Fieller 1954, J. R. Stat. Soc. B
 //! 16:175; for the shifts: Chatfield, The Analysis of Time Series, 2004, section 8.1 (cross-correlations of shifted series); for errors of blocks:
 //! Liang & Zeger 1986, Biometrika 73:13.
+//!
+//! **Beside a known force.** Where the force by position is known from other, slow recordings, what a dynamic recording has beside it is a constant
+//! (the zero of a sensor), a friction, its changes at low speed and at reversals, m a and b v ([`beside`]). The same estimates, errors and bounds hold, and a
+//! single fast press says something of the mass, because nothing else depends on the position. Where the dynamic recordings have strokes enough to show a term by themselves,
+//! the known force is not used: what it lacks is the same in each stroke, and would be taken for a term. Damping is bounded by all of its hysteresis, because
+//! friction may be less than in slow motion.
 
 mod carried;
 mod dissipation;
@@ -53,15 +59,19 @@ mod reference;
 mod spread;
 
 use super::folds::strokes;
-use crate::recording::Recording;
+use crate::model::coverage::Origin;
+use crate::recording::{Recording, range};
 use carried::LEAST_RELIABILITY;
 use equations::{BLOCKS, PER_NODE};
 pub(in crate::identify) use noise::white_noise_n;
-use reference::{Found, Reference};
+use reference::{Force, Found, Reference};
+use std::borrow::Cow;
 use std::fmt;
 
 /// With fewer strokes, nothing tells a mass or a damping from a force that depends on position and direction.
 pub const ENOUGH_STROKES: usize = 4;
+/// Fewest samples of which something is said.
+pub(super) const LEAST_SAMPLES: usize = BLOCKS * (PER_NODE + 2);
 
 study_base::named! {
     /// A term of a realization that a recording may not carry.
@@ -75,7 +85,7 @@ study_base::named! {
 
 impl Term {
     /// Mass and damping, in the order of the unknowns.
-    pub(super) const BOTH: [Self; 2] = [Self::Mass, Self::Damping];
+    pub const BOTH: [Self; 2] = [Self::Mass, Self::Damping];
 
     /// The unit of its values.
     pub fn unit(self) -> &'static str {
@@ -126,9 +136,19 @@ pub struct Evidence {
     pub carried: bool,
     /// The share of the variance of its regressor, beside the other terms, that is not noise: 0 to 1.
     pub reliability: f64,
+    /// Which recordings say so.
+    pub origin: Origin,
 }
 
 impl Evidence {
+    /// The recordings that say so, in words.
+    pub fn by(&self) -> &'static str {
+        match self.origin {
+            Origin::Dynamic => "dynamic recordings",
+            Origin::Training | Origin::Stated => "recordings",
+        }
+    }
+
     /// What recording would show the term.
     fn advice(&self) -> &'static str {
         match self.term {
@@ -159,7 +179,7 @@ impl fmt::Display for Evidence {
                 ),
             };
         }
-        write!(f, "{term}: not identified by the recordings")?;
+        write!(f, "{term}: not identified by the {}", self.by())?;
         match self.upper_bound.map(|bound| self.term.shown(bound)) {
             Some(bound) => write!(f, ", at most {bound} (99 %)")?,
             None => write!(f, " and not bounded")?,
@@ -184,49 +204,110 @@ impl fmt::Display for Evidence {
             ),
             (true, false, None) => write!(
                 f,
-                ", because the {of} is explained by position and direction or stays below its noise; {}",
+                ", because the {of} is explained by {} or stays below its noise; {}",
+                match self.origin {
+                    Origin::Dynamic => "the direction",
+                    Origin::Training | Origin::Stated => "position and direction",
+                },
                 self.advice()
             ),
         }
     }
 }
 
-/// What the recordings say about mass and damping, each beside the other if that one is found.
-/// `range_mm` is where the nodes are. `None` if there are too few samples for blocks.
-pub fn of(recordings: &[&Recording], range_mm: [f64; 2]) -> Option<[Evidence; 2]> {
-    let enough =
-        |of: &[&Recording]| of.iter().map(|r| r.len()).sum::<usize>() >= BLOCKS * (PER_NODE + 2);
-    if !enough(recordings) {
+/// Whether there are samples enough for blocks.
+fn enough(recordings: &[&Recording]) -> bool {
+    recordings.iter().map(|r| r.len()).sum::<usize>() >= LEAST_SAMPLES
+}
+
+/// Means of consecutive samples, without recordings that are too short for differences.
+fn averages<'r>(recordings: &[&'r Recording]) -> Vec<Cow<'r, Recording>> {
+    let mut averages = noise::averaged(recordings);
+    averages.retain(|r| r.len() > 3);
+    averages
+}
+
+/// What dynamic recordings say about mass and damping beside a force by position that is known: `rest` are the recordings with the force that it leaves,
+/// `whole` those with all of it. `range_mm` is where it is known. `None` if there are too few samples for blocks.
+pub(super) fn beside(
+    whole: &[&Recording],
+    rest: &[&Recording],
+    range_mm: [f64; 2],
+) -> Option<[Evidence; 2]> {
+    let [whole, rest] = [whole, rest].map(averages);
+    let [whole, rest]: [Vec<&Recording>; 2] =
+        [&whole, &rest].map(|of| of.iter().map(|r| &**r).collect());
+    if !enough(&rest) {
         return None;
     }
+    // the same strokes again and again would show what the known force lacks as if it were a term
+    let found = match has_enough_strokes(&whole) {
+        true => {
+            let ends: Vec<f64> = whole.iter().flat_map(|r| r.range_mm()).collect();
+            let reference = Reference::new(&whole, Force::Unknown, range(&ends), true)?;
+            found_in(&reference)?
+        }
+        false => found_in(&Reference::new(&rest, Force::Held(&whole), range_mm, true)?)?,
+    };
+    Some([0, 1].map(|term| Evidence {
+        carried: found[term].is_found(),
+        origin: Origin::Dynamic,
+        // instruments have no bias
+        ..evidence(term, found[term], true, 1.0)
+    }))
+}
+
+/// Whether places are passed often enough to tell a term from a force that depends on position and direction.
+fn has_enough_strokes(recordings: &[&Recording]) -> bool {
     let count = |r: &&Recording| strokes(r).last().map_or(0, |last| last + 1);
-    let enough_strokes = recordings.iter().map(count).sum::<usize>() >= ENOUGH_STROKES;
-    let carried = carried::of(recordings, range_mm)?;
-    let averages = noise::averaged(recordings);
-    let averages: Vec<&Recording> = (averages.iter())
-        .map(|r| &**r)
-        .filter(|r| r.len() > 3)
-        .collect();
-    if !enough(&averages) {
-        return None;
-    }
-    let reference = Reference::new(&averages, range_mm, enough_strokes)?;
-    let found = each_beside_the_other(
+    recordings.iter().map(count).sum::<usize>() >= ENOUGH_STROKES
+}
+
+/// Mass and damping in a reference model.
+fn found_in(reference: &Reference) -> Option<[Found; 2]> {
+    each_beside_the_other(
         |kept, term| reference.evidence(kept, term),
         Found::is_found,
         |found| found.value / found.standard_error,
-    )?;
-    Some([0, 1].map(|term| Evidence {
+    )
+}
+
+/// What is found of a term (0: mass, 1: damping), which no table takes up yet.
+fn evidence(term: usize, found: Found, enough_strokes: bool, reliability: f64) -> Evidence {
+    Evidence {
         term: Term::BOTH[term],
-        value: found[term].value,
-        standard_error: found[term].standard_error,
-        found: found[term].is_found(),
-        upper_bound: found[term].upper_bound,
-        shown_from: found[term].shown_from,
-        shows: found[term].shows,
+        value: found.value,
+        standard_error: found.standard_error,
+        found: found.is_found(),
+        upper_bound: found.upper_bound,
+        shown_from: found.shown_from,
+        shows: found.shows,
         enough_strokes,
-        carried: enough_strokes && carried[term].is_carried() && found[term].may_be_carried(),
-        reliability: carried[term].reliability,
+        carried: false,
+        reliability,
+        origin: Origin::Training,
+    }
+}
+
+/// What the recordings say about mass and damping, each beside the other if that one is found.
+/// `range_mm` is where the nodes are. `None` if there are too few samples for blocks.
+pub fn of(recordings: &[&Recording], range_mm: [f64; 2]) -> Option<[Evidence; 2]> {
+    if !enough(recordings) {
+        return None;
+    }
+    let enough_strokes = has_enough_strokes(recordings);
+    let carried = carried::of(recordings, range_mm)?;
+    let averages = averages(recordings);
+    let averages: Vec<&Recording> = averages.iter().map(|r| &**r).collect();
+    if !enough(&averages) {
+        return None;
+    }
+    let reference = Reference::new(&averages, Force::Unknown, range_mm, enough_strokes)?;
+    let found = found_in(&reference)?;
+    let may_be = |term: usize| carried[term].is_carried() && found[term].may_be_carried();
+    Some([0, 1].map(|term| Evidence {
+        carried: enough_strokes && may_be(term),
+        ..evidence(term, found[term], enough_strokes, carried[term].reliability)
     }))
 }
 
@@ -270,6 +351,7 @@ mod tests {
             enough_strokes: true,
             carried: false,
             reliability: 0.9,
+            origin: Origin::Training,
         }
     }
 

@@ -150,6 +150,9 @@ fn run_steps_on(
     // check the arguments before the long computation
     for method in &plan.methods {
         method.check()?;
+        if training.elsewhere.terms() != [false; 2] && !method.is_table() {
+            return Err(IdentifyError::OwnDynamics(method.as_str()));
+        }
     }
     let mut tables = Vec::new();
     if plan.methods.iter().any(|m| m.has_dx()) {
@@ -163,9 +166,9 @@ fn run_steps_on(
     let (carried, evidence): (Vec<Method>, Vec<Vec<Evidence>>) =
         (plan.methods.iter().map(|method| training.carried(*method))).unzip();
     let mut identified = identify(processor, training, &carried, &tables, lookup, step)?;
-    for (tables, evidence) in identified.iter_mut().zip(evidence) {
+    for ((tables, evidence), method) in identified.iter_mut().zip(evidence).zip(&carried) {
         for table in tables {
-            table.add_terms(evidence.clone());
+            table.add_terms(*method, evidence.clone());
         }
     }
     let methods: Vec<Method> = carried
@@ -176,12 +179,17 @@ fn run_steps_on(
     let identified: Vec<Identified> = identified.into_iter().flatten().collect();
     let realizations: Vec<&Realization> = identified.iter().map(|i| &i.realization).collect();
     let scores = score(processor, &realizations, recordings, done);
-    Ok(methods
+    methods
         .into_iter()
         .zip(identified)
         .zip(scores)
-        .map(|((method, identified), scores)| cell(method, identified, scores, recordings))
-        .collect())
+        .map(|((method, identified), scores)| {
+            let mut cell = cell(method, identified, scores, recordings);
+            let said = || training.evidence().copied();
+            training.elsewhere.complete(&mut cell, said, recordings)?;
+            Ok(cell)
+        })
+        .collect()
 }
 
 /// The tables of each method, in the order of dx.

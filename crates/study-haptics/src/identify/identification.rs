@@ -5,18 +5,22 @@
 //! [`Source::read`] reads a recording, [`run`] identifies, [`Identification::model_files`] has the
 //! files. What is remarkable on the way is handed to `say`, a sentence at a time.
 
+mod error;
+
+pub use error::IdentificationError;
+
 use super::compare::{self, Candidate, Comparison, Failure};
 use super::coverage;
+use super::elsewhere::{self, Elsewhere, Stated};
 use super::evidence::lag;
 use super::features;
 use super::grid::{self, Cell};
 use super::method::{Claim, Options, Progress};
-use super::plan::OptionError;
-use super::signal::{self, Acceleration, Excitation, SignalError, filter};
+use super::signal::{self, Acceleration, Excitation, filter};
 use super::validation::{self, Ceiling, Validation};
 use super::{IdentifyError, Training};
 use crate::model::{Units, file};
-use crate::recording::{self, Energy, Names, Recording, RecordingError, RecordingFault};
+use crate::recording::{self, Names, Recording};
 use std::io::BufRead;
 use study_base::text::{ModelId, Untrusted};
 use study_wire::predict::Lookup;
@@ -43,6 +47,8 @@ pub struct Request {
     pub turned: Option<(Units, f64)>,
     /// Whether model files say nothing of the coverage by the recordings, which release 0.1 reads.
     pub without_coverage: bool,
+    /// Mass and damping that the experimenter states.
+    pub stated: Stated,
 }
 
 impl Default for Request {
@@ -60,6 +66,7 @@ impl Default for Request {
             active: false,
             turned: None,
             without_coverage: false,
+            stated: Stated::default(),
         }
     }
 }
@@ -78,109 +85,14 @@ pub struct Source {
 pub struct Sources {
     /// From which realizations are identified; at least one.
     pub training: Vec<Source>,
+    /// From which mass and damping are identified, beside the force by position of `training`.
+    pub dynamic: Vec<Source>,
     /// On which one is selected.
     pub validate: Vec<Source>,
     /// On which its VAF is reported.
     pub test: Vec<Source>,
     /// Repetitions of the trajectories of `validate` and `test`.
     pub repeat: Vec<Source>,
-}
-
-/// Why there is no identification. The messages name the recordings by their paths.
-#[derive(Debug, thiserror::Error)]
-pub enum IdentificationError {
-    /// A recording cannot be read.
-    #[error("{}: line {}: {}", Untrusted(.0), .1.line, .1.fault)]
-    Unreadable(String, RecordingError),
-    /// A target that supplies energy.
-    #[error(
-        "{}: the target supplies energy: the work of the force over closed cycles is {:.3} J on {:.0} mm, but no passive target gives any",
-        Untrusted(.path), .energy.supplied_j, .energy.path_mm
-    )]
-    Active {
-        /// The recording.
-        path: String,
-        /// Its energy.
-        energy: Energy,
-        /// Whether spikes may be the cause.
-        spikes: bool,
-    },
-    /// Signals that cannot be prepared.
-    #[error("{}: {}", Untrusted(.0), .1)]
-    Signal(String, SignalError),
-    /// Two paths with the same bytes.
-    #[error("{} and {} are the same recording", Untrusted(.0), Untrusted(.1))]
-    Same(String, String),
-    /// Two recordings with one name.
-    #[error("two recordings are called {}: {} and {}", Untrusted(.name), Untrusted(.first), Untrusted(.second))]
-    SameName {
-        /// The name.
-        name: String,
-        /// The first path.
-        first: String,
-        /// The second path.
-        second: String,
-    },
-    /// A repetition of nothing.
-    #[error("{} does not repeat the trajectory of a --validate or --test recording", Untrusted(.0))]
-    NoRepetition(String),
-    /// There is nothing on which one of several realizations could be selected.
-    #[error("several realizations need --validate, on which one is selected")]
-    NoValidation,
-    /// Options that do not go together.
-    #[error(transparent)]
-    Options(#[from] OptionError),
-    /// The recordings do not suit the estimator.
-    #[error("{}: {}", Untrusted(.0), .1)]
-    Estimator(String, IdentifyError),
-    /// An id that a model file cannot have.
-    #[error("{0}")]
-    Id(String),
-    /// Two realizations with one id.
-    #[error("two cells would have the id {0}")]
-    SameId(ModelId),
-}
-
-impl IdentificationError {
-    /// What to do about it.
-    pub fn hint(&self) -> Option<&'static str> {
-        match self {
-            Self::Unreadable(_, error) => match &error.fault {
-                RecordingFault::MissingColumn { .. } => Some(
-                    "name the columns of your file: --columns t=NAME,x=NAME:UNIT,f=NAME:UNIT, with units such as mm, deg, rad, N and N·m",
-                ),
-                RecordingFault::Ragged { found, expected } if found > expected => {
-                    Some("decimal commas need semicolons or tabs between the columns")
-                }
-                RecordingFault::LongLine => Some("a row is a line that ends with a line feed"),
-                _ => None,
-            },
-            Self::Active { spikes: true, .. } => {
-                Some("the spikes may be the cause: --robust replaces them")
-            }
-            Self::Active { .. } => Some(
-                "F is the force that the probe applies to the target, positive with +x: change the sign of F, or that of x if the position is counted the other way round. For a target with a motor: --active",
-            ),
-            Self::Same(..) => {
-                Some("identify from one recording, select on a second and report a third")
-            }
-            Self::SameName { .. } => Some("give one another name: --validate NAME=PATH"),
-            Self::NoRepetition(_) => {
-                Some("record the same trajectory twice, and pass the second recording as --repeat")
-            }
-            Self::NoValidation => Some("or ask for one, such as --method passive --dx 0.05"),
-            Self::Options(error) => error.hint(),
-            Self::SameId(_) => {
-                Some("use {lambda}, {dx} and {delta} in the template, or fewer values")
-            }
-            Self::Signal(..) | Self::Estimator(..) | Self::Id(_) => None,
-        }
-    }
-
-    /// Whether the request is wrong, and not the recordings.
-    pub fn is_usage(&self) -> bool {
-        matches!(self, Self::NoValidation | Self::Options(_))
-    }
 }
 
 impl Source {
@@ -241,6 +153,11 @@ impl Source {
 }
 
 impl Request {
+    /// Of mass and damping, whether it may be from elsewhere.
+    fn elsewhere(&self, dynamic: &[Source]) -> [bool; 2] {
+        (self.stated.both()).map(|stated| stated.is_some() || !dynamic.is_empty())
+    }
+
     /// Whether a filter, a difference or a simulation needs even intervals.
     fn needs_even_samples(&self) -> bool {
         let simulates = |methods: Vec<super::Method>| methods.iter().any(|m| m.simulates());
@@ -274,6 +191,8 @@ impl Request {
 pub struct Identification {
     /// The training recordings.
     pub training: Vec<Source>,
+    /// The dynamic recordings.
+    pub dynamic: Vec<Source>,
     /// Those on which a realization was selected, then those on which its VAF is reported.
     pub recordings: Vec<Source>,
     /// How many of `recordings` a realization was selected on.
@@ -313,6 +232,7 @@ pub fn run(
 ) -> Result<Identification, IdentificationError> {
     let Sources {
         mut training,
+        mut dynamic,
         validate,
         test,
         mut repeat,
@@ -323,6 +243,7 @@ pub fn run(
     let plan = request.options.plan(first.scale_mm())?;
     let offset = [offset(first.range_mm()), offset(first.range_n())];
     let all = (training.iter_mut())
+        .chain(&mut dynamic)
         .chain(&mut recordings)
         .chain(&mut repeat);
     for Source { recording, .. } in all {
@@ -340,7 +261,9 @@ pub fn run(
             "warning: F is far from 0, which costs digits: identified at F - {offset_n} N; model files have the forces of the recording, so subtract the offset of the sensor before you play them"
         ));
     }
-    check_distinct(training.iter().chain(&recordings).chain(&repeat))?;
+    let all = training.iter().chain(&dynamic);
+    check_distinct(all.chain(&recordings).chain(&repeat))?;
+    request.options.allow(request.elsewhere(&dynamic))?;
     for Source { recording, path } in &mut training {
         if request.thin {
             let (thinned, removed) = signal::thin(recording);
@@ -350,6 +273,8 @@ pub fn run(
         if let Some(warning) = Excitation::of(recording).warning() {
             say(format!("warning: {path}: {warning}"));
         }
+    }
+    for Source { recording, path } in training.iter().chain(&dynamic) {
         if let Some(lag) = lag::of(recording) {
             say(format!("warning: {path}: {lag}"));
         }
@@ -362,26 +287,39 @@ pub fn run(
 
     let scored: Vec<&Recording> = recordings.iter().map(|s| &s.recording).collect();
     let trained: Vec<&Recording> = training.iter().map(|s| &s.recording).collect();
-    let identify = || -> Result<(Vec<Cell>, Option<Comparison>), IdentifyError> {
-        let training = Training::of(&trained)?;
+    let fast: Vec<&Recording> = dynamic.iter().map(|s| &s.recording).collect();
+    let identify = || -> Result<(Vec<Cell>, Option<Comparison>, Elsewhere), IdentifyError> {
+        let mut training = Training::of(&trained)?;
+        let mut elsewhere = Elsewhere::default();
+        if request.elsewhere(&dynamic) != [false; 2] {
+            let (range_mm, said) = (training.range_mm(), training.evidence());
+            elsewhere = Elsewhere::of(&fast, request.stated, range_mm, said)?;
+            training = training.with_elsewhere(elsewhere.clone());
+        }
         if compares {
             let comparison = compare::run(&training, request.lookup, &scored, step)?;
             let cells = comparison.best().map(|best| best.cell.clone());
-            return Ok((cells.into_iter().collect(), Some(comparison)));
+            return Ok((cells.into_iter().collect(), Some(comparison), elsewhere));
         }
         let lookup = request.lookup;
         grid::run_in_steps(&training, &plan, lookup, &scored, cell_done, step)
-            .map(|cells| (cells, None))
+            .map(|cells| (cells, None, elsewhere))
     };
-    let (mut cells, comparison) = identify()
+    let (mut cells, comparison, elsewhere) = identify()
         .map_err(|error| IdentificationError::Estimator(training[0].path.clone(), error))?;
-    let others = training.iter().skip(1).chain(&recordings);
+    let others = training.iter().skip(1).chain(&dynamic).chain(&recordings);
     warn_about_filters(&training[0].recording, others, &mut say);
     let filter = request.filter_description(&training[0].recording);
     for cell in &mut cells {
-        let covered = coverage::of(&cell.realization, &trained);
+        let from_dynamic = elsewhere::is_from_dynamic(&cell.terms);
+        let also = elsewhere.dynamic().iter().filter(|_| from_dynamic);
+        let went: Vec<&Recording> = trained.iter().copied().chain(also).collect();
+        let covered = coverage::of(&cell.realization, &went);
         let provenance = &mut cell.realization.provenance;
         provenance.filter = Some(filter.clone());
+        provenance.note = elsewhere::note(provenance.note.take(), &cell.terms, &fast);
+        let hashes = fast.iter().map(|r| (r.name.clone(), r.sha256.clone()));
+        provenance.recordings.extend(hashes);
         if !request.without_coverage {
             provenance.coverage = Some(covered);
             provenance.terms = coverage::determined(&cell.terms);
@@ -423,6 +361,7 @@ pub fn run(
     }
     let mut found = Identification {
         training,
+        dynamic,
         recordings,
         validations,
         cells,

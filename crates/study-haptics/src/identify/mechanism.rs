@@ -22,6 +22,7 @@ use super::method::Progress;
 use super::samples::weight_of;
 use super::signal::{LowPass, SignalError, sampling_interval_s};
 use super::{Estimate, IdentifyError, Training, Warning};
+use crate::model::coverage::Origin;
 use crate::model::{Elements, Mechanism};
 use crate::recording::Recording;
 pub use decision::Decision;
@@ -141,6 +142,7 @@ impl Fitted {
                 unit,
                 value,
                 standard_error,
+                origin: Origin::Training,
                 upper_bound: None,
                 identified: is_sure(name, value, standard_error),
             })

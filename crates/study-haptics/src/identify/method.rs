@@ -74,6 +74,16 @@ pub trait Estimator: fmt::Debug {
         false
     }
 
+    /// Whether its realizations are tables, to which a mass and a damping can be added.
+    fn is_table(&self) -> bool {
+        true
+    }
+
+    /// Whether its realizations have neither mass nor damping, whatever the recordings say.
+    fn is_static(&self) -> bool {
+        false
+    }
+
     /// What its realizations claim.
     fn claim(&self) -> Claim {
         Claim::Nothing

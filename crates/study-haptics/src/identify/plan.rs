@@ -25,6 +25,9 @@ pub enum OptionError {
     /// Terms of a mechanism.
     #[error("--terms does not apply to a mechanism")]
     Mechanism,
+    /// A term that is to be identified and is from elsewhere.
+    #[error("--terms {} asks for what is from elsewhere", .0.as_str())]
+    Elsewhere(TermName),
     /// An option that the estimator does not have.
     #[error("{} does not apply to this method", .0.as_str())]
     Useless(Opt),
@@ -38,6 +41,9 @@ impl OptionError {
             Self::Stiffness => Some("the others have a force by position, f0, whose slope it is"),
             Self::Mechanism => Some(
                 "none of its parts can be left out; a standard error shows which ones the recordings do not determine",
+            ),
+            Self::Elsewhere(_) => Some(
+                "leave it out: --dynamic, --mass-kg and --damping-n-s-per-mm say where it is from",
             ),
             Self::Unknown(_) | Self::Useless(_) => None,
         }
@@ -77,6 +83,17 @@ impl Options {
             ..Self::default()
         };
         *self == nothing
+    }
+
+    /// Refuses terms that are asked for although mass or damping are from elsewhere.
+    pub(super) fn allow(&self, [mass, damping]: [bool; 2]) -> Result<(), OptionError> {
+        let asked = |term: &TermName| match term {
+            TermName::M => mass,
+            TermName::B => damping,
+            TermName::K | TermName::F0 => false,
+        };
+        let wrong = self.terms.iter().copied().find(asked);
+        wrong.map_or(Ok(()), |term| Err(OptionError::Elsewhere(term)))
     }
 
     /// The estimators with their options.

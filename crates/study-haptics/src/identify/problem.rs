@@ -1,8 +1,10 @@
 //! Errors of identification and warnings about its results.
 
-use super::evidence::Evidence;
+use super::evidence::{Evidence, LEAST_SAMPLES, Term};
 use super::resample::MAX_NODES;
 use super::samples::Theta;
+use crate::model::coverage::Origin;
+use study_base::text::Untrusted;
 /// Number of samples after which an estimate rests on ten samples per parameter.
 pub(super) const START_UP_SAMPLES: usize = 40;
 
@@ -48,10 +50,51 @@ pub enum IdentifyError {
     Signal(#[from] super::signal::SignalError),
     #[error("no start led to a mechanism whose force is finite: check the units of x and F")]
     NoMechanism,
+    /// A stated term that the training recordings show.
+    #[error("the training recordings show a {} of {}, so that it is not stated but identified", .0.term.as_str(), what_is_said(.0))]
+    Shown(Evidence),
+    #[error("mass and damping from elsewhere are for tables: {0} has its own")]
+    OwnDynamics(&'static str),
+    #[error(
+        "the dynamic recording {} goes from {:.4} to {:.4} mm, and {percent} % of its samples are where the force by position is known, {:.4} to {:.4} mm",
+        Untrusted(.recording), .goes_mm[0], .goes_mm[1], .known_mm[0], .known_mm[1]
+    )]
+    DynamicRange {
+        recording: String,
+        percent: f64,
+        known_mm: [f64; 2],
+        goes_mm: [f64; 2],
+    },
+    #[error(
+        "the dynamic recording {} has {samples} samples where the force by position is known: mass and damping need {LEAST_SAMPLES}", Untrusted(.recording)
+    )]
+    DynamicTooShort { recording: String, samples: usize },
+    #[error(
+        "beside what follows from velocity and acceleration, the force of the dynamic recording is {0:.3} times that of the training recordings at the same positions"
+    )]
+    OtherForce(f64),
     #[error(
         "the estimates with lambda = {lambda} diverge: the recording does not excite all parameters; choose a larger lambda"
     )]
     Diverged { lambda: f64 },
+}
+
+impl IdentifyError {
+    /// What to do about it.
+    pub fn hint(&self) -> Option<&'static str> {
+        match self {
+            Self::Shown(_) => Some("leave --mass-kg or --damping-n-s-per-mm out"),
+            Self::OwnDynamics(_) => Some("such as --method passive"),
+            Self::DynamicRange { .. } => Some(
+                "both are of the same travel, counted from the same origin and in the same unit: record slow loops as far, or convert the positions",
+            ),
+            Self::DynamicTooShort { .. } => Some("record more presses, or at a higher rate"),
+            Self::OtherForce(_) => Some(
+                "both are of the same target, with forces in the same unit (1 gf is 0.00981 N) and of the same sign: convert them",
+            ),
+            _ => None,
+        }
+    }
 }
 
 /// What an estimator found of one of its terms, and how well the recordings determine it.
@@ -70,6 +113,23 @@ pub struct Estimate {
     /// Whether the recordings determine it: otherwise it is left out, or no more than set. A table leaves out a term that they
     /// determine if least squares would find too little of it, and has one that they do not determine if it predicts; both with a warning.
     pub identified: bool,
+    /// What it is known from. A stated value was not identified.
+    pub origin: Origin,
+}
+
+impl Estimate {
+    /// What the experimenter states, kg or N·s/mm.
+    pub(super) fn stated(term: Term, value: f64) -> Self {
+        Self {
+            name: term.as_str(),
+            unit: term.unit(),
+            value,
+            standard_error: None,
+            upper_bound: None,
+            identified: false,
+            origin: Origin::Stated,
+        }
+    }
 }
 
 impl From<&Evidence> for Estimate {
@@ -81,6 +141,7 @@ impl From<&Evidence> for Estimate {
             standard_error: Some(evidence.standard_error),
             upper_bound: evidence.upper_bound,
             identified: evidence.found,
+            origin: evidence.origin,
         }
     }
 }
@@ -143,6 +204,12 @@ pub enum Warning {
     /// The recordings do not show this term, but a table predicts better with it.
     #[error("{0}; --terms overrides this")]
     Ambiguous(Evidence),
+    /// The recordings say this of a term that the realization does not have, whatever the options are.
+    #[error("{}", without(.0))]
+    Without(Evidence),
+    /// The experimenter states something else than the recordings say.
+    #[error("{} of {} is stated, but the {} say {}", .said.term.as_str(), .said.term.shown(*.stated), .said.by(), what_is_said(.said))]
+    Stated { stated: f64, said: Evidence },
     /// The force has features between the nodes.
     #[error(
         "{rms_n:.3} N rms of the force repeat at places closer than 2 dx = {} mm, which nodes at this distance cannot follow: choose a smaller dx", 2.0 * .dx_mm
@@ -150,6 +217,32 @@ pub enum Warning {
     Narrow { rms_n: f64, dx_mm: f64 },
     #[error("the stiffness of the spring is negative: {k_n_per_mm:.4} N/mm")]
     NegativeSpring { k_n_per_mm: f64 },
+}
+
+/// What recordings say of a term that a realization does not have.
+fn without(evidence: &Evidence) -> String {
+    match evidence.found {
+        true => format!(
+            "{}: {}, which this method does not have",
+            evidence.term.as_str(),
+            what_is_said(evidence)
+        ),
+        false => evidence.to_string(),
+    }
+}
+
+/// An estimate with its standard error, or a bound.
+fn what_is_said(evidence: &Evidence) -> String {
+    let shown = |value| evidence.term.shown(value);
+    match (evidence.found, evidence.upper_bound) {
+        (true, _) => format!(
+            "{} ± {}",
+            shown(evidence.value),
+            shown(evidence.standard_error)
+        ),
+        (false, Some(bound)) => format!("at most {} (99 %)", shown(bound)),
+        (false, None) => "nothing of it".to_owned(),
+    }
 }
 
 /// A warning about nodes whose static force lies outside the measured range, low to

@@ -68,6 +68,10 @@ impl Estimator for Segments {
         false
     }
 
+    fn is_static(&self) -> bool {
+        true
+    }
+
     fn claim(&self) -> Claim {
         Claim::Baseline
     }

@@ -42,6 +42,10 @@ impl Estimator for Spring {
         false
     }
 
+    fn is_static(&self) -> bool {
+        true
+    }
+
     fn claim(&self) -> Claim {
         Claim::Baseline
     }

@@ -36,6 +36,10 @@ impl Estimator for Static {
         Ok(identified)
     }
 
+    fn is_static(&self) -> bool {
+        true
+    }
+
     fn claim(&self) -> Claim {
         Claim::Baseline
     }

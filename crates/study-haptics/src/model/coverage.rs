@@ -38,6 +38,22 @@ pub struct Determined {
     pub standard_error: Option<f64>,
     /// What it is at most, with a confidence of 99 %.
     pub upper_bound: Option<f64>,
+    /// What it is known from.
+    pub origin: Origin,
+}
+
+study_base::named! {
+    /// What a parameter is known from.
+    #[derive(Default)]
+    Origin {
+        /// The recordings that the force by position is from as well.
+        #[default]
+        Training = "training",
+        /// Dynamic recordings, beside the force by position of others.
+        Dynamic = "dynamic",
+        /// The experimenter, who stated it: it was not identified.
+        Stated = "stated",
+    }
 }
 
 /// Most places and most classes of speeds of a map.

@@ -64,11 +64,12 @@ pub fn document(results: &Identification) -> String {
         })
     };
     let further = (results.training.iter().skip(1)).map(|source| (source, "training"));
+    let dynamic = (results.dynamic.iter()).map(|source| (source, "dynamic"));
     let others = results.recordings.iter().enumerate().map(|(i, source)| {
         let validates = i < results.validations;
         (source, if validates { "validate" } else { "test" })
     });
-    let recordings: Vec<Value> = (further.chain(others))
+    let recordings: Vec<Value> = (further.chain(dynamic).chain(others))
         .map(|(source, role)| recording(source, role))
         .collect();
     let validation: Map<String, Value> = results
@@ -130,6 +131,7 @@ fn term(term: &Estimate) -> Value {
         "standard_error": term.standard_error,
         "upper_bound": term.upper_bound,
         "identified": term.identified,
+        "origin": term.origin.as_str(),
     })
 }
 

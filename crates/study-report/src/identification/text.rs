@@ -1,7 +1,7 @@
 //! What `study identify` prints.
 
 use super::printed::{Printed, align, short_name};
-use super::{comparison, elements, first, json, loops};
+use super::{comparison, elements, elsewhere, first, json, loops};
 use std::fmt::Write as _;
 use study_base::text::Untrusted;
 use study_haptics::identify::grid::Cell;
@@ -141,6 +141,7 @@ pub fn text(results: &Identification, width: usize) -> String {
 /// With the best cell in detail and the warnings.
 fn finished(mut out: String, results: &Identification, width: usize) -> String {
     out.push_str(&best_in_detail(results));
+    out.push_str(&elsewhere::text(results));
     out.push_str(&loops::text(results));
     for (warning, cells) in warnings(results) {
         let _ = writeln!(out, "warning: {warning} ({cells})");

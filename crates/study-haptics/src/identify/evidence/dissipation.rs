@@ -60,7 +60,7 @@ impl Dissipation {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::identify::evidence::equations::{Rule, nodes, rows};
+    use crate::identify::evidence::equations::{EVERYWHERE, Rule, nodes, rows};
     use crate::identify::evidence::instruments::Instruments;
     use crate::recording::{Recording, read};
     use study_wire::predict::Direction;
@@ -83,7 +83,7 @@ mod tests {
             direction: Direction::Sign,
             smooth: 1,
         };
-        let rows = rows(&recordings, &nodes, rule, &instruments);
+        let rows = rows(&recordings, (&nodes, EVERYWHERE), rule, &instruments);
         Dissipation::of(&rows, nodes.len()).damping.unwrap()
     }
 

@@ -65,13 +65,14 @@ impl Row {
         }
     }
 
+    /// With one node C and D are the same everywhere.
     fn entries(&self, nodes: usize) -> [(usize, f64); 2 * PER_NODE + BORDER] {
-        let Self { share, z, .. } = *self;
-        let (left, right, border) = (
-            self.left * PER_NODE,
-            (self.left + 1) * PER_NODE,
-            nodes * PER_NODE,
-        );
+        let z = self.z;
+        let border = nodes * PER_NODE;
+        let (left, right, share) = match nodes {
+            1 => (0, 0, 0.0),
+            _ => (self.left * PER_NODE, (self.left + 1) * PER_NODE, self.share),
+        };
         [
             (left, 1.0 - share),
             (left + 1, z * (1.0 - share)),
@@ -139,11 +140,14 @@ fn smoothed(values: &[f64], width: usize) -> Vec<f64> {
     (0..values.len()).map(mean).collect()
 }
 
+/// All positions.
+pub(super) const EVERYWHERE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
+
 /// Every sample of some recordings with a rule for the direction state, and with functions of time in the place of acceleration and
-/// velocity, one for each recording: instruments, or acceleration and velocity themselves.
+/// velocity, one for each recording: instruments, or acceleration and velocity themselves. Only samples `within_mm` count, but the state follows the motion beyond.
 pub(super) fn rows(
     recordings: &[&Recording],
-    nodes: &[f64],
+    (nodes, within_mm): (&[f64], [f64; 2]),
     rule: Rule,
     instruments: &[Instruments],
 ) -> Vec<Row> {
@@ -155,7 +159,11 @@ pub(super) fn rows(
         let states: Vec<f64> = (0..recording.len()).map(of_motion).collect();
         let smoothed = smoothed(&states, rule.smooth);
         let row = |(i, z)| Row::new(recording, i, nodes, (z, low_mm_s), [of.a[i], of.v[i]]);
-        rows.extend(smoothed.into_iter().enumerate().map(row));
+        let counts = |(i, _): &(usize, f64)| {
+            let x_mm = recording.x_mm[*i];
+            within_mm[0] <= x_mm && x_mm <= within_mm[1]
+        };
+        rows.extend(smoothed.into_iter().enumerate().filter(counts).map(row));
     }
     rows
 }

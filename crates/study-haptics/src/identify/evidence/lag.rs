@@ -4,7 +4,7 @@
 //! damping of either sign, by position. With the force moved back the reference model fits better. Friction, play and mass
 //! do not have this effect, because the model has them; a viscoelastic target may have.
 
-use super::equations::{Equations, PER_NODE, Rule, directions, nodes, rows};
+use super::equations::{EVERYWHERE, Equations, PER_NODE, Rule, directions, nodes, rows};
 use super::instruments::Instruments;
 use super::noise::pairs_averaged;
 use crate::recording::Recording;
@@ -55,7 +55,7 @@ pub fn of(recording: &Recording) -> Option<Lag> {
                 direction,
                 smooth: 1,
             };
-            let rows = rows(&[&moved], &nodes, rule, &instruments);
+            let rows = rows(&[&moved], (&nodes, EVERYWHERE), rule, &instruments);
             let equations = Equations::of(rows.into_iter(), moved.len(), nodes.len());
             let x = equations.solve(0, &equations.free([true; 2], [true, false]))?;
             Some(equations.total.error(&x))

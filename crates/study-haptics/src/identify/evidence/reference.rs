@@ -2,7 +2,7 @@
 
 use super::Term;
 use super::dissipation::Dissipation;
-use super::equations::{BORDER, Equations, Row, Rule, directions, nodes, rows};
+use super::equations::{BORDER, EVERYWHERE, Equations, Row, Rule, directions, nodes, rows};
 use super::instruments::{self, Instruments};
 use super::spread::{ONE_SIDED, Spread};
 use crate::recording::Recording;
@@ -65,6 +65,15 @@ impl Found {
     }
 }
 
+/// What is known of the force by position.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Force<'r> {
+    /// Nothing.
+    Unknown,
+    /// It is subtracted from these recordings, and only a constant and a friction are left.
+    Held(&'r [&'r Recording]),
+}
+
 /// The reference model with the scales of the instruments and the direction state that suit the recordings.
 #[derive(Debug)]
 pub(super) struct Reference {
@@ -81,15 +90,25 @@ impl Reference {
     /// `None` if a term is not determined at all, by rounding.
     pub(super) fn new(
         recordings: &[&Recording],
+        force: Force<'_>,
         range_mm: [f64; 2],
         enough_strokes: bool,
     ) -> Option<Self> {
         let nodes = nodes(recordings, range_mm);
-        let instruments = instruments_of(recordings, &nodes, range_mm)?;
+        let unknown = match force {
+            Force::Held(_) => 1,
+            Force::Unknown => nodes.len(),
+        };
+        let within_mm = match force {
+            Force::Unknown => EVERYWHERE,
+            Force::Held(_) => range_mm,
+        };
+        let places = (&nodes[..], within_mm);
+        let instruments = instruments_of(recordings, places, unknown)?;
         let with = |rule: Rule| {
-            let rows = rows(recordings, &nodes, rule, &instruments);
+            let rows = rows(recordings, places, rule, &instruments);
             let samples = rows.len();
-            let equations = Equations::of(rows.into_iter(), samples, nodes.len());
+            let equations = Equations::of(rows.into_iter(), samples, unknown);
             let free = equations.free([true; 2], [true; 2]);
             let error = equations.total.error(&equations.solve(0, &free)?);
             Some((error, rule, estimates(&equations, &free)?))
@@ -116,14 +135,22 @@ impl Reference {
             tried.sort_by(|a, b| a.0.total_cmp(&b.0));
         }
         let (least, rule, _) = *tried.first()?;
-        let rows = rows(recordings, &nodes, rule, &instruments);
-        let equations = Equations::of(rows.iter().copied(), rows.len(), nodes.len());
+        let rows = rows(recordings, places, rule, &instruments);
+        let equations = Equations::of(rows.iter().copied(), rows.len(), unknown);
+        // friction does not push, but there may be less of it than in slow motion
+        let dissipation = match force {
+            Force::Unknown => Dissipation::of(&rows, nodes.len()),
+            Force::Held(whole) => {
+                let whole = self::rows(whole, places, rule, &instruments);
+                Dissipation::of(&whole, nodes.len())
+            }
+        };
         Some(Self {
             by_rule: (tried.iter())
                 .filter(|(error, ..)| *error <= NEARLY * least)
                 .map(|(.., estimates)| *estimates)
                 .collect(),
-            dissipation: Dissipation::of(&rows, nodes.len()),
+            dissipation,
             enough_strokes,
             rows,
             equations,
@@ -214,9 +241,10 @@ impl Reference {
 /// The instruments at the scales that show most of acceleration and velocity.
 fn instruments_of(
     recordings: &[&Recording],
-    nodes: &[f64],
-    [low, high]: [f64; 2],
+    places: (&[f64], [f64; 2]),
+    unknown: usize,
 ) -> Option<Vec<Instruments>> {
+    let (low, high) = (places.0.first()?, places.0.last()?);
     let delta_mm = USUAL_PLAY * (high - low);
     let rule = Rule {
         direction: Direction::Play { delta_mm },
@@ -228,9 +256,9 @@ fn instruments_of(
         let of: Vec<Instruments> = (recordings.iter())
             .map(|r| Instruments::new(r, width))
             .collect();
-        let rows = rows(recordings, nodes, rule, &of);
+        let rows = rows(recordings, places, rule, &of);
         let samples = rows.len();
-        let equations = Equations::of(rows.into_iter(), samples, nodes.len());
+        let equations = Equations::of(rows.into_iter(), samples, unknown);
         let free = equations.free([true; 2], [true; 2]);
         for (term, best) in best.iter_mut().enumerate() {
             let shown = shown_by(&equations, &free, term).unwrap_or(0.0);

@@ -97,6 +97,10 @@ impl Estimator for Mechanism {
         true
     }
 
+    fn is_table(&self) -> bool {
+        false
+    }
+
     fn claim(&self) -> Claim {
         Claim::Passive
     }

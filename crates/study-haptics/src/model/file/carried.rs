@@ -2,7 +2,7 @@
 
 use super::text::Text;
 use super::{PARAMETERS, SCALAR_KEYS, finite, numbers, positive};
-use crate::model::coverage::{Coverage, Covered, Determined, MOST_CELLS};
+use crate::model::coverage::{Coverage, Covered, Determined, MOST_CELLS, Origin};
 use crate::model::{Provenance, Units};
 use std::collections::BTreeMap;
 use study_base::diagnostic::table::Value;
@@ -122,8 +122,16 @@ fn determined(value: Value<'_, '_>) -> Option<Determined> {
     let value = optional("value", &|v| finite(&v));
     let standard_error = optional("standard_error", &not_negative);
     let upper_bound = optional("upper_bound", &|v| finite(&v));
+    let origin = match table.value("origin") {
+        None => Some(Origin::default()),
+        Some(value) => {
+            let all = [Origin::Training, Origin::Dynamic, Origin::Stated];
+            value.word(&all.map(|origin| (origin.as_str(), origin)))
+        }
+    };
     table.finish();
     Some(Determined {
+        origin: origin?,
         value: value?,
         standard_error: standard_error?,
         upper_bound: upper_bound?,
@@ -158,6 +166,9 @@ pub(super) fn write(out: &mut Text, provenance: &Provenance, own: Units) {
             if let Some(number) = number {
                 out.number(key, number);
             }
+        }
+        if known.origin != Origin::default() {
+            out.text("origin", known.origin.as_str());
         }
     }
 }
