@@ -1,7 +1,8 @@
 use super::*;
 use crate::recording::force_curve::{self, Source, Stated as OfCurve};
 
-const MODEL_FILE: &str = include_str!("../../../../protocols/keyboard/models/akko-blue.toml");
+/// A model file of an earlier release, so that the address of its bundle is that of then.
+const MODEL_FILE: &str = include_str!("../../tests/data/akko-blue.toml");
 const CURVE: &[u8] = include_bytes!("../../../../tests/data/switches/Akko_Blue_V2.csv");
 
 /// The recording of which protocols/keyboard/identify.sh made the model file.
