@@ -7,6 +7,7 @@ pub mod failure;
 mod amend;
 mod analyze;
 mod check;
+mod command_line;
 mod completions;
 mod device;
 mod device_selection;

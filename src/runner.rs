@@ -485,6 +485,7 @@ impl Runner {
             },
             servo_told: device.servo.is_some(),
             samples: &self.samples,
+            numbered: device.numbered,
             lost: playback.samples_lost,
             time_ratio: playback.time_ratio,
             host_late_s: playback.host_late_ms.map(|[_, most]| 1e-3 * most),

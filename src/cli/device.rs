@@ -4,6 +4,7 @@ mod check;
 mod commission;
 mod hold;
 pub(super) mod port;
+mod program;
 pub(super) mod record;
 mod rendered;
 mod rendering;
@@ -60,8 +61,14 @@ enum What {
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     match &args.what {
         What::List { json } => list(*json, console),
-        What::Info(args) => check::info(args, console),
-        What::Check(args) => check::check(args, console),
+        What::Info(args) => match args.address.is_program()? {
+            true => program::info(args, console),
+            false => check::info(args, console),
+        },
+        What::Check(args) => match !args.golden && args.address.is_program()? {
+            true => program::check(args, console),
+            false => check::check(args, console),
+        },
         What::Commission(args) => commission::run(args, console),
         What::Hold(args) => hold::run(args, console),
         What::Safety(args) => safety::run(args, console),

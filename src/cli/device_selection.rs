@@ -1,6 +1,6 @@
 //! Selection of the device from the protocol, the arguments and `device.toml`.
 
-use super::{Console, Failure};
+use super::{Console, Failure, command_line};
 use crate::rehearsal::with_manual_samples;
 use crate::tui;
 use serde::{Deserialize, Serialize};
@@ -39,7 +39,7 @@ pub(super) struct DeviceArgs {
 pub(super) struct DeviceAddress {
     #[command(flatten)]
     pub(super) serial: SerialPortArgs,
-    /// Program and arguments of a process device, separated by spaces
+    /// Program and arguments of a process device, quoted as for a shell
     #[arg(long, value_name = "COMMAND")]
     pub(super) command: Option<String>,
 }
@@ -174,11 +174,10 @@ impl DeviceAddress {
         }
     }
 
-    fn process(&self) -> Result<Vec<String>, Failure> {
-        let given = self.command.as_deref();
-        let given = given.map(|c| c.split_whitespace().map(str::to_owned).collect());
-        let command: Option<Vec<String>> = match given {
-            Some(command) => Some(command),
+    /// The program and its arguments.
+    pub(super) fn process(&self) -> Result<Vec<String>, Failure> {
+        let command: Option<Vec<String>> = match &self.command {
+            Some(command) => Some(command_line::words("--command", command)?),
             None => DeviceConfig::read(Path::new(CONFIG_FILE))?.process.command,
         };
         command.filter(|c| !c.is_empty()).ok_or_else(|| {

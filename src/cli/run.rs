@@ -3,6 +3,7 @@
 mod ending;
 mod hurry;
 mod page;
+mod unrendered;
 mod unsaved;
 
 use super::console::shell_command;
@@ -20,8 +21,6 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use study_analysis::load;
 use study_base::text::{PartId, ParticipantId, Untrusted};
-use study_device::Identity;
-use study_plan::protocol::DeviceKind;
 use study_session::session::roster::Newcomer;
 use study_session::session::{Config, Ending, MAX_OPERATOR, Roster};
 use study_session::store::{
@@ -72,8 +71,8 @@ pub(super) struct Args {
     #[arg(long, value_name = "ADDR", num_args = 0..=1, require_equals = true,
           default_missing_value = "127.0.0.1")]
     screen: Option<Address>,
-    /// A front of your own for the participant: a program and its arguments, separated by
-    /// spaces, that shows the pages of docs/page.md
+    /// A front of your own for the participant: a program and its arguments, quoted as for a
+    /// shell, that shows the pages of docs/page.md
     #[arg(long, value_name = "COMMAND", conflicts_with = "screen")]
     front: Option<String>,
     /// Do not use the mouse
@@ -170,7 +169,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let Some(device) = opened? else {
         return console.out("Nothing was recorded.\n");
     };
-    refuse_unrendered(&device.identity(), kind, &loaded)?;
+    unrendered::refuse_unrendered(&device.identity(), kind, &loaded)?;
     let (deliveries, said) = load::deliveries(&loaded)?;
     for notice in said {
         console.say(format!("warning: {}", Untrusted(&notice)));
@@ -354,53 +353,6 @@ fn check_ids(args: &Args) -> Result<Option<ParticipantId>, Failure> {
     let id = args.participant.as_deref().map(str::trim);
     let id = id.map(ParticipantId::new).transpose();
     id.map_err(|why| Failure::input(why).hint("use a pseudonym, such as P01"))
-}
-
-/// Refuses, before anything is recorded, a study with realizations that the device would
-/// refuse: mechanisms where it plays tables only, and what is stiffer than it renders.
-fn refuse_unrendered(
-    device: &Identity,
-    kind: DeviceKind,
-    loaded: &load::Loaded,
-) -> Result<(), Failure> {
-    if kind == DeviceKind::Manual {
-        return Ok(());
-    }
-    let protocol = &loaded.protocol;
-    let permitted = protocol.device.uncertified.as_ref().is_some_and(|u| u.play);
-    for model in protocol.models.iter().filter(|m| m.device.is_none()) {
-        let Some(table) = loaded.models.get(&model.id) else {
-            continue;
-        };
-        if table.mechanism.is_some() && !device.mechanisms {
-            return Err(Failure::device(format!(
-                "realization `{}` is a mechanism, and the device `{}` plays tables only",
-                model.id, device.id
-            ))
-            .hint("a serial device needs minor version 2 of docs/wire.md, a program `\"mechanisms\": true` in its hello; or take the realization out of the protocol"));
-        }
-        if table.elements.is_some() && !device.elements {
-            let (id, device) = (&model.id, &device.id);
-            return Err(Failure::device(format!("realization `{id}` is made of elements, which the device `{device}` does not play"))
-                .hint("a serial device needs the feature `elements` of docs/wire.md, minor version 2; or identify it as a table: --method passive"));
-        }
-        let certificate = table.certificate();
-        // as the device judges it: from minor version 1 on with the direction state
-        let asked = match device.servo {
-            Some(_) => certificate.rendered_n_per_mm(),
-            None => certificate.stiffness_n_per_mm,
-        };
-        if let Some(most) = device.stiffness_n_per_mm.filter(|most| asked > *most)
-            && !permitted
-        {
-            return Err(Failure::device(format!(
-                "realization `{}` has a stiffness of {asked:.1} N/mm, direction state included, and the device `{}` renders at most {most:.1} N/mm",
-                model.id, device.id
-            ))
-            .hint("identify it with a longer --delta or a smaller friction, or permit it: uncertified = { play = true, … }"));
-        }
-    }
-    Ok(())
 }
 
 /// The command line that resumes the session.

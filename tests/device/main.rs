@@ -10,6 +10,7 @@ mod playback;
 mod port;
 mod precision;
 mod process;
+mod process_check;
 mod rendering;
 mod safety;
 mod shipped;

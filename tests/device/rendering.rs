@@ -145,6 +145,7 @@ pub(crate) fn judged(
         },
         servo_told: true,
         samples: &heard.samples,
+        numbered: true,
         lost: heard.playback.map_or(0, |p| p.samples_lost),
         time_ratio: heard.playback.and_then(|p| p.time_ratio),
         host_late_s: None,

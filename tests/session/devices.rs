@@ -10,7 +10,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The protocol of the paper with one repetition and other changes.
-fn protocol(folder: &Path, changes: &[(&str, &str)]) -> PathBuf {
+pub(crate) fn protocol(folder: &Path, changes: &[(&str, &str)]) -> PathBuf {
     let to = folder.join("protocol");
     let changes = [&[("repetitions = 3", "repetitions = 1"), PATIENT], changes].concat();
     changed_protocol("turn-signal", &to, &changes);
@@ -18,7 +18,7 @@ fn protocol(folder: &Path, changes: &[(&str, &str)]) -> PathBuf {
 }
 
 /// `study run` on its first page.
-fn run(folder: &Path, protocol: &Path, more: &[&str]) -> Terminal {
+pub(crate) fn run(folder: &Path, protocol: &Path, more: &[&str]) -> Terminal {
     let path = protocol.to_str().unwrap();
     let arguments = [&["run", path, "--operator", "lw"], more].concat();
     let mut terminal = Terminal::start(&arguments, folder, 24, 80);
@@ -251,7 +251,7 @@ fn info_shows_the_identity_of_a_program() {
     let (code, out, err) = study(&check, folder.path());
     assert_eq!(code, 3, "{err}");
     assert!(
-        err.contains("the program does not answer in time"),
+        err.contains("the program violates clause load"),
         "{out}{err}"
     );
     assert_eq!(out.matches("FAIL").count(), 1, "{out}");

@@ -25,6 +25,7 @@ mod memory;
 mod mirror;
 mod parts_by_keys;
 mod plain;
+mod programs;
 mod rehearsed;
 mod release_0_1;
 mod screen;

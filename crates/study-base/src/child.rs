@@ -16,6 +16,8 @@ const MAX_LINE: u64 = 256 * 1024;
 const QUEUE_LINES: usize = 256;
 /// Time that a program has to end by itself once its input is closed.
 const EXIT_TIMEOUT: Duration = Duration::from_millis(300);
+/// Time that a program has for the same once it has violated the specification.
+const LAST_WORDS: Duration = Duration::from_millis(100);
 /// Time to wait for the exit status once the output is closed; a busy machine needs a
 /// moment between the two.
 const STATUS_TIMEOUT: Duration = Duration::from_secs(2);
@@ -201,6 +203,11 @@ impl Running {
             ChildFailure::Violation(_) => Duration::ZERO,
         };
         let ended = self.wait_for_exit(wait);
+        if ended.is_none() {
+            // It may still be able to switch its motor off.
+            self.close_input();
+            self.wait_for_exit(LAST_WORDS);
+        }
         // The program may have ended by itself.
         let _ = self.child.kill();
         let _ = self.child.wait();
@@ -220,7 +227,14 @@ impl Running {
         text
     }
 
-    fn wait_for_exit(&mut self, wait: Duration) -> Option<ExitStatus> {
+    /// Closes the program's input.
+    pub fn close_input(&mut self) {
+        let (closed, _) = sync_channel(0);
+        self.input = closed;
+    }
+
+    /// Waits at most `wait` for the end of the program.
+    pub fn wait_for_exit(&mut self, wait: Duration) -> Option<ExitStatus> {
         let until = Instant::now() + wait;
         loop {
             match self.child.try_wait() {
@@ -258,8 +272,7 @@ impl Drop for Running {
         if self.child.try_wait().is_ok_and(|ended| ended.is_some()) {
             return;
         }
-        let (closed, _) = sync_channel(0);
-        self.input = closed;
+        self.close_input();
         if self.wait_for_exit(EXIT_TIMEOUT).is_some() {
             return;
         }

@@ -15,6 +15,7 @@ mod strange;
 mod uploads;
 
 use super::link::LinkError;
+pub(super) use bounds::{Bound, outside, servo_bounds};
 use exchange::Exchange;
 use std::fmt::Display;
 use std::time::Duration;

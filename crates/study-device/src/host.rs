@@ -548,11 +548,13 @@ fn identity(device: &message::Identity) -> Option<Identity> {
         id: display_name(&device.serial),
         simulated: device.flags.simulated,
         telemetry: device.flags.telemetry,
+        numbered: true,
         limits: Limits::new(device.force_n, device.velocity_mm_s).ok()?,
         servo: device.constants.map(|told| servo(device, &told)),
         mechanisms: device.constants.is_some_and(|told| told.features.mechanism),
         elements: device.constants.is_some_and(|told| told.features.elements),
         stiffness_n_per_mm: Some(device.stiffness_n_per_mm),
+        stroke_mm: Some(device.stroke_mm),
         firmware: Some(display_name(&device.firmware)),
     })
 }

@@ -40,6 +40,8 @@ pub struct Identity {
     pub simulated: bool,
     /// Whether it reports samples during playback.
     pub telemetry: bool,
+    /// Whether it numbers them, so that it is known which are lost; a program does not.
+    pub numbered: bool,
     /// Limits that it never exceeds.
     pub limits: Limits,
     /// The constants of its servo, if it tells them.
@@ -50,7 +52,9 @@ pub struct Identity {
     pub elements: bool,
     /// Largest stiffness of a certified realization, N/mm, if it tells.
     pub stiffness_n_per_mm: Option<f64>,
-    /// The version of its firmware, if it tells it.
+    /// Positions that its handle can reach, mm, if it tells.
+    pub stroke_mm: Option<[f64; 2]>,
+    /// The version of its firmware, or of a program, if it tells it.
     pub firmware: Option<String>,
 }
 

@@ -82,12 +82,14 @@ impl Device for Manual {
             id: "manual".to_owned(),
             simulated: false,
             telemetry: false,
+            numbered: false,
             // No limit in practice, because a sample has no motor.
             limits: Limits::new(1e3, 1e5).expect("positive constants"),
             servo: None,
             mechanisms: false,
             elements: false,
             stiffness_n_per_mm: None,
+            stroke_mm: None,
             firmware: None,
         }
     }

@@ -7,34 +7,42 @@
 //! second. [`study_base::child`] contains the threads, `messages` the messages.
 //!
 //! The host cannot switch off the force of a program that it cannot reach. It therefore
-//! sends `limp`, sends `alive` as long as it polls, and closes the program's input when
-//! it ends. The program has to go limp when it receives `limp`, when `alive` stays away,
-//! and at the end of its input.
+//! sends `free`, sends `alive` as long as it polls, and closes the program's input when
+//! it ends. The program has to go limp when it receives `free`, which it confirms, when
+//! `alive` stays away, and at the end of its input. `check` tests that.
 
+pub mod check;
+mod error;
+mod hello;
 mod messages;
 
 use super::host::Arrivals;
 use super::table::TableError;
 use super::{Device, DeviceError, Identity, Report, Stimulus};
-use messages::{ChildMessage, Hello, MessageError};
+use error::MessageError;
+use messages::ChildMessage;
+use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 use study_base::child::{ChildFailure, RESTART_DELAY, Running};
 use study_base::limits::Limits;
 use study_session::outcome::{Playback, Sample};
 
-pub use messages::FORMAT;
+pub use error::FORMAT;
+pub use hello::Told;
 pub use study_base::child::HELLO_TIMEOUT;
 
 /// Largest number of lines processed per poll.
 const MAX_LINES_PER_POLL: usize = 2048;
 /// Time between two `alive` messages.
 const ALIVE_INTERVAL: Duration = Duration::from_millis(20);
+/// A program that has not confirmed `free` in this time is ended.
+const FREE_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// A controller program, connected by its standard streams.
 #[derive(Debug)]
 pub struct ProcessDevice {
     command: Vec<String>,
-    identity: Identity,
+    told: Told,
     child: Option<Running>,
     phase: Phase,
     /// Number of the current load; messages about earlier loads are ignored.
@@ -45,6 +53,8 @@ pub struct ProcessDevice {
     arrivals: Arrivals,
     /// When `alive` was last sent.
     alive_at: Duration,
+    /// Loads whose `free` is not confirmed, and when it was sent.
+    freed: VecDeque<(u64, Duration)>,
     reports: Vec<Report>,
     /// Last reported reason why no program is running.
     reported_loss: Option<String>,
@@ -95,8 +105,8 @@ impl Opening {
         };
         match hello {
             Err(failure) => Err(DeviceError::Lost(self.child.end(&failure))),
-            Ok(hello) => Ok(Opened::Device(Box::new(ProcessDevice {
-                identity: identity(hello),
+            Ok(told) => Ok(Opened::Device(Box::new(ProcessDevice {
+                told,
                 command: self.command,
                 child: Some(self.child),
                 phase: Phase::Idle,
@@ -104,6 +114,7 @@ impl Opening {
                 samples: 0,
                 arrivals: Arrivals::default(),
                 alive_at: Duration::ZERO,
+                freed: VecDeque::new(),
                 reports: Vec::new(),
                 reported_loss: None,
             }))),
@@ -172,6 +183,11 @@ impl ProcessDevice {
         &self.command
     }
 
+    /// What the program has told in its `hello`.
+    pub fn told(&self) -> &Told {
+        &self.told
+    }
+
     fn send(&mut self, line: String, at: Duration) {
         let Some(child) = &mut self.child else { return };
         if let Err(failure) = child.send(line) {
@@ -183,6 +199,7 @@ impl ProcessDevice {
     /// Ends the program. Repeated failures to restart it are reported only once.
     fn lose(&mut self, reason: String, at: Duration) {
         self.child = None;
+        self.freed.clear();
         let absent = matches!(self.phase, Phase::Lost { .. } | Phase::Opening { .. });
         if !absent || self.reported_loss.as_ref() != Some(&reason) {
             self.reports.push(Report::Lost(reason.clone()));
@@ -210,14 +227,18 @@ impl ProcessDevice {
 
     fn handle(&mut self, message: ChildMessage, at: Duration) -> Result<(), MessageError> {
         if let Phase::Opening { .. } = self.phase {
-            let identity = identity(message.hello()?);
-            if identity.id != self.identity.id {
-                return Err(MessageError::OtherDevice(identity.id));
+            let told = message.hello()?;
+            if told.identity.id != self.told.identity.id {
+                return Err(MessageError::OtherDevice(told.identity.id));
             }
-            self.identity = identity;
+            self.told = told;
             self.reported_loss = None;
             self.phase = Phase::Idle;
             self.reports.push(Report::Ready);
+            return Ok(());
+        }
+        if let ChildMessage::Free { load, .. } = message {
+            self.freed.retain(|(earlier, _)| *earlier > load);
             return Ok(());
         }
         if message.load().is_some_and(|load| load != self.load) {
@@ -278,6 +299,19 @@ impl ProcessDevice {
         Ok(())
     }
 
+    /// Ends a program that does not confirm that its force is off.
+    fn await_free(&mut self, at: Duration) {
+        let due =
+            (self.freed.front()).is_some_and(|(_, sent)| at.saturating_sub(*sent) > FREE_TIMEOUT);
+        if let (true, Some(child)) = (due, &mut self.child) {
+            let timeout = FREE_TIMEOUT.as_secs();
+            let why =
+                format!("it has not confirmed within {timeout} s that its force is off (`free`)");
+            let reason = child.end(&ChildFailure::Violation(why));
+            self.lose(reason, at);
+        }
+    }
+
     fn wrong_state(&self, command: &'static str) -> DeviceError {
         match self.phase {
             Phase::Lost { .. } | Phase::Opening { .. } => {
@@ -312,32 +346,18 @@ impl ProcessDevice {
 }
 
 impl Drop for ProcessDevice {
-    /// Sends `limp` before the input is closed.
+    /// Sends `free` before the input is closed.
     fn drop(&mut self) {
         if let Some(child) = &mut self.child {
             // A program that has ended cannot receive it.
-            let _ = child.send(messages::command("limp", self.load));
+            let _ = child.send(messages::command(self.told.free(), self.load));
         }
-    }
-}
-
-fn identity(hello: Hello) -> Identity {
-    Identity {
-        id: hello.id,
-        simulated: hello.simulated,
-        telemetry: hello.telemetry,
-        limits: hello.limits,
-        servo: None,
-        mechanisms: hello.mechanisms,
-        elements: false,
-        stiffness_n_per_mm: None,
-        firmware: None,
     }
 }
 
 impl Device for ProcessDevice {
     fn identity(&self) -> Identity {
-        self.identity.clone()
+        self.told.identity.clone()
     }
 
     fn load(
@@ -349,7 +369,9 @@ impl Device for ProcessDevice {
         if !matches!(self.phase, Phase::Idle | Phase::Loading | Phase::Loaded) {
             return Err(self.wrong_state("load"));
         }
-        if what.table.is_some_and(|table| table.mechanism.is_some()) && !self.identity.mechanisms {
+        if what.table.is_some_and(|table| table.mechanism.is_some())
+            && !self.told.identity.mechanisms
+        {
             return Err(DeviceError::Refused(TableError::Mechanism.to_string()));
         }
         if what.table.is_some_and(|table| table.elements.is_some()) {
@@ -359,7 +381,7 @@ impl Device for ProcessDevice {
         self.samples = 0;
         self.arrivals = Arrivals::default();
         self.phase = Phase::Loading;
-        let limits = limits.capped_at(self.identity.limits);
+        let limits = limits.capped_at(self.told.identity.limits);
         self.send(messages::load(self.load, what, limits), at);
         match self.phase {
             Phase::Loading => Ok(()),
@@ -390,7 +412,10 @@ impl Device for ProcessDevice {
     }
 
     fn limp(&mut self, at: Duration) {
-        self.send(messages::command("limp", self.load), at);
+        self.send(messages::command(self.told.free(), self.load), at);
+        if self.child.is_some() && !self.told.is_version_1 {
+            self.freed.push_back((self.load, at));
+        }
         // Later messages about this load are ignored.
         self.load += 1;
         if !matches!(self.phase, Phase::Lost { .. } | Phase::Opening { .. }) {
@@ -402,6 +427,7 @@ impl Device for ProcessDevice {
     fn poll(&mut self, at: Duration) -> Vec<Report> {
         self.restart(at);
         self.receive(at);
+        self.await_free(at);
         if at.saturating_sub(self.alive_at) >= ALIVE_INTERVAL {
             self.alive_at = at;
             self.send(messages::command("alive", self.load), at);

@@ -233,11 +233,13 @@ impl Device for VirtualDevice {
             id: "simulated".to_owned(),
             simulated: true,
             telemetry: true,
+            numbered: true,
             limits: firmware::Options::default().limits,
             servo: None,
             mechanisms: true,
             elements: true,
             stiffness_n_per_mm: None,
+            stroke_mm: None,
             firmware: None,
         })
     }

@@ -32,7 +32,10 @@ use defects::{Found, defects};
 use lasting::{largest_level, largest_mean, middles};
 use measured::measured;
 use moments::Moments;
-use motion::{explore, in_order, interval, longest_gap_s, repeated, unexplained_gaps};
+use motion::{
+    explore, in_order, interval, longest_gap_s, repeated, speed_late_ms, turns_lost,
+    unexplained_gaps,
+};
 use scale::Scale;
 use search::{delay, nearest};
 use shares::largest_share;
@@ -59,6 +62,8 @@ const SENSOR_N: f64 = 0.05;
 const MEASURED_EXCESS: (f64, f64) = (1.1, 0.5);
 /// A host that was later than this does not judge the clock of the device, s.
 const HOST_LATE_S: f64 = 0.03;
+/// Least rate of the steps into which the periods of a program are divided, Hz.
+const STEPS_HZ: f64 = 4000.0;
 /// Largest share of moving samples that repeat the one before.
 const MOST_REPEATED: f64 = 0.2;
 
@@ -75,6 +80,10 @@ pub struct Played<'a> {
     pub servo_told: bool,
     /// Its samples, in the order of arrival.
     pub samples: &'a [Sample],
+    /// Whether the device numbers its samples, so that [`Played::lost`] counts all that are
+    /// missing. The samples of a program are the turns of its loop: their times are uneven, and
+    /// a turn that came late is one that is lost.
+    pub numbered: bool,
     /// Number of samples that were lost.
     pub lost: u64,
     /// Time of the samples over time of the host.
@@ -85,18 +94,33 @@ pub struct Played<'a> {
     pub others: &'a [(ModelId, servo::Rendering<'a>)],
 }
 
+impl Played<'_> {
+    /// The servo whose steps explain the forces: that of a program, whose periods are uneven, in
+    /// steps that divide them.
+    fn stepped(&self) -> ServoSettings {
+        let divided = match self.numbered {
+            true => 1.0,
+            false => (STEPS_HZ / self.servo.servo_hz).ceil().max(1.0),
+        };
+        ServoSettings {
+            servo_hz: divided * self.servo.servo_hz,
+            ..self.servo
+        }
+    }
+}
+
 /// Judges a playback.
 pub fn judge(played: &Played<'_>, rules: &RenderingRules) -> Fidelity {
     let samples = in_order(played.samples);
+    let usual_s = interval(&samples);
+    let late = usual_s.filter(|_| !played.numbered);
+    let lost = played.lost as f64 + late.map_or(0.0, |usual_s| turns_lost(&samples, usual_s));
     let mut fidelity = Fidelity {
-        lost_share: share(
-            played.lost as f64,
-            played.samples.len() as f64 + played.lost as f64,
-        ),
+        lost_share: share(lost, played.samples.len() as f64 + lost),
         time_ratio: played.time_ratio,
         ..Fidelity::default()
     };
-    let Some(interval_s) = interval(&samples) else {
+    let Some(interval_s) = usual_s else {
         fidelity.verdict = Verdict::TooLittle;
         fidelity.because = Some("no samples".to_owned());
         return fidelity;
@@ -162,6 +186,10 @@ pub fn judge(played: &Played<'_>, rules: &RenderingRules) -> Fidelity {
         keep[i].then(|| [forces[i].force_n, samples[i].force_command_n])
     });
     fidelity.rendered_delay_ms = lag.map(|lag| 1e3 * interval_s * lag.steps);
+    let speed_late_ms = match played.numbered {
+        true => None,
+        false => speed_late_ms(&samples[..searched], interval_s),
+    };
     let nearest = nearest(played, &samples[..searched], &keep, interval_s, scale);
     fidelity.nearest_model = nearest.as_ref().map(|near| near.model.clone());
 
@@ -178,9 +206,10 @@ pub fn judge(played: &Played<'_>, rules: &RenderingRules) -> Fidelity {
         other: nearest.is_some_and(|near| near.explains),
         disordered: samples.len() < played.samples.len()
             || repeated(&samples).is_some_and(|share| share > MOST_REPEATED)
-            || unexplained_gaps(&samples, played.lost, interval_s),
+            || (played.numbered && unexplained_gaps(&samples, played.lost, interval_s)),
         enough: too_little.is_none(),
         host_in_time: played.host_late_s.is_none_or(|late| late < HOST_LATE_S),
+        speed_late_ms,
         felt_n: vibration::felt_n(played, scale),
         measured_n: sensed.and_then(|sensed| sensed.lasting_n),
         measured_range_share: of_range(sensed.and_then(|sensed| sensed.level_n), SENSOR_N),
@@ -215,13 +244,19 @@ fn settle(
         Verdict::Ok
     };
     // The limit holds whatever the constants of the servo are.
-    if fidelity.defects.contains(&Defect::OverLimit) {
+    if played.servo_told || fidelity.defects.contains(&Defect::OverLimit) {
         return;
     }
-    if !played.servo_told {
-        fidelity.only_flag("the device does not tell the constants of its servo");
+    // Other constants may make it another force; a wrong sign or clock is wrong with any.
+    if !fidelity.defects.is_empty() && fidelity.defects.iter().all(|d| d.may_be_constants()) {
+        fidelity.verdict = Verdict::Unverified;
+        fidelity.because = Some(format!("{UNTOLD}, and it is not that of docs/wire.md"));
     }
+    fidelity.only_flag(UNTOLD);
 }
+
+/// Why a wrong force is not held against a device.
+const UNTOLD: &str = "the device does not tell the constants of its servo";
 
 /// Whether the handle is in the range of the realization, and not at the wall beyond it.
 fn is_inside(played: &Played<'_>, sample: &Sample) -> bool {

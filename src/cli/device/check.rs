@@ -5,63 +5,60 @@ use super::record::{Record, RecordKind};
 use super::rendering;
 use super::single_playback::Pace;
 use crate::cli::device_selection::{
-    COMMISSIONED, COMMISSIONED_FILE, Commissioned, DeviceAddress, Tested, WaitDisplay,
+    COMMISSIONED, COMMISSIONED_FILE, Commissioned, DeviceAddress, Tested,
 };
 use crate::cli::{Console, Failure, Kind};
 use std::path::{Path, PathBuf};
 use study_base::text::Untrusted;
+use study_device::Device;
 use study_device::check::{self, Commissioning, Progress, Verdict};
 use study_device::host::{HostSettings, display_name};
 use study_device::link::{nonce, priority};
-use study_device::{Device, process};
 use study_wire::message::{Fault, Identity};
 
 /// Arguments of `study device info`.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct InfoArgs {
     #[command(flatten)]
-    address: DeviceAddress,
+    pub(super) address: DeviceAddress,
     /// Print one JSON document
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 }
 
 /// Arguments of `study device check`.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct CheckArgs {
     #[command(flatten)]
-    address: DeviceAddress,
+    pub(super) address: DeviceAddress,
     /// Do not play tables in which each term, look-up and direction rule counts, and judge each
     /// playback as in a session, while somebody moves the handle: a session for which the protocol
     /// asks for a check does not accept it
     #[arg(long)]
-    without_rendering: bool,
+    pub(super) without_rendering: bool,
     /// The default since release 0.2
     #[arg(long, hide = true, conflicts_with = "without_rendering")]
     rendering: bool,
     /// Print all messages of the wire format with their bytes, as JSON, and end
     #[arg(long, exclusive = true)]
-    golden: bool,
+    pub(super) golden: bool,
     /// Also play each table of this study and compare the rendered force with the table
     #[arg(long, value_name = "PROTOCOL")]
-    models: Option<PathBuf>,
+    pub(super) models: Option<PathBuf>,
     /// Save the result in devices/ of the results folder, where sessions look for it, and in
     /// device-check.json
     #[arg(long)]
-    save: bool,
+    pub(super) save: bool,
     /// Folder of all results
     #[arg(long, value_name = "DIR", default_value = "results")]
-    results: PathBuf,
+    pub(super) results: PathBuf,
     /// Print one JSON document
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 }
 
 /// Prints identity and limits of a device.
 pub(in crate::cli) fn info(args: &InfoArgs, console: &mut Console) -> Result<(), Failure> {
-    if args.address.is_program()? {
-        return program(args, console);
-    }
     let mut connection = PortConnection::open(&args.address.serial)?;
     let address = connection.address.clone();
     let device = check::identify(&mut connection, nonce()).map_err(|error| {
@@ -111,57 +108,18 @@ pub(in crate::cli) fn info(args: &InfoArgs, console: &mut Console) -> Result<(),
     console.out(aligned(&lines))
 }
 
-fn at_most(value: f64, unit: &str) -> String {
+pub(super) fn at_most(value: f64, unit: &str) -> String {
     format!("at most {value} {unit}")
 }
 
 /// The features that a device has.
-fn list(features: &[(bool, &str)]) -> String {
+pub(super) fn list(features: &[(bool, &str)]) -> String {
     let present = features.iter().filter(|(present, _)| *present);
     let names: Vec<&str> = present.map(|(_, name)| *name).collect();
     names.join(", ")
 }
 
-/// Prints identity and limits of a controller program.
-fn program(args: &InfoArgs, console: &mut Console) -> Result<(), Failure> {
-    let mut display = WaitDisplay::in_a_line(console);
-    let Some(device) = args.address.open_program(&mut display)? else {
-        return Ok(());
-    };
-    let (command, device) = (device.command().join(" "), device.identity());
-    let force_n = device.limits.force_n.get();
-    let velocity_mm_s = device.limits.velocity_mm_s.get();
-    if args.json {
-        let document = serde_json::json!({
-            "format": "study-device-info/1",
-            "command": command,
-            "device": {
-                "id": device.id,
-                "language": process::FORMAT,
-                "simulated": device.simulated,
-                "telemetry": device.telemetry,
-                "force_n": force_n,
-                "velocity_mm_s": velocity_mm_s,
-            },
-        });
-        return console.json(&document);
-    }
-    let features = [
-        (device.simulated, "simulated: every session is a pilot"),
-        (device.telemetry, "telemetry"),
-    ];
-    let lines = [
-        ("program", Untrusted(&command).to_string()),
-        ("id", Untrusted(&device.id).to_string()),
-        ("messages", process::FORMAT.to_owned()),
-        ("features", list(&features)),
-        ("force", at_most(force_n, "N")),
-        ("velocity", at_most(velocity_mm_s, "mm/s")),
-    ];
-    console.out(aligned(&lines))
-}
-
-fn aligned(lines: &[(&str, String)]) -> String {
+pub(super) fn aligned(lines: &[(&str, String)]) -> String {
     let line = |(what, value): &(&str, String)| format!("{what:<14} {value}\n");
     lines.iter().map(line).collect()
 }
@@ -192,9 +150,6 @@ fn described(device: &Identity) -> serde_json::Value {
 pub(in crate::cli) fn check(args: &CheckArgs, console: &mut Console) -> Result<(), Failure> {
     if args.golden {
         return console.document(GOLDEN);
-    }
-    if args.address.is_program()? {
-        return program_rendering(args, console);
     }
     // A host that is late says nothing of the device.
     priority::raise();
@@ -293,7 +248,7 @@ pub(in crate::cli) fn check(args: &CheckArgs, console: &mut Console) -> Result<(
 }
 
 /// Plays the tables of the rendering check and prints each result.
-fn judge_rendering(
+pub(super) fn judge_rendering(
     device: &mut dyn Device,
     middle_mm: f64,
     console: &mut Console,
@@ -317,62 +272,6 @@ fn middle(low: f64, high: f64) -> f64 {
 /// The golden bytes of docs/wire.md.
 const GOLDEN: &str = include_str!("../../../docs/wire-frames.json");
 
-/// The rendering of a controller program: it has no clauses of the wire format.
-fn program_rendering(args: &CheckArgs, console: &mut Console) -> Result<(), Failure> {
-    if args.models.is_some() {
-        return Err(Failure::usage("--models needs a device on a port"));
-    }
-    let mut display = WaitDisplay::in_a_line(console);
-    let Some(mut device) = args.address.open_program(&mut display)? else {
-        return Ok(());
-    };
-    let all = judge_rendering(&mut device, PROGRAM_MIDDLE_MM, console, args.json)?;
-    let [passed, failed, open] = rendering::tally(&all);
-    let summary = format!(
-        "rendering: {passed} of {} passed, {failed} failed, {open} not judged",
-        all.len()
-    );
-    let pass = passed == all.len();
-    if args.save {
-        let parts = serde_json::json!({ "rendering": all });
-        let tested = Tested::of(&device);
-        let record = Record::new(RecordKind::Check, tested, pass, summary.clone(), parts);
-        let path = record.save(&args.results)?;
-        console.say(format!("saved: {}", path.display()));
-    }
-    if args.json {
-        let document = serde_json::json!({
-            "format": "study-device-check/1",
-            "device": device.identity().id,
-            "pass": pass,
-            "rendering": all,
-        });
-        console.json(&document)?;
-    } else {
-        console.out(format!("{summary}\n"))?;
-    }
-    if pass {
-        return Ok(());
-    }
-    if all.iter().any(|line| line.is_silent) {
-        return Err(Failure::device("the program does not answer in time")
-            .hint("it has to answer load, start and stop as docs/devices.md says"));
-    }
-    if failed == 0 {
-        return Err(
-            Failure::device(format!("{open} of {} tables were not judged", all.len()))
-                .hint("the lines above say why; nothing was found wrong"),
-        );
-    }
-    Err(
-        Failure::device("the program does not render its tables as the servo of docs/wire.md")
-            .hint("a program with other constants is only marked in sessions; docs/devices.md"),
-    )
-}
-
-/// Middle of the tables for a program, which tells no stroke, mm.
-const PROGRAM_MIDDLE_MM: f64 = 17.5;
-
 fn save(result: &Commissioning) -> Result<(), Failure> {
     let Some(device) = &result.device else {
         return Ok(());
@@ -390,17 +289,23 @@ fn save(result: &Commissioning) -> Result<(), Failure> {
     std::fs::write(path, text + "\n").map_err(|e| Failure::file(path, &e))
 }
 
-fn line(verdict: &Verdict) -> String {
+pub(super) fn line(verdict: &Verdict) -> String {
     let mark = match (verdict.pass, verdict.judged) {
         (true, _) => "pass",
         (false, true) => "FAIL",
         (false, false) => "open",
     };
     format!(
-        "{mark}  {:<5} {}\n            {}\n",
+        "{mark}  {:<width$} {}\n            {}\n",
         verdict.clause,
         verdict.what,
-        Untrusted(&verdict.seen)
+        Untrusted(&verdict.seen),
+        // those of a program have names
+        width = if verdict.clause.starts_with(char::is_numeric) {
+            5
+        } else {
+            7
+        },
     )
 }
 

@@ -1,6 +1,6 @@
 //! The participant's screen before the session: link and code of the page, or a front's hello.
 
-use super::super::{Console, Failure, Kind};
+use super::super::{Console, Failure, Kind, command_line};
 use crate::front::Front;
 use crate::screen::{Address, Screen, ScreenError, secret};
 use crossterm::event::{self, Event, KeyCode};
@@ -44,7 +44,7 @@ pub(super) fn open(
 pub(super) fn start(command: &str, protocol: &Protocol) -> Result<Front, Failure> {
     has_use(protocol, "--front")?;
     let words = protocol.text.phrases();
-    let command = command.split_whitespace().map(str::to_owned).collect();
+    let command = command_line::words("--front", command)?;
     let run = secret().map_err(|e| unusable(&e))?;
     let front = Front::open(command, run, protocol.text.lang.as_deref(), &words);
     front.map_err(|error| {

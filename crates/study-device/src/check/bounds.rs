@@ -4,9 +4,10 @@
 use super::exchange::Exchange;
 use super::{ClauseResult, fail};
 use study_wire::message::{Constants, Identity, MINOR};
+use study_wire::servo::ServoSettings;
 
 /// A number with the least and the largest value that it may have.
-type Bound = (&'static str, f64, f64, f64, &'static str);
+pub(crate) type Bound = (&'static str, f64, f64, f64, &'static str);
 
 /// What a force or a position in TELEMETRY can hold, N, mm and mm/s.
 const LARGEST: f64 = 2147.0;
@@ -50,9 +51,24 @@ pub(super) fn limits(device: &Identity) -> Option<String> {
 
 /// The first of the constants that is out of its bounds.
 pub(super) fn constants(told: &Constants) -> Option<String> {
-    // A device that renders every mass tells −∞.
-    let least_kg = told.least_mass_kg.max(-10.0);
-    let bounds: [Bound; 9] = [
+    outside(&servo_bounds(&ServoSettings {
+        acceleration_hz: told.acceleration_hz,
+        // A device that renders every mass tells −∞.
+        least_mass_kg: told.least_mass_kg.max(-10.0),
+        damping_n_s_per_mm: told.damping_n_s_per_mm,
+        wall_n_per_mm: told.wall_n_per_mm,
+        wall_n_s_per_mm: told.wall_n_s_per_mm,
+        overtravel_mm: told.overtravel_mm,
+        jump_mm: told.jump_mm,
+        slew_n_s: told.slew_n_s,
+        ramp_s: told.ramp_s,
+        ..ServoSettings::default()
+    }))
+}
+
+/// The bounds of the constants of a servo.
+pub(crate) fn servo_bounds(told: &ServoSettings) -> [Bound; 9] {
+    [
         (
             "acceleration filter",
             told.acceleration_hz,
@@ -60,7 +76,7 @@ pub(super) fn constants(told: &Constants) -> Option<String> {
             200.0,
             "Hz",
         ),
-        ("least mass", least_kg, -10.0, 0.0, "kg"),
+        ("least mass", told.least_mass_kg, -10.0, 0.0, "kg"),
         (
             "added damping",
             told.damping_n_s_per_mm,
@@ -80,11 +96,11 @@ pub(super) fn constants(told: &Constants) -> Option<String> {
         ("jump", told.jump_mm, 0.01, 10.0, "mm"),
         ("slew limit", told.slew_n_s, 1e3, 1e6, "N/s"),
         ("ramp", told.ramp_s, 0.1, 1.0, "s"),
-    ];
-    outside(&bounds)
+    ]
 }
 
-fn outside(bounds: &[Bound]) -> Option<String> {
+/// The first number that is out of its bounds, in words.
+pub(crate) fn outside(bounds: &[Bound]) -> Option<String> {
     let (what, value, low, high, unit) = bounds
         .iter()
         .find(|(_, value, low, high, _)| !(low..=high).contains(&value))?;

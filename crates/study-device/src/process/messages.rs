@@ -1,49 +1,12 @@
 //! Messages between host and program, one JSON object per line.
 
+use super::error::{MAX_SAMPLES, MessageError, short_text};
+use super::hello::{Hello, Told};
 use crate::Stimulus;
 use serde::Deserialize;
 use serde_json::{Value, json};
-use study_base::child::{ChildFailure, MAX_TEXT};
 use study_base::limits::Limits;
-use study_base::text::{Untrusted, beginning};
 use study_session::outcome::{Playback, Sample};
-
-/// Version of the messages, stated in the program's `hello`.
-pub const FORMAT: &str = "study-process/1";
-
-/// Longest device id, characters.
-const MAX_ID: usize = 64;
-/// Largest number of samples in one line.
-const MAX_SAMPLES: usize = 4096;
-
-/// Why a message of a program is rejected.
-#[derive(Debug, thiserror::Error)]
-pub(super) enum MessageError {
-    /// Not valid JSON of a known message; the error and the line.
-    #[error("{0}: {1}")]
-    Json(serde_json::Error, String),
-    #[error("more than {MAX_SAMPLES} samples in one line")]
-    TooManySamples,
-    #[error("it uses the format `{format}`; this program supports {FORMAT}", format = Untrusted(.0))]
-    Format(String),
-    #[error("its id needs 1 to {MAX_ID} characters")]
-    Id,
-    #[error("it sends `{0}` before `hello`")]
-    NoHello(&'static str),
-    #[error("it is another device than before, `{id}`", id = Untrusted(.0))]
-    OtherDevice(String),
-    #[error("it sends `{message}` while {state}")]
-    WrongState {
-        message: &'static str,
-        state: &'static str,
-    },
-}
-
-impl From<MessageError> for ChildFailure {
-    fn from(error: MessageError) -> Self {
-        Self::Violation(error.to_string())
-    }
-}
 
 /// A message of a program.
 #[derive(Debug, Deserialize)]
@@ -69,35 +32,27 @@ pub(super) enum ChildMessage {
         strokes: u32,
         clamps: u64,
     },
+    /// Version 1 has another word for it.
+    #[serde(alias = "outcome")]
     Stopped {
         load: u64,
         #[serde(flatten)]
         outcome: PlaybackOutcome,
+    },
+    /// The force is off, as was asked; with the sample after that.
+    Free {
+        load: u64,
+        sample: Option<SampleRow>,
     },
     Fault {
         what: String,
     },
 }
 
-/// Identity and limits of a program.
-#[derive(Debug, Deserialize)]
-pub(super) struct Hello {
-    pub(super) format: String,
-    pub(super) id: String,
-    pub(super) telemetry: bool,
-    /// Whether it is simulated, without motor and hand.
-    #[serde(default)]
-    pub(super) simulated: bool,
-    /// Whether it plays mechanisms, and not only tables.
-    #[serde(default)]
-    pub(super) mechanisms: bool,
-    pub(super) limits: Limits,
-}
-
 /// Outcome of a playback.
 #[derive(Debug, Deserialize)]
 pub(super) struct PlaybackOutcome {
-    duration_s: f64,
+    pub(super) duration_s: f64,
     strokes: u32,
     least_energy_j: f64,
     switches_per_s: f64,
@@ -105,7 +60,7 @@ pub(super) struct PlaybackOutcome {
 }
 
 /// t in s, x in mm, v in mm/s, commanded force in N, measured force in N or null.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Clone, Deserialize)]
 pub(super) struct SampleRow(f64, f64, f64, f64, Option<f64>);
 
 impl From<SampleRow> for Sample {
@@ -137,15 +92,9 @@ impl From<PlaybackOutcome> for Playback {
 }
 
 impl ChildMessage {
-    pub(super) fn hello(self) -> Result<Hello, MessageError> {
+    pub(super) fn hello(self) -> Result<Told, MessageError> {
         match self {
-            Self::Hello(hello) if hello.format != FORMAT => {
-                Err(MessageError::Format(short_text(&hello.format)))
-            }
-            Self::Hello(hello) if hello.id.is_empty() || hello.id.chars().count() > MAX_ID => {
-                Err(MessageError::Id)
-            }
-            Self::Hello(hello) => Ok(hello),
+            Self::Hello(hello) => hello.told(),
             other => Err(MessageError::NoHello(other.as_str())),
         }
     }
@@ -159,7 +108,8 @@ impl ChildMessage {
             | Self::Started { load }
             | Self::Samples { load, .. }
             | Self::Progress { load, .. }
-            | Self::Stopped { load, .. } => Some(*load),
+            | Self::Stopped { load, .. }
+            | Self::Free { load, .. } => Some(*load),
         }
     }
 
@@ -171,7 +121,8 @@ impl ChildMessage {
             Self::Started { .. } => "started",
             Self::Samples { .. } => "samples",
             Self::Progress { .. } => "progress",
-            Self::Stopped { .. } => "stopped",
+            Self::Stopped { .. } => "outcome",
+            Self::Free { .. } => "free",
             Self::Fault { .. } => "fault",
         }
     }
@@ -195,16 +146,11 @@ pub(super) fn read(line: &[u8]) -> Result<ChildMessage, MessageError> {
     Ok(message)
 }
 
-/// The beginning of a program's text.
-pub(super) fn short_text(text: &str) -> String {
-    beginning(text, MAX_TEXT)
-}
-
 fn line(value: &Value) -> String {
     format!("{value}\n")
 }
 
-/// The command `start`, `stop`, `limp` or `alive`.
+/// The command `start`, `stop`, `free`, `limp` or `alive`.
 pub(super) fn command(name: &str, load: u64) -> String {
     line(&json!({"do": name, "load": load}))
 }
@@ -255,6 +201,7 @@ pub(super) fn load(number: u64, what: &Stimulus<'_>, limits: Limits) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use study_base::child::MAX_TEXT;
 
     #[test]
     fn messages_that_violate_the_specification_are_rejected() {
@@ -278,10 +225,10 @@ mod tests {
             let error = read(line.as_bytes()).unwrap_err().to_string();
             assert!(error.contains(why), "{line}: {error}");
         }
-        let other = r#"{"say":"hello","format":"study-process/2","id":"a","telemetry":true,"limits":{"force_n":1,"velocity_mm_s":1}}"#;
+        let other = r#"{"say":"hello","format":"study-process/7","id":"a","telemetry":true,"limits":{"force_n":1,"velocity_mm_s":1}}"#;
         let error = read(other.as_bytes()).unwrap().hello().unwrap_err();
         let error = error.to_string();
-        assert!(error.contains("study-process/1"), "{error}");
+        assert!(error.contains("study-process/2"), "{error}");
     }
 
     #[test]

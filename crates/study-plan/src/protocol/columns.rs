@@ -323,7 +323,7 @@ table! {
             .empty(NEVER_PRESENTED).with_replays(),
         Rendering: level("rendering", &[
             ("ok", "the force was that of the table"),
-            ("unverified", "the device reports no samples, or plays no table"),
+            ("unverified", "the device reports no samples or plays no table, or does not tell the constants that its force depends on"),
             ("too-little", "too little was felt or reported to judge it"),
             ("flag", "the force was not that of the table, and the protocol marks it"),
             ("fault", "the force was not that of the table, and the attempt failed"),

@@ -67,6 +67,17 @@ impl Defect {
     pub fn is_grave(self) -> bool {
         matches!(self, Self::OverLimit | Self::OtherTable | Self::Sign)
     }
+
+    /// Whether a right device whose servo has other constants than those of docs/wire.md may
+    /// show it.
+    pub fn may_be_constants(self) -> bool {
+        match self {
+            Self::Shape | Self::Gain | Self::Bias | Self::Delay | Self::Error => true,
+            Self::Vibration | Self::Constants | Self::OtherTable => true,
+            Self::OverLimit | Self::Sign => false,
+            Self::Measured | Self::Speed | Self::Clock | Self::Samples => false,
+        }
+    }
 }
 
 /// What was found about one playback. `None`: not known, or not defined.

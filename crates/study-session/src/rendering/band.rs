@@ -6,7 +6,7 @@
 //! leaves the force open: such samples, and those that were lost, are not judged.
 
 use super::comparable::{by_sign, unknown_s};
-use super::predicted::{GAP_S, Predicted, predicted};
+use super::predicted::{GAP_S, Predicted, accelerations, predicted};
 use super::{Played, REST_MM_S};
 use crate::outcome::Sample;
 use study_wire::predict::{BranchView, TableView};
@@ -94,6 +94,7 @@ fn sides(played: &Played<'_>, samples: &[Sample]) -> Option<[Vec<Predicted>; 2]>
     let Law::Table { table, rule } = played.what.law else {
         return None;
     };
+    let a_m_s2 = accelerations(samples, played.numbered);
     let side = |branch: BranchView<'_>| {
         let table = TableView {
             positive: branch,
@@ -104,7 +105,7 @@ fn sides(played: &Played<'_>, samples: &[Sample]) -> Option<[Vec<Predicted>; 2]>
             law: Law::Table { table, rule },
             ..played.what
         };
-        predicted(&what, played.servo, samples, |_| 0.0)
+        predicted(&what, played.stepped(), samples, |i| a_m_s2[i])
     };
     Some([side(table.positive), side(table.negative)])
 }

@@ -1,7 +1,7 @@
 //! Which samples of a playback are compared with the table, and whether they are enough.
 
 use super::moments::Moments;
-use super::predicted::{APART, GAP_S, Predicted, acceleration, predicted};
+use super::predicted::{APART, GAP_S, Predicted, accelerations, predicted};
 use super::scale::Scale;
 use super::{Played, REST_MM_S, ROUNDING_N, WINDOW_S};
 use crate::outcome::{Fidelity, Sample};
@@ -32,20 +32,33 @@ const MOST_DOUBT: (f64, f64) = (0.1, 0.5);
 /// servo period and among lost samples; the deflection of a mechanism is open by half a step.
 pub(super) fn with_doubt(played: &Played<'_>, samples: &[Sample]) -> Vec<Predicted> {
     let (what, servo) = (&played.what, played.servo);
-    let mut forces = predicted(what, servo, samples, |_| 0.0);
+    let stepped = played.stepped();
+    let a_m_s2 = accelerations(samples, played.numbered);
+    let mut forces = predicted(what, stepped, samples, |i| a_m_s2[i]);
     // The largest acceleration in that band within half a step.
     let band = std::f64::consts::TAU * servo.acceleration_hz;
     let half_mm = 0.5 * step_mm(samples);
     let swings_n: Vec<f64> = forces.iter().map(|p| p.ends_n[1] - p.ends_n[0]).collect();
     let more_m_s2 = |i: usize| {
-        1e-3 * half_mm * band * band
-            + jerk(samples, i) / servo.servo_hz
-            + among_lost_m_s2(samples, i, half_mm, swings_n[i])
+        let among_lost = among_lost_m_s2(samples, &a_m_s2, i, half_mm, swings_n[i]);
+        match played.numbered {
+            // The program filters the same steps.
+            false => among_lost,
+            true => {
+                1e-3 * half_mm * band * band
+                    + jerk(samples, &a_m_s2, i) / servo.servo_hz
+                    + among_lost
+            }
+        }
     };
-    let mut others = vec![predicted(what, servo, samples, more_m_s2)];
+    let mut others = vec![predicted(what, stepped, samples, |i| {
+        a_m_s2[i] + more_m_s2(i)
+    })];
     // At a limit of the force only one side shows.
     if forces.iter().any(|p| p.after_gap) {
-        others.push(predicted(what, servo, samples, |i| -more_m_s2(i)));
+        others.push(predicted(what, stepped, samples, |i| {
+            a_m_s2[i] - more_m_s2(i)
+        }));
     }
     let deflection_n = half_mm * stiffness_n_per_mm(&what.law);
     for (i, force) in forces.iter_mut().enumerate() {
@@ -59,7 +72,13 @@ pub(super) fn with_doubt(played: &Played<'_>, samples: &[Sample]) -> Vec<Predict
 /// that between both ends, m/s²: the change from one to the other, which may have come at once,
 /// twice what the speeds tell of the mean, what two steps of the position in each millisecond do to
 /// them, and what the force did to the handle meanwhile.
-fn among_lost_m_s2(samples: &[Sample], i: usize, half_mm: f64, swing_n: f64) -> f64 {
+fn among_lost_m_s2(
+    samples: &[Sample],
+    a_m_s2: &[f64],
+    i: usize,
+    half_mm: f64,
+    swing_n: f64,
+) -> f64 {
     let Some(before) = i.checked_sub(1) else {
         return 0.0;
     };
@@ -67,17 +86,17 @@ fn among_lost_m_s2(samples: &[Sample], i: usize, half_mm: f64, swing_n: f64) -> 
     if gap_s <= GAP_S {
         return 0.0;
     }
-    let ends = [before, i].map(|i| acceleration(samples, i));
+    let ends = [before, i].map(|i| a_m_s2[i]);
     let mean_m_s2 = 1e-3 * (samples[i].v_mm_s - samples[before].v_mm_s) / gap_s;
     let apart_m_s2 = mean_m_s2 - 0.5 * (ends[0] + ends[1]);
     (ends[1] - ends[0]).abs() + 2.0 * apart_m_s2.abs() + 4.0 * half_mm / gap_s + swing_n / HANDLE_KG
 }
 
 /// Size of the change of the acceleration, m/s³.
-fn jerk(samples: &[Sample], i: usize) -> f64 {
+fn jerk(samples: &[Sample], a_m_s2: &[f64], i: usize) -> f64 {
     let (before, after) = (i.saturating_sub(APART), (i + APART).min(samples.len() - 1));
     let time_s = samples[after].t_s - samples[before].t_s;
-    let change = acceleration(samples, after) - acceleration(samples, before);
+    let change = a_m_s2[after] - a_m_s2[before];
     if time_s > 0.0 {
         (change / time_s).abs()
     } else {

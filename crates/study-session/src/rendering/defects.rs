@@ -21,6 +21,8 @@ pub(super) struct Found {
     pub(super) disordered: bool,
     pub(super) enough: bool,
     pub(super) host_in_time: bool,
+    /// By how much the speed of a program is late, ms.
+    pub(super) speed_late_ms: Option<f64>,
     /// Vibration that is felt, N.
     pub(super) felt_n: f64,
     /// Largest difference of measured and commanded force that lasted 20 ms, N, and its largest
@@ -108,10 +110,8 @@ pub(super) fn defects(fidelity: &Fidelity, found: &Found, rules: &RenderingRules
     if weak || at_times || over(fidelity.measured_error_n, rules.max_measured_error_n) {
         all.push(Defect::Measured);
     }
-    if fidelity
-        .speed_gain
-        .is_some_and(|gain| (gain - 1.0).abs() > SPEED_ERROR)
-    {
+    let other_speed = (fidelity.speed_gain).is_some_and(|gain| (gain - 1.0).abs() > SPEED_ERROR);
+    if other_speed || over(found.speed_late_ms, rules.max_delay_ms) {
         all.push(Defect::Speed);
     }
     let off = |ratio: f64| (ratio - 1.0).abs() > TIME_ERROR;

@@ -1,8 +1,13 @@
 //! The motion of the handle in a playback, and whether its samples are in order.
 
 use super::comparable::SLOW_S;
+use super::predicted::GAP_S;
+use super::search::delay;
 use super::{Played, REST_MM_S, WINDOW_S, share};
 use crate::outcome::{Fidelity, Sample};
+
+/// A longer time between two samples than this many usual ones is no jitter.
+const JITTER: f64 = 2.0;
 
 /// The finite samples with ascending times.
 pub(super) fn in_order(samples: &[Sample]) -> Vec<Sample> {
@@ -35,6 +40,15 @@ pub(super) fn longest_gap_s(samples: &[Sample], interval_s: f64) -> f64 {
     let first_s = samples.first().map_or(0.0, |first| first.t_s);
     let gaps = samples.windows(2).map(|w| w[1].t_s - w[0].t_s - interval_s);
     gaps.fold(first_s.max(0.0), f64::max)
+}
+
+/// Turns of a program's loop that did not come: what a pause leaves out that is longer than
+/// jitter and than the pauses after which filters settle again.
+pub(super) fn turns_lost(samples: &[Sample], interval_s: f64) -> f64 {
+    let least_s = GAP_S.max(JITTER * interval_s);
+    let pauses = samples.windows(2).map(|w| w[1].t_s - w[0].t_s);
+    let late = pauses.filter(|pause_s| *pause_s > least_s);
+    late.map(|pause_s| pause_s / interval_s - 1.0).sum()
 }
 
 /// Whether more samples are missing than the device says.
@@ -89,6 +103,19 @@ pub(super) fn explore(
     if interval_s <= SLOW_S && f64::max(xx, vv) > n * rest_mm * rest_mm {
         fidelity.speed_gain = Some(if xx > 0.0 { xv / xx } else { f64::MAX });
     }
+}
+
+/// By how much later than the change of the position the speed of a program comes, ms: its forces are
+/// predicted with that speed.
+pub(super) fn speed_late_ms(samples: &[Sample], interval_s: f64) -> Option<f64> {
+    let change = |i: usize| {
+        let (before, after) = (samples.get(i.checked_sub(1)?)?, samples.get(i + 1)?);
+        Some((after.x_mm - before.x_mm) / (after.t_s - before.t_s))
+    };
+    let lag = delay(samples, interval_s, |i| {
+        Some([change(i)?, samples[i].v_mm_s])
+    })?;
+    Some(1e3 * interval_s * lag.steps)
 }
 
 /// Share of moving samples that repeat the one before.

@@ -51,12 +51,12 @@ impl Predicted {
 /// The force at each sample. The samples are finite and in the order of time.
 ///
 /// Between two samples the motion is interpolated, so that the servo runs at its own
-/// rate. `more_m_s2` of a sample is added to its acceleration.
+/// rate. `acceleration_m_s2` is that of a sample.
 pub(super) fn predicted(
     what: &Rendering<'_>,
     settings: ServoSettings,
     samples: &[Sample],
-    more_m_s2: impl Fn(usize) -> f64,
+    acceleration_m_s2: impl Fn(usize) -> f64,
 ) -> Vec<Predicted> {
     // The device trips by its own measurements; here every sample has a force.
     let mut servo = Servo::new(ServoSettings {
@@ -70,6 +70,8 @@ pub(super) fn predicted(
     let most = ((LONGEST_GAP_S + settings.ramp_s) * hz).ceil();
     let mut all = Vec::with_capacity(samples.len());
     let mut before: Option<(f64, Motion)> = None;
+    // What the whole steps so far have left of the time, in steps.
+    let mut left = 0.0;
     let mut settled_from_s = 0.0;
     // Positions since the last gap, until they cover what the direction depends on.
     let mut since_gap: Option<[f64; 2]> = None;
@@ -79,7 +81,7 @@ pub(super) fn predicted(
         let here = Motion {
             x_mm: sample.x_mm,
             v_mm_s: sample.v_mm_s,
-            a_m_s2: acceleration(samples, i) + more_m_s2(i),
+            a_m_s2: acceleration_m_s2(i),
         };
         // A playback begins at its servo period 0 with the first motion that is known.
         let (from_s, from) = before.unwrap_or((-1.0 / hz, here));
@@ -97,7 +99,9 @@ pub(super) fn predicted(
                 .filter(|[low, high]| high - low < memory_mm)
         };
         (since_gap, since_turn) = (covering(since_gap), covering(since_turn));
-        let steps = (apart_s * hz).round().clamp(1.0, most) as u32;
+        let due = apart_s * hz + left;
+        let steps = due.round().clamp(1.0, most) as u32;
+        left = (due - f64::from(steps)).clamp(-1.0, 1.0);
         let mut force_n = 0.0;
         let mut ends_n = [f64::INFINITY, f64::NEG_INFINITY];
         for step in 1..=steps {
@@ -178,10 +182,25 @@ fn bend_m_s2(samples: &[Sample], i: usize) -> Option<f64> {
     whole.then(|| 1e-3 * bend_mm / (past_s * next_s))
 }
 
+/// The accelerations of the samples, m/s². Those of a program, whose times may be uncertain by a part
+/// of a turn, are what it computes itself: the change of its speed since the turn before.
+pub(super) fn accelerations(samples: &[Sample], numbered: bool) -> Vec<f64> {
+    let since_before = |i: usize| {
+        let before = samples.get(i.checked_sub(1)?)?;
+        Some(1e-3 * (samples[i].v_mm_s - before.v_mm_s) / (samples[i].t_s - before.t_s))
+    };
+    (0..samples.len())
+        .map(|i| match numbered {
+            true => acceleration(samples, i),
+            false => since_before(i).unwrap_or(0.0),
+        })
+        .collect()
+}
+
 /// Acceleration at a sample, m/s²: the second difference of the position, in which the
 /// filter of the speed has no part; where too few samples are there the difference of the
 /// speed.
-pub(super) fn acceleration(samples: &[Sample], i: usize) -> f64 {
+fn acceleration(samples: &[Sample], i: usize) -> f64 {
     // Beside a gap that of the nearest sample with enough samples around it.
     let near = (0..=APART).flat_map(|by| [i.checked_sub(by), Some(i + by)]);
     if let Some(a_m_s2) = near.flatten().find_map(|i| bend_m_s2(samples, i)) {

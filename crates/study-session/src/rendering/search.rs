@@ -1,7 +1,7 @@
 //! How late the commanded force came, and of which table it was.
 
 use super::moments::{Lag, Moments, best_lag};
-use super::predicted::predicted;
+use super::predicted::{accelerations, predicted};
 use super::scale::Scale;
 use super::{LONGEST_DELAY_S, Played, SEARCHED_S};
 use crate::outcome::Sample;
@@ -54,8 +54,9 @@ pub(super) fn nearest<'a>(
         servo_hz: 1.0 / interval_s,
         ..played.servo
     };
+    let a_m_s2 = accelerations(samples, played.numbered);
     let score = |what: &servo::Rendering<'_>| {
-        let forces = predicted(what, settings, samples, |_| 0.0);
+        let forces = predicted(what, settings, samples, |i| a_m_s2[i]);
         let pairs = (samples.iter().zip(&forces).zip(keep)).filter(|(_, keep)| **keep);
         let moments = Moments::of(pairs.map(|((s, p), _)| (p.force_n, s.force_command_n)));
         let far = moments.residual()? + moments.bias()?.powi(2);
