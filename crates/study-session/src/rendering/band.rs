@@ -82,7 +82,8 @@ pub(super) fn bands(
         }
         Band {
             ends_n: [low - force.doubt_n, high + force.doubt_n],
-            judged: sides.is_some() || certain,
+            // The filters of a program go over a pause in one turn, each in its own way.
+            judged: (sides.is_some() || certain) && (played.numbered || !force.after_gap),
             narrow: certain && !force.after_gap,
         }
     };

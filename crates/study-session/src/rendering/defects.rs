@@ -111,7 +111,7 @@ pub(super) fn defects(fidelity: &Fidelity, found: &Found, rules: &RenderingRules
         all.push(Defect::Measured);
     }
     let other_speed = (fidelity.speed_gain).is_some_and(|gain| (gain - 1.0).abs() > SPEED_ERROR);
-    if other_speed || over(found.speed_late_ms, rules.max_delay_ms) {
+    if other_speed || (found.enough && over(found.speed_late_ms, rules.max_delay_ms)) {
         all.push(Defect::Speed);
     }
     let off = |ratio: f64| (ratio - 1.0).abs() > TIME_ERROR;

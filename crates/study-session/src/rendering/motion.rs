@@ -110,7 +110,8 @@ pub(super) fn explore(
 pub(super) fn speed_late_ms(samples: &[Sample], interval_s: f64) -> Option<f64> {
     let change = |i: usize| {
         let (before, after) = (samples.get(i.checked_sub(1)?)?, samples.get(i + 1)?);
-        Some((after.x_mm - before.x_mm) / (after.t_s - before.t_s))
+        let time_s = after.t_s - before.t_s;
+        (time_s < 2.0 * GAP_S).then(|| (after.x_mm - before.x_mm) / time_s)
     };
     let lag = delay(samples, interval_s, |i| {
         Some([change(i)?, samples[i].v_mm_s])
