@@ -47,12 +47,14 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
     };
     let limits = Limits::new(9.0, 1000.0).map_err(|e| Failure::new(Kind::Bug, e))?;
     let mut device = match args.address.is_program()? {
-        false => ActiveDevice::Linked(args.address.serial.open_serial(HostSettings::default())?),
+        false => ActiveDevice::Linked(Box::new(
+            args.address.serial.open_serial(HostSettings::default())?,
+        )),
         true => match args
             .address
             .open_program(&mut WaitDisplay::in_a_line(console))?
         {
-            Some(device) => ActiveDevice::Program(device),
+            Some(device) => ActiveDevice::Program(Box::new(device)),
             None => return Ok(()),
         },
     };
@@ -98,15 +100,15 @@ pub(super) fn input_lines() -> Receiver<String> {
 
 /// The device, of either kind.
 enum ActiveDevice {
-    Linked(LinkedDevice),
-    Program(ProcessDevice),
+    Linked(Box<LinkedDevice>),
+    Program(Box<ProcessDevice>),
 }
 
 impl ActiveDevice {
     fn any(&mut self) -> &mut dyn Device {
         match self {
-            Self::Linked(device) => device,
-            Self::Program(device) => device,
+            Self::Linked(device) => device.as_mut(),
+            Self::Program(device) => device.as_mut(),
         }
     }
 

@@ -12,7 +12,7 @@ use study_session::outcome::{Playback, Sample};
 #[derive(Debug, Deserialize)]
 #[serde(tag = "say", rename_all = "kebab-case")]
 pub(super) enum ChildMessage {
-    Hello(Hello),
+    Hello(Box<Hello>),
     Loaded {
         load: u64,
     },

@@ -282,7 +282,7 @@ impl Talk {
             None if self.told.identity.telemetry => {
                 Err(Failed::Wrong("`free` has no sample".to_owned()))
             }
-            Some(s) if !(s.force_command_n.abs() <= ZERO_N) => Err(Failed::Wrong(format!(
+            Some(s) if s.force_command_n.abs() > ZERO_N => Err(Failed::Wrong(format!(
                 "the sample of `free` has {:.2} N",
                 s.force_command_n
             ))),
