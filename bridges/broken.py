@@ -96,7 +96,7 @@ def _(axis):
     patch(Simulated, "push", lambda old: lambda self, n: old(self, 0.5 * n))
 
 
-@flaw("metres", "positions and speeds in metres")
+@flaw("meters", "positions and speeds in meters")
 def _(axis):
     _readings(lambda r: Reading(1e-3 * r.x_mm, 1e-3 * r.v_mm_s, r.measured_n, r.t_s))
 
