@@ -3,7 +3,7 @@
 use super::trajectory::{refuse_to_overwrite, write_file};
 use super::{Console, Failure};
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use study_base::hex::sha256;
 use study_base::text::counted;
 use study_haptics::recording::force_curve::{self, Source, Stated, USUAL_RATE_HZ};
@@ -63,10 +63,27 @@ fn rate(given: &str) -> Result<f64, String> {
         .ok_or_else(|| "a rate is a number above 0".to_owned())
 }
 
+/// A measurement cannot be made again.
+fn refuse_to_replace_an_input(files: &[PathBuf], out: &Path) -> Result<(), Failure> {
+    let same = |file: &&PathBuf| match (fs::canonicalize(file), fs::canonicalize(out)) {
+        (Ok(file), Ok(out)) => file == out,
+        _ => false,
+    };
+    match files.iter().find(same) {
+        Some(file) => Err(Failure::input(format!(
+            "{} is one of the measurements, which would be lost",
+            file.display()
+        ))
+        .hint("write the recording to another file; nothing was written")),
+        None => Ok(()),
+    }
+}
+
 /// Reads the files and writes the recording.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let What::ForceCurve(args) = &args.what;
     refuse_to_overwrite(Some(&args.out), args.force)?;
+    refuse_to_replace_an_input(&args.files, &args.out)?;
     let mut curves = Vec::new();
     for path in &args.files {
         let bytes = fs::read(path).map_err(|e| Failure::file(path, &e))?;

@@ -243,6 +243,11 @@ pub(super) fn read_plant(
 /// Fails if a file exists and may not be overwritten.
 pub(super) fn refuse_to_overwrite(out: Option<&Path>, force: bool) -> Result<(), Failure> {
     match out {
+        // what is written replaces it: a device or a pipe would be gone
+        Some(path) if fs::metadata(path).is_ok_and(|found| !found.is_file()) => Err(
+            Failure::input(format!("{} exists and is no regular file", path.display()))
+                .hint("name a file to write; nothing was written"),
+        ),
         Some(path) if !force && path.exists() => {
             Err(Failure::input(format!("{} already exists", path.display()))
                 .hint("--force overwrites it; nothing was written"))

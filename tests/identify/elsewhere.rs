@@ -217,7 +217,12 @@ fn rates(kind: Fast, term: usize, sets: u64) -> Rates {
 #[test]
 fn a_planted_mass_and_damping_are_found_within_their_intervals() {
     let sets = 8;
-    for (kind, term) in [(Fast::Press, 0), (Fast::Press, 1), (Fast::Presses, 0)] {
+    for (kind, term) in [
+        (Fast::Press, 0),
+        (Fast::Press, 1),
+        (Fast::Presses, 0),
+        (Fast::Alike, 0),
+    ] {
         let found = rates(kind, term, sets as u64);
         assert!(found.wrong <= 1, "{kind:?} {term} {found:?}");
         assert_eq!(found.bounded, sets, "{kind:?} {term} {found:?}");
@@ -472,6 +477,16 @@ fn a_dynamic_recording_that_does_not_belong_there_is_refused_with_the_cause() {
         &["--terms", "m,f0"],
         &["--terms m asks for what is from elsewhere"],
     );
+    // pounds are not so far away that they are refused
+    let pounds = folder(|text| with(text, 2, |f| f / 4.448_221_6));
+    identify(
+        pounds.path(),
+        &[&PASSIVE[..], &["--dynamic", PRESS]].concat(),
+    )
+    .success()
+    .stdout(predicate::str::contains(
+        "warning: the force of the dynamic recordings is 0.2",
+    ));
     let elements = ["--method", "mechanism"];
     let dir = folder(same);
     identify(dir.path(), &[&elements[..], &["--dynamic", PRESS]].concat())

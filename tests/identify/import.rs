@@ -101,6 +101,36 @@ fn what_is_no_curve_is_refused_with_file_and_line() {
     study(&["import", "force-curve", CLICKIEZ, "-o", &out])
         .code(1)
         .stderr(contains("already exists"));
+    // a measurement is not replaced by its recording, and a folder or a device not at all
+    let own = path("own.csv");
+    fs::copy(CLICKIEZ, &own).unwrap();
+    let again = dir.path().join("./own.csv").display().to_string();
+    study(&["import", "force-curve", &own, "-o", &again, "--force"])
+        .code(1)
+        .stderr(contains("is one of the measurements, which would be lost"));
+    assert_eq!(fs::read(&own).unwrap(), fs::read(CLICKIEZ).unwrap());
+    let folder = dir.path().to_str().unwrap();
+    study(&["import", "force-curve", CLICKIEZ, "-o", folder, "--force"])
+        .code(1)
+        .stderr(contains("is no regular file"));
+}
+
+/// Rows in the wrong order of time: the release comes first, and the target would supply the energy.
+#[test]
+fn a_curve_that_was_turned_around_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
+    let (turned, recording) = (path("turned.csv"), path("r.csv"));
+    let text = fs::read_to_string(CLICKIEZ).unwrap();
+    let (names, rows) = text.split_once('\n').unwrap();
+    let rows: Vec<&str> = rows.lines().rev().collect();
+    fs::write(&turned, format!("{names}\n{}\n", rows.join("\n"))).unwrap();
+    study(&["import", "force-curve", &turned, "-o", &recording]).success();
+    study(&[
+        "identify", &recording, "--method", "passive", "--dx", "0.05",
+    ])
+    .failure()
+    .stderr(contains("the target supplies energy"));
 }
 
 /// A curve and the same with a tenth more force: two loops that differ by a tenth of the force.

@@ -201,3 +201,36 @@ fn a_recommended_static_table_says_what_is_known_of_mass_and_damping() {
     let faults = study_haptics::model::file::parse("key", &foreign).1;
     assert!(format!("{faults:?}").contains("guessed"), "{faults:?}");
 }
+
+/// Friction that grows smoothly with the speed is none that a table has: it takes up more mass than its recordings show, and says so.
+#[test]
+fn a_mass_of_a_table_that_is_not_the_one_of_the_recordings_is_named() {
+    let warned = |friction_n: f64| {
+        let mut text = String::from("t_s,x_mm,v_mm_s,a_m_s2,f_n\n");
+        for i in 0..4000 {
+            let t = f64::from(i) / 500.0;
+            let [mut x, mut v, mut a] = [0.0; 3];
+            for (hz, phase) in [(0.3, 3.2), (0.55, 6.0), (0.9, 0.9), (1.5, 6.0)] {
+                let (mm, w) = (8.0 / (1.0 + hz), std::f64::consts::TAU * hz);
+                let (sin, cos) = (w * t + phase).sin_cos();
+                x += mm * sin;
+                v += mm * w * cos;
+                a -= 1e-3 * mm * w * w * sin;
+            }
+            let f = 0.3 * a + 0.005 * v + 2.0 * (0.5 * x).sin() + friction_n * v.tanh();
+            let x = (x / 0.005).round() * 0.005;
+            text += &format!("{t},{x},{v},{a},{f}\n");
+        }
+        let recording = study_haptics::recording::read("detents", text.as_bytes()).unwrap();
+        let found = identified(&recording, Method::Passive(Passive::default()), 1.0);
+        let of_table = found.realization.positive.m_kg[0];
+        let other = found.warnings.iter().any(|warning| {
+            matches!(warning, Warning::OtherMass { table_kg, .. } if *table_kg == of_table)
+        });
+        (of_table, other)
+    };
+    let (smooth, said) = warned(0.5);
+    assert!(smooth > 0.35 && said, "{smooth} {said}");
+    let (without, said) = warned(0.0);
+    assert!((without - 0.3).abs() < 0.02 && !said, "{without} {said}");
+}

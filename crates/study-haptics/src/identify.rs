@@ -381,6 +381,28 @@ impl Identified {
             (true, false) => Some(Warning::Ambiguous(evidence)),
             (false, _) => Some(Warning::LeftOut(evidence)),
         };
+        let masses = || {
+            self.realization
+                .positive
+                .m_kg
+                .iter()
+                .chain(&self.realization.negative.m_kg)
+        };
+        let one = masses()
+            .next()
+            .filter(|first| masses().all(|kg| kg == *first))
+            .copied();
+        let other = |said: &Evidence| {
+            let reach = said.upper_bound? - said.value;
+            let is_mass = said.term == Term::Mass && said.found && said.carried;
+            let table_kg = one.filter(|kg| is_mass && (kg - said.value).abs() > reach)?;
+            Some(Warning::OtherMass {
+                table_kg,
+                said: *said,
+            })
+        };
+        let other: Vec<Warning> = evidence.iter().filter_map(other).collect();
+        self.warnings.extend(other);
         self.warnings
             .extend(evidence.into_iter().filter_map(warning));
     }

@@ -127,11 +127,11 @@ pub(in crate::cli) struct Args {
     pub(super) dynamic: Vec<NamedPath>,
 
     /// Mass that you state, such as that of a handle that was weighed: it is not identified, and every output says so
-    #[arg(long, value_name = "KG", value_parser = positive)]
+    #[arg(long, value_name = "KG", value_parser = positive, allow_negative_numbers = true)]
     pub(super) mass_kg: Option<f64>,
 
     /// Damping that you state: it is not identified, and every output says so
-    #[arg(long, value_name = "N_S_PER_MM", value_parser = positive)]
+    #[arg(long, value_name = "N_S_PER_MM", value_parser = positive, allow_negative_numbers = true)]
     pub(super) damping_n_s_per_mm: Option<f64>,
 
     /// Recordings on which lambda and dx are selected, needed for more than one realization; NAME=PATH sets the name in model files

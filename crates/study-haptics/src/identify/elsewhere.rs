@@ -31,6 +31,8 @@ const LEAST_INSIDE: f64 = 0.5;
 const DIFFERENT: f64 = 2.576;
 /// The force of a dynamic recording at the positions of the table is its force times a number in this range.
 const SAME_TARGET: [f64; 2] = [0.2, 5.0];
+/// Beyond this range a sensor of another calibration is likelier than another speed.
+const ALIKE: [f64; 2] = [0.75, 1.35];
 /// The share of the force of the table that motion does not explain, from which on that number says something.
 const LEAST_OWN: f64 = 0.02;
 
@@ -146,7 +148,12 @@ impl Elsewhere {
         }
         let asks = !self.dynamic.is_empty();
         let said = match asks {
-            true => beside(&cell.realization, &self.dynamic)?,
+            true => {
+                let (said, ratio) = beside(&cell.realization, &self.dynamic)?;
+                let differs = ratio.filter(|ratio| !(ALIKE[0]..=ALIKE[1]).contains(ratio));
+                (cell.warnings).extend(differs.map(|ratio| Warning::OtherForce { ratio }));
+                said
+            }
             false => said(),
         };
         let realization = &mut cell.realization;
@@ -199,11 +206,12 @@ fn contradicts(said: &Evidence, stated: f64) -> bool {
     }
 }
 
-/// What dynamic recordings say beside the force of a realization without mass and damping; `None` if they do not determine the model.
+/// What dynamic recordings say beside the force of a realization without mass and damping, `None` if they do not determine the model; and how many times that force
+/// they have, if it is clearly another one.
 fn beside(
     realization: &Realization,
     dynamic: &[Recording],
-) -> Result<Option<[Evidence; 2]>, IdentifyError> {
+) -> Result<(Option<[Evidence; 2]>, Option<f64>), IdentifyError> {
     let mut rest = dynamic.to_vec();
     for recording in &mut rest {
         let by_position: Vec<f64> = vaf::predict(realization, recording).collect();
@@ -213,10 +221,13 @@ fn beside(
     }
     let [whole, rest]: [Vec<&Recording>; 2] =
         [dynamic, &rest[..]].map(|recordings| recordings.iter().collect());
-    if let Some(ratio) = other_force(&whole, &rest, realization.trained.x_mm) {
+    let ratio = other_force(&whole, &rest, realization.trained.x_mm);
+    let [least, most] = SAME_TARGET;
+    if let Some(ratio) = ratio.filter(|ratio| !(least..=most).contains(ratio)) {
         return Err(IdentifyError::OtherForce(ratio));
     }
-    Ok(evidence::beside(&whole, &rest, realization.trained.x_mm))
+    let said = evidence::beside(&whole, &rest, realization.trained.x_mm);
+    Ok((said, ratio))
 }
 
 /// How many times the force by position a measured force has, if that is another force: beside a constant, a spring, which stands for a mass in a
@@ -256,8 +267,7 @@ fn other_force(whole: &[&Recording], rest: &[&Recording], known_mm: [f64; 2]) ->
     };
     // as the same force it would leave twice the squared error at least
     let wrong = (1.0 - ratio).powi(2) * own > rows().map(error).sum();
-    let [least, most] = SAME_TARGET;
-    (says && wrong && !(least..=most).contains(&ratio)).then_some(ratio)
+    (says && wrong).then_some(ratio)
 }
 
 /// One value at all nodes and in both directions.

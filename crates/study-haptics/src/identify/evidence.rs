@@ -46,7 +46,8 @@
 //! **Beside a known force.** Where the force by position is known from other, slow recordings, what a dynamic recording has beside it is a constant
 //! (the zero of a sensor), a friction, its changes at low speed and at reversals, m a and b v ([`beside`]). The same estimates, errors and bounds hold, and a
 //! single fast press says something of the mass, because nothing else depends on the position. Where the dynamic recordings have strokes enough to show a term by themselves,
-//! the known force is not used: what it lacks is the same in each stroke, and would be taken for a term. Damping is bounded by all of its hysteresis, because
+//! the known force is not used: what it lacks is the same in each stroke, and would be taken for a damping. Only a mass that strokes at one speed cannot show is that beside
+//! the known force. Damping is bounded by all of its hysteresis, because
 //! friction may be less than in slow motion.
 
 mod carried;
@@ -240,14 +241,19 @@ pub(super) fn beside(
     if !enough(&rest) {
         return None;
     }
-    // the same strokes again and again would show what the known force lacks as if it were a term
+    let held = || found_in(&Reference::new(&rest, Force::Held(&whole), range_mm, true)?);
     let found = match has_enough_strokes(&whole) {
         true => {
             let ends: Vec<f64> = whole.iter().flat_map(|r| r.range_mm()).collect();
             let reference = Reference::new(&whole, Force::Unknown, range(&ends), true)?;
-            found_in(&reference)?
+            let [mass, damping] = found_in(&reference)?;
+            // What the known force lacks is the same in strokes that are alike, and would be taken for a damping; a mass alone turns twice in each stroke.
+            match mass.is_found() || mass.shows {
+                true => [mass, damping],
+                false => [held()?[0], damping],
+            }
         }
-        false => found_in(&Reference::new(&rest, Force::Held(&whole), range_mm, true)?)?,
+        false => held()?,
     };
     Some([0, 1].map(|term| Evidence {
         carried: found[term].is_found(),

@@ -210,6 +210,14 @@ pub enum Warning {
     /// The experimenter states something else than the recordings say.
     #[error("{} of {} is stated, but the {} say {}", .said.term.as_str(), .said.term.shown(*.stated), .said.by(), what_is_said(.said))]
     Stated { stated: f64, said: Evidence },
+    /// The mass of a table is not that which the recordings show.
+    #[error("mass: this table has {}, but the recordings say {}: the rest stands for something that the table lacks; compare the methods (without --method), or choose another dx or --direction", .said.term.shown(*.table_kg), what_is_said(.said))]
+    OtherMass { table_kg: f64, said: Evidence },
+    /// A dynamic recording has another force at the same positions.
+    #[error(
+        "the force of the dynamic recordings is {ratio:.2} times that of the training recordings at the same positions, and a mass from them is wrong by as much if that is a unit or a calibration: compare the sensors"
+    )]
+    OtherForce { ratio: f64 },
     /// The force has features between the nodes.
     #[error(
         "{rms_n:.3} N rms of the force repeat at places closer than 2 dx = {} mm, which nodes at this distance cannot follow: choose a smaller dx", 2.0 * .dx_mm

@@ -11,6 +11,9 @@ const COARSE: f64 = 0.2;
 /// Less energy per path than this share of the range of the force may be noise.
 const ENERGY_SHARE: f64 = 0.005;
 
+/// The share of the acceleration that neither a spring nor a damping explains, from which on a mass can be told.
+const LEAST_OWN: f64 = 0.01;
+
 /// Warnings about spikes, snaps and saturation.
 pub(super) fn warnings(x_mm: &[f64], f_n: &[f64], t_s: &[f64]) -> Vec<Warning> {
     let mut warnings = Vec::new();
@@ -59,19 +62,21 @@ pub struct Energy {
 }
 
 impl Recording {
-    /// The energy from the first sample to the last one at the same position and direction;
-    /// `None` if there is no closed cycle, or too few samples in it. Around a cycle a constant
-    /// force does no work; its middle is left out, because no cycle of samples closes exactly.
+    /// The energy from the first sample to the last one at the same position and direction, or, if
+    /// the probe only went there and back, to the last one at the same position; `None` if there is
+    /// none, or too few samples before it. Around a cycle a constant
+    /// force does no work; its middle is left out, because no cycle of samples closes exactly. What a
+    /// mass took up because the speed is another one is no work of the target.
     pub fn energy(&self) -> Option<Energy> {
         let x = &self.x_mm;
         let start = x[0];
         let crossing = |i: &usize| (x[i - 1] - start) * (x[*i] - start) <= 0.0 && x[*i] != x[i - 1];
         let first = (1..x.len()).find(|i| x[*i] != start)?;
         let upwards = x[first] > start;
-        let last = (first + 1..x.len())
-            .rev()
-            .filter(crossing)
-            .find(|i| (x[*i] > x[i - 1]) == upwards)?;
+        let crossings = || (first + 1..x.len()).rev().filter(crossing);
+        let last = crossings()
+            .find(|i| (x[*i] > x[i - 1]) == upwards)
+            .or_else(|| crossings().next())?;
         let [low, high] = range(&self.f_n);
         let middle = 0.5 * low + 0.5 * high;
         let (mut energy, mut path_mm) = (0.0, 0.0);
@@ -87,8 +92,28 @@ impl Recording {
         Some(Energy {
             supplied_j: 1e-3 * energy,
             path_mm,
-            negative: energy < -ENERGY_SHARE * (high - low) * path_mm,
+            negative: energy - self.kinetic_n_mm(last) < -ENERGY_SHARE * (high - low) * path_mm,
         })
+    }
+
+    /// The kinetic energy that a mass has more at a sample than at the first one, N·mm, with the
+    /// mass that least squares find beside a constant, a spring and a damping.
+    fn kinetic_n_mm(&self, at: usize) -> f64 {
+        let others = [&self.x_mm, &self.v_mm_s].map(|column| centered(column));
+        let mut own = centered(&self.a_m_s2);
+        let whole = dot(&own, &own);
+        let [mut x, v] = others;
+        remove(&mut x, &v);
+        for other in [&v, &x] {
+            remove(&mut own, other);
+        }
+        let left = dot(&own, &own);
+        if left <= LEAST_OWN * whole {
+            return 0.0;
+        }
+        let mass_kg = (dot(&own, &self.f_n) / left).max(0.0);
+        let square = |i: usize| self.v_mm_s[i].powi(2);
+        0.5e-3 * mass_kg * (square(at) - square(0))
     }
 
     /// Whether its energy is negative because of spikes: without them it is not.
@@ -118,6 +143,25 @@ impl Recording {
             self.a_m_s2 = (all.map(|i| acceleration(&self.t_s, &self.x_mm, i))).collect();
         }
         in_x.len() + in_f.len()
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Values less their mean.
+fn centered(values: &[f64]) -> Vec<f64> {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    values.iter().map(|value| value - mean).collect()
+}
+
+/// Takes out of values what is in proportion to others.
+fn remove(values: &mut [f64], other: &[f64]) {
+    let square = dot(other, other);
+    if square > 0.0 {
+        let share = dot(values, other) / square;
+        (values.iter_mut().zip(other)).for_each(|(value, other)| *value -= share * other);
     }
 }
 
@@ -171,6 +215,38 @@ mod tests {
         let flipped = recording(-1.0).energy().unwrap();
         assert!(flipped.negative);
         assert!((flipped.supplied_j + right.supplied_j).abs() < 1e-12);
+    }
+
+    /// A press and a release close no cycle in the same direction.
+    #[test]
+    fn a_single_loop_that_was_turned_around_supplies_energy() {
+        let once = |sign: f64| {
+            let half: Vec<usize> = (0..499).collect();
+            let mut loop_ = recording(sign).select(&half);
+            loop_.a_m_s2.iter_mut().for_each(|a| *a = 0.0);
+            loop_.energy().unwrap()
+        };
+        assert!(once(1.0).supplied_j > 0.0 && !once(1.0).negative);
+        assert!(once(-1.0).negative);
+    }
+
+    /// A mass that is faster at the end than at the beginning has taken up energy, or given it back.
+    #[test]
+    fn a_mass_alone_supplies_no_energy() {
+        let mut text = String::from("t_s,x_mm,v_mm_s,a_m_s2,f_n\n");
+        for i in 0..3100 {
+            let t = f64::from(i) * 1e-3;
+            let (w, u) = (6.3, 14.1);
+            let x = 10.0 * (w * t).sin() + 4.0 * (u * t).sin();
+            let v = 10.0 * w * (w * t).cos() + 4.0 * u * (u * t).cos();
+            let a = -1e-3 * (10.0 * w * w * (w * t).sin() + 4.0 * u * u * (u * t).sin());
+            let force = 0.8 * a;
+            text += &format!("{t},{x},{v},{a},{force}\n");
+        }
+        let recording = super::super::read("r", text.as_bytes()).unwrap();
+        let energy = recording.energy().unwrap();
+        assert!(energy.supplied_j < -1e-4, "{energy:?}");
+        assert!(!energy.negative, "{energy:?}");
     }
 
     /// Cycles of samples do not close exactly, and ten samples are no cycle.

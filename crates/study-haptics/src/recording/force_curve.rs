@@ -7,15 +7,21 @@
 //! * **high resolution**: lines such as `UNIT = gf,mm` and `RECORDING RATE = 0.0005`, then rows of force and
 //!   displacement without column names;
 //! * **tidy**: the columns `force` and `displacement` in any order, with or without others; units may be
-//!   part of the names, as in `force_n` or `Force (N)`, and are gf and mm otherwise.
+//!   part of the names, as in `force_n` or `Force (N)`, and are gf and mm otherwise. A column `time`, in s or in
+//!   the unit of its name, gives the rate.
+//!
+//! Fields may be quoted.
 //!
 //! [`join`] makes one recording of several curves: repeated measurements, or several speeds.
+
+mod time;
 
 use super::names::linear;
 use super::rows::{number, separator, shown};
 use super::{Columns, acceleration, resolution, velocity, write};
 use std::fmt::Write as _;
 use study_base::text::Untrusted;
+use time::{Time, moment, rate, time_of};
 
 /// Rows a second of a curve that has no time, unless another rate is given.
 pub const USUAL_RATE_HZ: f64 = 10.0;
@@ -23,7 +29,6 @@ pub const USUAL_RATE_HZ: f64 = 10.0;
 const MOST_HEADER_LINES: usize = 100;
 /// Fewest rows of a curve: second differences need three.
 const LEAST_ROWS: usize = 3;
-const SECONDS_A_DAY: f64 = 86_400.0;
 
 study_base::named! {
     /// How a file writes a force curve.
@@ -82,6 +87,24 @@ pub enum ForceCurveFault {
     },
     #[error("the unit of {0} changes: a curve has one unit")]
     UnitChanges(&'static str),
+    #[error(
+        "{found} fields under {expected} column names: complete or remove the row; where the decimal mark is a comma, separate the columns by semicolons or quote the numbers"
+    )]
+    Fields { found: usize, expected: usize },
+    #[error(
+        "the time is `{}`, neither a number nor a time of day: correct it, or remove the column of the time", Untrusted(.0)
+    )]
+    Time(String),
+    #[error("the time does not increase: sort the rows by time, or remove the column of the time")]
+    TimeBackwards,
+    #[error(
+        "rows are {longest_s:.3} s apart here and {usual_s:.3} s usually: measure at an even rate, or resample the file"
+    )]
+    Uneven { longest_s: f64, usual_s: f64 },
+    #[error(
+        "the displacement decreases during the press: change its sign, so that a press increases it"
+    )]
+    Downwards,
     #[error("{found} fields, but {column} is column {expected}: complete or remove the row")]
     Ragged {
         found: usize,
@@ -109,8 +132,10 @@ struct Header {
     separator: u8,
     force: Column,
     displacement: Column,
-    time: Option<usize>,
+    time: Option<Time>,
     name: Option<usize>,
+    /// Fields of a row, at most.
+    fields: usize,
 }
 
 /// A column of numbers.
@@ -154,7 +179,7 @@ impl Column {
             })
         };
         let text = field(self.at)?;
-        let value = number(text, separator).filter(|value: &f64| value.is_finite());
+        let value = number_in(text, separator).filter(|value: &f64| value.is_finite());
         let value = value.ok_or_else(|| Fault::NotANumber {
             column: self.what,
             text: shown(text),
@@ -195,18 +220,28 @@ pub fn read(text: &str) -> Result<ForceCurve, ForceCurveError> {
         };
         (first_row, header, layout, None)
     };
-    let (mut x_mm, mut f_n, mut seconds) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut x_mm, mut f_n, mut times) = (Vec::new(), Vec::new(), Vec::new());
     let mut target = None;
     let mut last = first_row;
     for (line, text) in lines().filter(|(line, text)| *line >= first_row && !text.is_empty()) {
         let separator = header.separator;
-        let fields: Vec<&str> = (text.split(char::from(separator)))
-            .map(|field| field.trim().trim_matches('"'))
-            .collect();
+        let fields = fields(text, separator);
+        let fields: Vec<&str> = fields.iter().map(str::trim).collect();
+        let found = fields.len() - fields.iter().rev().take_while(|f| f.is_empty()).count();
+        if found > header.fields {
+            let expected = header.fields;
+            return Err(at(line)(Fault::Fields { found, expected }));
+        }
         let value = |column: &mut Column| column.value(&fields, separator).map_err(at(line));
         f_n.push(value(&mut header.force)?);
         x_mm.push(value(&mut header.displacement)?);
-        seconds.extend((header.time.and_then(|at| fields.get(at))).and_then(|t| seconds_of(t)));
+        if let Some(time) = header.time {
+            let text = fields.get(time.at).copied().unwrap_or_default();
+            times.push((
+                line,
+                moment(text, time.unit_s, separator).map_err(at(line))?,
+            ));
+        }
         let name = || fields.get(header.name?).filter(|name| !name.is_empty());
         target = target.or_else(|| name().map(|name| (*name).to_owned()));
         last = line;
@@ -223,7 +258,11 @@ pub fn read(text: &str) -> Result<ForceCurve, ForceCurveError> {
     let travel = x_mm[top] - x_mm[0].min(x_mm[x_mm.len() - 1]);
     let one_way = |end: f64| x_mm[top] - end < 0.5 * travel;
     if one_way(x_mm[0]) || one_way(x_mm[x_mm.len() - 1]) {
-        return Err(at(last)(Fault::OneDirection));
+        let fault = match goes_down_and_back(&x_mm) {
+            true => Fault::Downwards,
+            false => Fault::OneDirection,
+        };
+        return Err(at(last)(fault));
     }
     let rate_hz = match settings {
         Some(settings) if settings.count != x_mm.len() => {
@@ -231,9 +270,7 @@ pub fn read(text: &str) -> Result<ForceCurve, ForceCurveError> {
             return Err(at(last)(Fault::Count { found, stated }));
         }
         Some(settings) => Some(1.0 / settings.interval_s),
-        None => Some(&seconds)
-            .filter(|seconds| seconds.len() == x_mm.len())
-            .and_then(|seconds| rate_of(seconds)),
+        None => rate(&times).map_err(|(line, fault)| ForceCurveError { line, fault })?,
     };
     Ok(ForceCurve {
         layout,
@@ -247,8 +284,8 @@ pub fn read(text: &str) -> Result<ForceCurve, ForceCurveError> {
 /// The columns of a line of column names; `None` if it is none.
 fn columns(line: &str) -> Result<Option<Header>, Fault> {
     let separator = separator(line.as_bytes());
-    let names: Vec<String> = (line.split(char::from(separator)))
-        .map(|name| name.trim().trim_matches('"').to_lowercase())
+    let names: Vec<String> = (fields(line, separator).iter())
+        .map(|name| name.trim().to_lowercase())
         .collect();
     let find = |word: &str| names.iter().position(|name| name == word);
     let column = |(what, kind, usual): (&'static str, usize, &'static str)| {
@@ -281,8 +318,9 @@ fn columns(line: &str) -> Result<Option<Header>, Fault> {
         separator,
         force,
         displacement,
-        time: find("time"),
+        time: time_of(&names),
         name: find("name"),
+        fields: names.len() - names.iter().rev().take_while(|n| n.is_empty()).count(),
     }))
 }
 
@@ -302,6 +340,7 @@ fn settings<'t>(
         displacement: column_at(1, Column::DISPLACEMENT),
         time: None,
         name: None,
+        fields: 2,
     };
     let (mut units, mut interval_s, mut count) = (false, None, None);
     for (line, text) in lines {
@@ -364,31 +403,26 @@ fn column_at(at: usize, (what, kind, _): (&'static str, usize, &'static str)) ->
     }
 }
 
-/// The time of day of `12:29:11 PM` or `12:29:11`, s.
-fn seconds_of(text: &str) -> Option<f64> {
-    let upper = text.to_uppercase();
-    let (clock, half) = match upper.rsplit_once(' ') {
-        Some((clock, half @ ("AM" | "PM"))) => (clock, Some(half)),
-        _ => (upper.as_str(), None),
-    };
-    let mut parts = clock.split(':').map(|part| part.trim().parse::<f64>().ok());
-    let (hours, minutes, seconds) = (parts.next()??, parts.next()??, parts.next()??);
-    let hours = match half {
-        Some(half) => hours % 12.0 + if half == "PM" { 12.0 } else { 0.0 },
-        None => hours,
-    };
-    Some(3600.0 * hours + 60.0 * minutes + seconds)
+/// Whether a displacement goes down for the press and comes back.
+fn goes_down_and_back(x_mm: &[f64]) -> bool {
+    let lowest = x_mm.iter().fold(f64::INFINITY, |low, x| low.min(*x));
+    let highest = x_mm.iter().fold(f64::NEG_INFINITY, |high, x| high.max(*x));
+    let near_the_top = |x: f64| highest - x < 0.5 * (highest - lowest);
+    near_the_top(x_mm[0]) && near_the_top(x_mm[x_mm.len() - 1])
 }
 
-/// Rows a second from their times in whole seconds: between the first and the last time that
-/// changes; `None` if there is no more than one.
-fn rate_of(seconds: &[f64]) -> Option<f64> {
-    let changes: Vec<usize> = (1..seconds.len())
-        .filter(|i| seconds[*i] != seconds[*i - 1])
-        .collect();
-    let (first, last) = (*changes.first()?, *changes.last()?);
-    let elapsed = (seconds[last] - seconds[first]).rem_euclid(SECONDS_A_DAY);
-    (elapsed > 0.0).then(|| (last - first) as f64 / elapsed)
+/// The fields of a line, without their quotes.
+fn fields(line: &str, separator: u8) -> csv::StringRecord {
+    let reader = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .delimiter(separator)
+        .from_reader(line.as_bytes());
+    (reader.into_records().next().and_then(Result::ok)).unwrap_or_default()
+}
+
+/// A number; a comma in a field can only be a decimal one.
+fn number_in(text: &str, separator: u8) -> Option<f64> {
+    number(text, if text.contains(',') { b';' } else { separator })
 }
 
 /// A curve and where it comes from.

@@ -1,3 +1,4 @@
+use super::time::{rate_of, seconds_of};
 use super::*;
 use crate::recording;
 
@@ -188,4 +189,68 @@ fn every_bad_file_is_told_with_its_line() {
         let message = message(&text);
         assert!(message.starts_with(expected), "{message}\n{expected}");
     }
+}
+
+#[test]
+fn a_time_in_numbers_gives_the_rate_and_a_wrong_one_is_named() {
+    let with = |name: &str, times: [&str; 4]| {
+        let rows = ["0,0", "50,0.5", "100,1", "0,0.1"];
+        let rows: String = (times.iter().zip(rows))
+            .map(|(t, row)| format!("{t},{row}\n"))
+            .collect();
+        read(&format!("{name},force,displacement\n{rows}"))
+    };
+    for (name, times) in [
+        ("time", ["0", "0.02", "0.04", "0.06"]),
+        ("time_s", ["5", "5.02", "5.04", "5.06"]),
+        ("Time (ms)", ["0", "20", "40", "60"]),
+        ("t_ms", ["0", "20", "40", "60"]),
+    ] {
+        let rate = with(name, times).unwrap().rate_hz.unwrap();
+        assert!((rate - 50.0).abs() < 1e-9, "{name}: {rate}");
+    }
+    for (times, line, text) in [
+        (["0", "0.02", "0.01", "0.06"], 4, "does not increase"),
+        (
+            ["0", "0.02", "soon", "0.06"],
+            4,
+            "the time is `soon`, neither",
+        ),
+        (
+            ["0", "0.02", "0.04", "0.5"],
+            5,
+            "0.460 s apart here and 0.020 s usually",
+        ),
+        (["0", "12:00:01", "0.04", "0.06"], 3, "the time is"),
+    ] {
+        let error = with("time", times).unwrap_err().to_string();
+        assert!(
+            error.starts_with(&format!("line {line}: ")) && error.contains(text),
+            "{error}"
+        );
+    }
+    // a column that only begins with these letters is none
+    assert_eq!(
+        with("tactility", ["0", "1", "0", "1"]).unwrap().rate_hz,
+        None
+    );
+}
+
+#[test]
+fn a_decimal_comma_is_read_in_quotes_and_refused_without() {
+    let quoted = "force,displacement\n\"0,0\",\"0,000\"\n\"30,5\",\"1,250\"\n\"0,0\",\"0,010\"\n";
+    assert_eq!(read(quoted).unwrap().x_mm, [0.0, 1.25, 0.01]);
+    let bare = quoted.replace('"', "");
+    let error = message(&bare);
+    assert!(
+        error.starts_with("line 2: 4 fields under 2 column names"),
+        "{error}"
+    );
+    assert!(error.contains("semicolons"), "{error}");
+}
+
+#[test]
+fn a_tester_that_counts_downwards_is_named() {
+    let error = message("force,displacement\n0,0\n50,-0.5\n100,-1\n50,-0.5\n0,-0.01\n");
+    assert!(error.contains("decreases during the press"), "{error}");
 }
