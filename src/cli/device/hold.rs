@@ -99,16 +99,31 @@ pub(super) fn input_lines() -> Receiver<String> {
 }
 
 /// The device, of either kind.
-enum ActiveDevice {
+pub(super) enum ActiveDevice {
     Linked(Box<LinkedDevice>),
     Program(Box<ProcessDevice>),
 }
 
 impl ActiveDevice {
-    fn any(&mut self) -> &mut dyn Device {
+    pub(super) fn any(&mut self) -> &mut dyn Device {
         match self {
             Self::Linked(device) => device.as_mut(),
             Self::Program(device) => device.as_mut(),
+        }
+    }
+
+    pub(super) fn into_any(self) -> Box<dyn Device> {
+        match self {
+            Self::Linked(device) => Box::new(device),
+            Self::Program(device) => Box::new(device),
+        }
+    }
+
+    /// Where its stops are, mm, if it tells.
+    pub(super) fn stroke_mm(&self) -> Option<[f64; 2]> {
+        match self {
+            Self::Linked(device) => device.status().device.map(|told| told.stroke_mm),
+            Self::Program(_) => None,
         }
     }
 
