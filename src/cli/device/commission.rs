@@ -141,9 +141,11 @@ const STEPS: [(&str, StepOf); 6] = [
 /// Runs the command.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let mut device = match args.address.is_program()? {
-        false => ActiveDevice::Linked(args.address.serial.open_serial(HostSettings::default())?),
+        false => ActiveDevice::Linked(Box::new(
+            args.address.serial.open_serial(HostSettings::default())?,
+        )),
         true => match (args.address).open_program(&mut WaitDisplay::in_a_line(console))? {
-            Some(device) => ActiveDevice::Program(device),
+            Some(device) => ActiveDevice::Program(Box::new(device)),
             None => return Ok(()),
         },
     };

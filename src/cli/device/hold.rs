@@ -114,8 +114,8 @@ impl ActiveDevice {
 
     pub(super) fn into_any(self) -> Box<dyn Device> {
         match self {
-            Self::Linked(device) => Box::new(device),
-            Self::Program(device) => Box::new(device),
+            Self::Linked(device) => device,
+            Self::Program(device) => device,
         }
     }
 
