@@ -97,16 +97,31 @@ pub(super) fn input_lines() -> Receiver<String> {
 }
 
 /// The device, of either kind.
-enum ActiveDevice {
+pub(super) enum ActiveDevice {
     Linked(LinkedDevice),
     Program(ProcessDevice),
 }
 
 impl ActiveDevice {
-    fn any(&mut self) -> &mut dyn Device {
+    pub(super) fn any(&mut self) -> &mut dyn Device {
         match self {
             Self::Linked(device) => device,
             Self::Program(device) => device,
+        }
+    }
+
+    pub(super) fn into_any(self) -> Box<dyn Device> {
+        match self {
+            Self::Linked(device) => Box::new(device),
+            Self::Program(device) => Box::new(device),
+        }
+    }
+
+    /// Where its stops are, mm, if it tells.
+    pub(super) fn stroke_mm(&self) -> Option<[f64; 2]> {
+        match self {
+            Self::Linked(device) => device.status().device.map(|told| told.stroke_mm),
+            Self::Program(_) => None,
         }
     }
 
