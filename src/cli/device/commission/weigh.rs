@@ -58,6 +58,8 @@ pub(super) fn direction(rig: &mut Rig<'_>, bench: &mut Bench, pushes: Side) -> R
             }
             Weighed::Wrong(why) => {
                 let seen = format!("at {:.1} N: {}", stage.force_n, safe(&why));
+                let fit = DirectionFit::of(pushes, &bench.numbers.weighings);
+                bench.numbers.directions.extend(fit);
                 return Ok(failed(what, required, so_far(bench, pushes, Some(seen))));
             }
         }
