@@ -165,7 +165,7 @@ fn line(all: &[&Weighing]) -> Option<[f64; 2]> {
         .map(|w| (w.commanded_n - x) * (w.measured_n - y))
         .sum();
     let slope = sxy / sxx;
-    (all.len() > 1 && slope.is_finite()).then(|| [slope, y - slope * x])
+    (all.len() > 1 && slope.is_finite()).then_some([slope, y - slope * x])
 }
 
 /// Two places on a ruler and as the device reports them.
