@@ -228,7 +228,7 @@ fn a_closed_terminal_and_ctrl_c_leave_the_device_limp() {
 
 /// A program with a handle at the place that stands in a file, whose motor is right.
 const PROGRAM: &str = r#"
-import json, sys
+import json, os, sys
 def say(**m): print(json.dumps(m), flush=True)
 say(say="hello", format="study-process/1", id="rig-9", telemetry=True, limits={"force_n": 10, "velocity_mm_s": 800})
 table, playing, t, load = None, False, 0.0, 0
@@ -258,7 +258,8 @@ for line in sys.stdin:
         samples = [[t + 0.001 * i, x, 0.0, force(x), None] for i in range(20)]
         t += 0.02
         say(say="samples", load=load, samples=samples)
-    open("force", "w").write(str(force(place()) if playing else 0.0))
+    open("force.new", "w").write(str(force(place()) if playing else 0.0))
+    os.replace("force.new", "force")
 "#;
 
 #[test]
@@ -266,7 +267,11 @@ fn a_program_is_commissioned_too() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     std::fs::write(at("rig.py"), PROGRAM).unwrap();
-    let place = |x_mm: f64| std::fs::write(at("place"), x_mm.to_string()).unwrap();
+    // the program reads it at any time
+    let place = |x_mm: f64| {
+        std::fs::write(at("place.new"), x_mm.to_string()).unwrap();
+        std::fs::rename(at("place.new"), at("place")).unwrap();
+    };
     place(20.0);
     let mut person = |line: &str| {
         let answer = |text: &str| Some(text.to_owned());
