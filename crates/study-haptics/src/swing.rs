@@ -293,7 +293,7 @@ fn least_squares(mut columns: Vec<Vec<f64>>, mut right: Vec<f64>) -> Option<(Vec
             own.iter_mut().zip(q).for_each(|(x, q)| *x -= r[i][j] * q);
         }
         let norm = dot(own, own).sqrt();
-        if !(norm > DEPENDENT * before) {
+        if norm.is_nan() || norm <= DEPENDENT * before {
             return None;
         }
         own.iter_mut().for_each(|x| *x /= norm);
