@@ -7,8 +7,12 @@
 
 pub(super) mod desk;
 pub(super) mod rig;
+mod self_weigh;
 mod steps;
+mod swing;
 mod weigh;
+
+pub(in crate::cli) use self_weigh::self_weighed;
 
 use super::hold::ActiveDevice;
 use super::record::{Record, RecordKind};
@@ -124,7 +128,7 @@ fn left_out(what: &'static str, required: &str) -> Made {
 type StepOf = fn(&mut Rig<'_>, &mut Bench) -> Result<Made, Stop>;
 
 /// The steps in their order: the switch before any higher force.
-const STEPS: [(&str, StepOf); 6] = [
+const STEPS: [(&str, StepOf); 7] = [
     ("stroke", steps::stroke),
     ("ruler", steps::ruler),
     ("unpowered friction", steps::friction),
@@ -136,6 +140,7 @@ const STEPS: [(&str, StepOf); 6] = [
     ("force towards +x", |rig, bench| {
         weigh::direction(rig, bench, Side::Plus)
     }),
+    ("self-weighing", swing::step),
 ];
 
 /// Runs the command.
@@ -149,11 +154,11 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     };
     let tested = Tested::of(device.any());
     let stroke_mm = device.stroke_mm();
-    let device = device.into_any();
+    let mut device = device.into_any();
     refuse_unseen(&*device)?;
     let (done, numbers, ended) = {
         let desk = Terminal::open(console)?;
-        let mut rig = Rig::new(device, Box::new(desk));
+        let mut rig = Rig::new(&mut *device, Box::new(desk));
         dialog(&mut rig, &tested, stroke_mm, args.force)
     };
     let pass = done.iter().all(|step| step.outcome == Outcome::Passed);

@@ -117,11 +117,11 @@ impl VirtualSpring {
         places.dedup_by(|b, a| *b - *a < 1e-6);
         let force_n =
             |place: &f64| (self.stiffness_n_per_mm * place).clamp(-self.force_n, self.force_n);
-        table(
+        table_of(
             "spring",
             places.iter().map(|place| self.rest_mm + place).collect(),
             places.iter().map(force_n).collect(),
-            self.damping_n_s_per_mm,
+            vec![self.damping_n_s_per_mm; places.len()],
             [self.rest_mm - self.reach_mm, self.rest_mm + self.reach_mm],
         )
     }
@@ -129,20 +129,27 @@ impl VirtualSpring {
 
 /// A table without force over a range, to read where the handle is.
 pub fn force_free(range_mm: [f64; 2]) -> Realization {
-    table("none", range_mm.to_vec(), vec![0.0; 2], 0.0, range_mm)
+    table_of(
+        "none",
+        range_mm.to_vec(),
+        vec![0.0; 2],
+        vec![0.0; 2],
+        range_mm,
+    )
 }
 
-fn table(
+/// A table of forces and damping at places, the same in both directions.
+pub(super) fn table_of(
     id: &str,
     x_mm: Vec<f64>,
     f0_n: Vec<f64>,
-    b_n_s_per_mm: f64,
+    b_n_s_per_mm: Vec<f64>,
     range_mm: [f64; 2],
 ) -> Realization {
     let nodes = x_mm.len();
     let branch = Branch {
         m_kg: vec![0.0; nodes],
-        b_n_s_per_mm: vec![b_n_s_per_mm; nodes],
+        b_n_s_per_mm,
         k_n_per_mm: vec![0.0; nodes],
         f0_n,
     };

@@ -6,10 +6,11 @@ use std::collections::VecDeque;
 use std::time::Duration;
 use study_base::limits::Limits;
 use study_base::text::Untrusted;
-use study_device::commission::{Travel, VirtualSpring, force_free};
+use study_device::commission::{SwingSpring, Travel, VirtualSpring, force_free};
 use study_device::{Device, Report, Stimulus};
 use study_haptics::model::Realization;
 use study_session::outcome::Sample;
+use study_wire::servo::ServoSettings;
 
 /// Time for a load, a start, a stop, or until a device answers again.
 const ANSWER: Duration = Duration::from_secs(10);
@@ -83,12 +84,14 @@ struct Guard {
 
 /// The device and the person.
 pub(in crate::cli::device) struct Rig<'d> {
-    device: Box<dyn Device + 'd>,
+    device: &'d mut dyn Device,
     pub(in crate::cli::device) desk: Box<dyn Desk + 'd>,
     /// Limits of the device.
     pub(in crate::cli::device) limits: Limits,
     /// The last samples of the present playback.
     samples: VecDeque<Sample>,
+    /// All samples of a swing.
+    kept: Option<Vec<Sample>>,
     /// Where the present motion has to stay.
     guard: Option<Guard>,
     farthest_mm: f64,
@@ -101,7 +104,7 @@ pub(in crate::cli::device) struct Rig<'d> {
 
 impl<'d> Rig<'d> {
     pub(in crate::cli::device) fn new(
-        device: Box<dyn Device + 'd>,
+        device: &'d mut dyn Device,
         desk: Box<dyn Desk + 'd>,
     ) -> Self {
         Self {
@@ -109,6 +112,7 @@ impl<'d> Rig<'d> {
             device,
             desk,
             samples: VecDeque::new(),
+            kept: None,
             guard: None,
             farthest_mm: 0.0,
             fastest_mm_s: 0.0,
@@ -143,6 +147,9 @@ impl<'d> Rig<'d> {
     /// Watches a sample: the device has bounds of its own, and these are behind them.
     fn see(&mut self, sample: &Sample) {
         self.samples.push_back(*sample);
+        if let Some(kept) = &mut self.kept {
+            kept.push(*sample);
+        }
         let newest_s = sample.t_s;
         while (self.samples.front()).is_some_and(|first| newest_s - first.t_s > READING_S) {
             self.samples.pop_front();
@@ -309,6 +316,43 @@ impl<'d> Rig<'d> {
         });
         let limits = spring.limits().map_err(|e| e.to_string())?;
         self.play(&spring.table(), limits)
+    }
+
+    /// Plays a spring beside whose rest the free handle is, and returns what it did.
+    pub(in crate::cli::device) fn swing(
+        &mut self,
+        spring: &SwingSpring,
+    ) -> Result<Vec<Sample>, String> {
+        self.guard = Some(Guard {
+            rest_mm: spring.rest_mm,
+            reach_mm: spring.reach_mm(),
+            velocity_mm_s: spring.velocity_mm_s,
+        });
+        let limits = spring.limits().map_err(|e| e.to_string())?;
+        self.kept = Some(Vec::new());
+        let played = self.play(&spring.table(), limits);
+        if played.is_ok() {
+            self.watch(Duration::from_secs_f64(spring.seconds));
+        }
+        let kept = self.kept.take().unwrap_or_default();
+        let trouble = self.take_trouble();
+        self.limp();
+        played?;
+        match trouble {
+            Some(why) => Err(why),
+            None => Ok(kept),
+        }
+    }
+
+    /// The constants of the servo, if the device tells them.
+    pub(in crate::cli::device) fn servo(&self) -> Option<ServoSettings> {
+        self.device.identity().servo
+    }
+
+    /// The mass of the handle, if the device tells what it can compensate, kg.
+    pub(in crate::cli::device) fn told_mass_kg(&self) -> Option<f64> {
+        let least_kg = -self.servo()?.least_mass_kg;
+        (least_kg.is_finite() && least_kg > 0.0).then_some(least_kg)
     }
 
     /// Where the handle is, by a short playback without force.
