@@ -320,6 +320,28 @@ mod tests {
         }
     }
 
+    /// Where d′ is never below 0, answers below chance are: nobody tells the two apart who is
+    /// wrong more often than somebody who guesses.
+    #[test]
+    fn answers_below_chance_are_below_0() {
+        let below = |share: f64| Sensitivity {
+            d: Some(Stat::of(0.7)),
+            d_differencing: Some(Stat::of(0.7)),
+            share_correct: Some(Stat::of(share)),
+            share_unbiased: Some(Stat::of(share)),
+            ..Sensitivity::undefined("")
+        };
+        for (asked, method) in [
+            (Asked::ThreeIntervals, Method::ThreeIntervals),
+            (Asked::OddOneOut, Method::OddOneOut),
+            (Asked::Abx, Method::Abx),
+            (Asked::SameDifferent, Method::SameDifferent),
+        ] {
+            let (_, found) = sensitivity(asked, method, Some(&below(0.2))).unwrap();
+            assert!(found < -0.1, "{method:?}: {found}");
+        }
+    }
+
     /// Whoever compares the intervals has the d′ of differencing, also in tables.
     #[test]
     fn the_sensitivity_of_comparing_is_that_of_differencing() {
