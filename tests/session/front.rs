@@ -148,11 +148,11 @@ fn a_command_that_is_no_front_is_refused_before_the_session() {
         ("true", "has ended with exit status 0"),
         ("echo hello", "its first line says who it is"),
         (
-            r#"echo {"format":"study-page/2","front":"x"}"#,
+            r#"echo '{"format":"study-page/2","front":"x"}'"#,
             "supports study-page/1",
         ),
         (
-            r#"echo {"format":"study-page/1","front":""}"#,
+            r#"echo '{"format":"study-page/1","front":""}'"#,
             "1 to 64 characters",
         ),
     ] {
