@@ -221,7 +221,7 @@ mod tests {
     #[test]
     fn a_single_loop_that_was_turned_around_supplies_energy() {
         let once = |sign: f64| {
-            let half: Vec<usize> = (0..499).collect();
+            let half: Vec<usize> = (0..520).collect();
             let mut loop_ = recording(sign).select(&half);
             loop_.a_m_s2.iter_mut().for_each(|a| *a = 0.0);
             loop_.energy().unwrap()

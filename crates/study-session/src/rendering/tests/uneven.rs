@@ -125,9 +125,15 @@ fn a_right_program_is_not_accused_of_its_uneven_turns() {
     for turns in EVEN_ENOUGH {
         for (seed, strokes_hz) in [0.4, 0.7, 1.0, 1.6, 2.3].into_iter().enumerate() {
             let found = of_a_program(&played_in(turns, strokes_hz, 1.0, seed as u64));
-            assert_eq!(
-                found.verdict,
-                Verdict::Ok,
+            // what follows a long turn is not judged, which may leave too little
+            let unjudged =
+                matches!(turns, Turns::AtLeast(..)) && found.verdict == Verdict::TooLittle;
+            assert!(
+                found.verdict == Verdict::Ok || unjudged,
+                "{turns:?} {strokes_hz} Hz: {found:?}"
+            );
+            assert!(
+                found.defects.is_empty(),
                 "{turns:?} {strokes_hz} Hz: {found:?}"
             );
         }
