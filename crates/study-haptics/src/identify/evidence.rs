@@ -44,7 +44,7 @@
 //! Liang & Zeger 1986, Biometrika 73:13.
 //!
 //! **Beside a known force.** Where the force by position is known from other, slow recordings, what a dynamic recording has beside it is a constant
-//! (the zero of a sensor), a friction, its changes at low speed and at reversals, m a and b v ([`beside`]). The same estimates, errors and bounds hold, and a
+//! (the zero of a sensor), a friction, its changes at low speed and at reversals, m a and b v (`beside`). The same estimates, errors and bounds hold, and a
 //! single fast press says something of the mass, because nothing else depends on the position. Where the dynamic recordings have strokes enough to show a term by themselves,
 //! the known force is not used: what it lacks is the same in each stroke, and would be taken for a damping. Only a mass that strokes at one speed cannot show is that beside
 //! the known force. Damping is bounded by all of its hysteresis, because
