@@ -13,7 +13,12 @@ fn trouble(from: &str, to: &str, words: &[&str]) {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
-    let protocol = super::devices::protocol(folder.path(), &[("\"simulated\"", "\"process\"")]);
+    // Every attempt fails: one for each trial is enough.
+    let changes = [
+        ("\"simulated\"", "\"process\""),
+        ("max_attempts = 50", "max_attempts = 1"),
+    ];
+    let protocol = super::devices::protocol(folder.path(), &changes);
     let example = fs::read_to_string(repository("docs/process_device.py")).unwrap();
     assert!(example.contains(from));
     let script = folder.path().join("controller.py");
