@@ -20,10 +20,13 @@ use study_haptics::identify::identification::{
     self, Identification, IdentificationError, Request, Source, Sources,
 };
 use study_haptics::identify::method::Progress;
-use study_haptics::recording::Names;
+use study_haptics::recording::{Names, RecordingFault, force_curve};
 use study_report::identification::{Drawing, document, figures, page, text};
 use study_report::picture::png::Painter;
+use study_session::store::disk::read_capped;
 
+/// Most bytes of a file that is tried as a force curve.
+const LARGEST_CURVE: usize = 1 << 26;
 /// Columns of the text on a page.
 const PAGE_WIDTH: usize = 100;
 
@@ -143,7 +146,24 @@ fn read(
     let input = BufReader::with_capacity(1 << 16, Reader::new(file, length));
     let shown = path.display().to_string();
     let say = |text: String| console.say(text);
-    Source::read((&named.name, &shown), input, names, request, say).map_err(|e| refused(&e))
+    let found = Source::read((&named.name, &shown), input, names, request, say);
+    found.map_err(|error| {
+        let no_columns = matches!(&error, IdentificationError::Unreadable(_, error)
+            if matches!(error.fault, RecordingFault::MissingColumn { .. } | RecordingFault::NoColumns | RecordingFault::Ragged { .. }));
+        let failure = refused(&error);
+        match no_columns && is_force_curve(path) {
+            true => failure.hint(format!(
+                "it is a force curve of displacement and force: `study import force-curve {shown} -o recording.csv` makes a recording of it"
+            )),
+            false => failure,
+        }
+    })
+}
+
+/// Whether a file is what `study import force-curve` reads.
+fn is_force_curve(path: &Path) -> bool {
+    let text = read_capped(path, LARGEST_CURVE).ok();
+    text.is_some_and(|bytes| force_curve::read(&String::from_utf8_lossy(&bytes)).is_ok())
 }
 
 /// Writes the files; without `force` none if one of them exists.

@@ -8,6 +8,9 @@ use study_base::hex::sha256;
 use study_base::text::counted;
 use study_haptics::recording::force_curve::{self, Source, Stated, USUAL_RATE_HZ};
 
+/// A longer press is likelier a time in ms, s.
+const LONG_S: f64 = 1800.0;
+
 /// Arguments of `study import`.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
@@ -90,15 +93,22 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         let curve = force_curve::read(&String::from_utf8_lossy(&bytes))
             .map_err(|e| Failure::input(format!("{}: {e}", path.display())))?;
         let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let (rows, layout) = (curve.x_mm.len(), curve.layout.as_str());
         let rate = match curve.rate_hz {
-            Some(hz) => format!("{hz:.1} rows a second"),
+            Some(hz) => format!("{hz:.3} rows a second, {:.1} s in all", rows as f64 / hz),
             None => format!(
                 "no time: {} rows a second assumed",
                 args.rate.unwrap_or(USUAL_RATE_HZ)
             ),
         };
-        let (rows, layout) = (curve.x_mm.len(), curve.layout.as_str());
         console.say(format!("{}: {layout}, {rows} rows, {rate}", path.display()));
+        if let Some(hz) = curve.rate_hz.filter(|hz| rows as f64 / hz > LONG_S) {
+            console.say(format!(
+                "warning: {}: by its column of the time the curve took {:.1} h; if that is in ms, call it time_ms",
+                path.display(),
+                rows as f64 / hz / 3600.0
+            ));
+        }
         curves.push((curve, name.into_owned(), sha256(&bytes)));
     }
     for (i, (_, name, hash)) in curves.iter().enumerate() {
@@ -116,6 +126,9 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             sha256,
         })
         .collect();
+    for doubt in force_curve::unlike(&sources) {
+        console.say(format!("warning: {doubt}"));
+    }
     let stated = Stated {
         target: args.target.as_deref(),
         instrument: args.instrument.as_deref(),

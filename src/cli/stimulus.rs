@@ -118,7 +118,18 @@ fn read(path: &Path) -> Result<Vec<u8>, Failure> {
 
 fn open(path: &Path) -> Result<Bundle, Failure> {
     let opened = Bundle::open(&read(path)?);
-    opened.map_err(|e| Failure::input(format!("{}: refused: {e}", path.display())))
+    let bundle = opened.map_err(|e| Failure::input(format!("{}: refused: {e}", path.display())))?;
+    let name = path.file_stem().unwrap_or_default().to_string_lossy();
+    let is_address = name.len() == 64 && name.chars().all(|c| c.is_ascii_hexdigit());
+    match is_address && !name.eq_ignore_ascii_case(&bundle.sha256()) {
+        true => Err(Failure::input(format!(
+            "{}: refused: its name is an address, and it is the bundle sha256:{}",
+            path.display(),
+            bundle.sha256()
+        ))
+        .hint("get the bundle with the address of its name, or give this one another name")),
+        false => Ok(bundle),
+    }
 }
 
 fn pack(args: &Pack, console: &mut Console) -> Result<(), Failure> {
@@ -141,6 +152,9 @@ fn pack(args: &Pack, console: &mut Console) -> Result<(), Failure> {
             BundleError::NotStated(key) => failure.hint(format!(
                 "say it with --{key}, or in the header of the recording: # {key}: …"
             )),
+            BundleError::Other(_) => failure.hint(
+                "every byte counts: a program that converts line ends or the encoding makes another recording of it",
+            ),
             BundleError::Absent(_) => failure.hint("name every recording after the model file"),
             _ => failure,
         }
@@ -214,10 +228,13 @@ fn site(folder: &Path, out: &Path, console: &mut Console) -> Result<(), Failure>
         );
     }
     paths.sort();
-    let bundles = paths
+    let mut bundles = paths
         .iter()
         .map(|path| open(path))
         .collect::<Result<Vec<_>, _>>()?;
+    // A copy is no second stimulus.
+    bundles.sort_by_cached_key(Bundle::sha256);
+    bundles.dedup_by_key(|bundle| bundle.sha256());
     new_folder(out)?;
     for (name, text) in catalogue::files(&bundles) {
         write(out, &name, text.as_bytes())?;

@@ -420,6 +420,17 @@ fn every_output_says_that_a_mass_is_stated() {
         (&mass["origin"], &mass["identified"]),
         (&"stated".into(), &false.into())
     );
+    // grams that are taken for kilograms
+    let out = identify(dir.path(), &[&PASSIVE[..], &["--mass-kg", "12"]].concat()).success();
+    out.stdout(predicate::str::contains(
+        "warning: mass of 12.00 kg is stated: five strokes a second over the travel would take ",
+    ));
+    let out = identify(
+        dir.path(),
+        &[&PASSIVE[..], &["--mass-kg", "0.012"]].concat(),
+    )
+    .success();
+    out.stdout(predicate::str::contains("five strokes a second").not());
     // a press contradicts it
     let args = ["--mass-kg", "0.2", "--dynamic", PRESS];
     identify(dir.path(), &[&PASSIVE[..], &args].concat())

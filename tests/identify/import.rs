@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that fails says where")]
 
 use assert_cmd::Command;
+use predicates::prelude::PredicateBooleanExt as _;
 use predicates::str::contains;
 use std::fmt::Write as _;
 use std::fs;
@@ -101,6 +102,23 @@ fn what_is_no_curve_is_refused_with_file_and_line() {
     study(&["import", "force-curve", CLICKIEZ, "-o", &out])
         .code(1)
         .stderr(contains("already exists"));
+    // and who gives the curve itself to `study identify` is told of this command
+    study(&["identify", CLICKIEZ])
+        .code(1)
+        .stderr(contains("hint: it is a force curve").and(contains("study import force-curve")));
+    study(&["identify", &bad])
+        .code(1)
+        .stderr(contains("--columns").and(contains("import").not()));
+    let slow = path("slow.csv");
+    let rows: String = (0..1900)
+        .map(|i| format!("{i},{i},{}\n", 1000 - (i - 1000i32).abs()))
+        .collect();
+    fs::write(&slow, format!("time,force,displacement\n{rows}")).unwrap();
+    study(&["import", "force-curve", &slow, "-o", &path("slow-r.csv")])
+        .success()
+        .stderr(contains(
+            "the curve took 0.5 h; if that is in ms, call it time_ms",
+        ));
     // a measurement is not replaced by its recording, and a folder or a device not at all
     let own = path("own.csv");
     fs::copy(CLICKIEZ, &own).unwrap();

@@ -98,6 +98,15 @@ fn two_labs_pack_the_same_bytes_and_unpack_what_they_packed() {
             contains("wrong.tar: refused: recordings/01.csv was changed")
                 .and(contains("1 bundle refused")),
         );
+    // a name that is the address of another bundle
+    let renamed = format!("{}.tar", "0".repeat(64));
+    fs::copy(&a, home.path().join(&renamed)).unwrap();
+    study(&["stimulus", "verify", &renamed], home.path())
+        .code(1)
+        .stderr(contains(
+            "its name is an address, and it is the bundle sha256:",
+        ));
+    fs::remove_file(home.path().join(&renamed)).unwrap();
     let model = repository("protocols/keyboard/models/jwk-bluey.toml");
     study(&["stimulus", "pack", &model, "jwk-bluey.csv"], home.path())
         .code(1)

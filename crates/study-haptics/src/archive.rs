@@ -18,8 +18,9 @@ pub use facts::Fact;
 pub use feel::{Feel, at_rest};
 pub use tar::{MAX_BYTES, TarError};
 
-use crate::model::Realization;
+use crate::identify::vaf::score;
 use crate::model::file;
+use crate::model::{Realization, Units};
 use crate::recording::{self, Recording, RecordingError};
 use study_base::diagnostic::{Findings, Severity, table};
 use study_base::hex::sha256;
@@ -108,7 +109,18 @@ fn is_day(text: &str) -> bool {
     text.len() == 10
         && text.chars().all(|c| c.is_ascii_digit() || c == '-')
         && matches!(text.split('-').collect::<Vec<_>>()[..], [year, month, day]
-            if year.len() == 4 && month.len() == 2 && within(year, 9999) && within(month, 12) && within(day, 31))
+            if year.len() == 4 && month.len() == 2 && within(year, 9999) && within(month, 12) && within(day, days(year, month)))
+}
+
+/// The number of days of a month.
+fn days(year: &str, month: &str) -> u32 {
+    let year: u32 = year.parse().unwrap_or_default();
+    let leap = year.is_multiple_of(4) && (!year.is_multiple_of(100) || year.is_multiple_of(400));
+    match month {
+        "02" => 28 + u32::from(leap),
+        "04" | "06" | "09" | "11" => 30,
+        _ => 31,
+    }
 }
 
 study_base::named! {
@@ -165,6 +177,14 @@ fn path(index: usize) -> String {
     format!("recordings/{:02}.csv", index + 1)
 }
 
+/// What a key of [`Stated`] is called in a sentence.
+fn words(key: &str) -> &str {
+    match key {
+        "published" => "day of publication",
+        other => other,
+    }
+}
+
 /// Why something is no bundle, or cannot become one.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "the messages have the meanings")]
@@ -179,19 +199,24 @@ pub enum BundleError {
     Format,
     #[error("{MANIFEST}: line {0} was changed: it is not as `study stimulus pack` writes it")]
     Line(usize),
-    #[error("the {0} is not stated")]
+    #[error("the {} is not stated", words(.0))]
     NotStated(&'static str),
-    #[error("the {0} has control characters or more than {MAX_TEXT} characters")]
+    #[error("the {} has control characters or more than {MAX_TEXT} characters", words(.0))]
     Text(&'static str),
     #[error("`{}` is not a date: write the day of publication as 2024-05-17", Untrusted(.0))]
     Day(String),
-    #[error("the {key} is stated as `{}`, and the recording `{}` has `{}`", Untrusted(.stated), Untrusted(.recording), Untrusted(.own))]
+    #[error("the {} is stated as `{}`, and the recording `{}` has `{}`", words(.key), Untrusted(.stated), Untrusted(.recording), Untrusted(.own))]
     Contradicts {
         key: &'static str,
         stated: String,
         recording: String,
         own: String,
     },
+    #[error(
+        "the model says that it was identified from the recording `{}`, but predicts its force worse than a constant (VAF {vaf:.1}): is it of another target, in other units, or of the opposite sign?",
+        Untrusted(.recording)
+    )]
+    Misfit { recording: String, vaf: f64 },
     #[error("{0} was changed: its SHA-256 is not the one in {MANIFEST}")]
     Changed(String),
     #[error("{MODEL}: {}", Untrusted(.0))]
@@ -514,6 +539,15 @@ fn related(
         )
     };
     kept.sort_by_key(key);
+    // That of a turning handle needs a lever arm, which is not known.
+    let judged = kept.iter().filter(|_| realization.units == Units::Linear);
+    for Kept { recording, .. } in judged.filter(|kept| kept.purpose == Purpose::Training) {
+        let vaf = score(realization, recording).vaf;
+        if vaf < 0.0 {
+            let recording = recording.name.clone();
+            return Err(BundleError::Misfit { recording, vaf });
+        }
+    }
     Ok(kept)
 }
 

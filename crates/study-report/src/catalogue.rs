@@ -12,6 +12,7 @@ use study_base::text::{Untrusted, counted};
 use study_haptics::archive::{Bundle, Feel, at_rest};
 use study_haptics::identify::repetition::WITHIN;
 use study_haptics::model::Units;
+use study_haptics::model::coverage::Origin;
 
 const CSS: &str = include_str!("catalogue/style.css");
 
@@ -252,6 +253,18 @@ fn card(address: &str, feel: &Feel, bundle: &Bundle) -> Markup {
             ),
         ),
     ];
+    for (name, term) in &r.provenance.terms {
+        let what = match name.as_str() {
+            "m_kg" => "Mass",
+            "b_n_s_per_mm" => "Damping",
+            other => other,
+        };
+        match term.origin {
+            Origin::Training => {}
+            Origin::Dynamic => facts.push((what, "from a dynamic recording".to_owned())),
+            Origin::Stated => facts.push((what, "stated, not identified".to_owned())),
+        }
+    }
     for (name, vaf) in &r.vaf {
         facts.push(("VAF", format!("{} ({name})", size(*vaf))));
     }

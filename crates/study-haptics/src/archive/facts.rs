@@ -2,6 +2,7 @@
 
 use super::feel::Feel;
 use super::{FORMAT, Kept, Stated};
+use crate::model::coverage::Origin;
 use crate::model::file::quoted;
 use crate::model::{Realization, Units};
 use std::fmt::Write as _;
@@ -94,6 +95,11 @@ pub(super) fn of(
     }
     put("coverage", own("x_mm"), list(r.trained.x_mm));
     put("coverage", own("v_mm_s"), number(r.trained.v_mm_s));
+    // What is not from the recordings of the force by position is told apart.
+    let terms = r.provenance.terms.iter();
+    for (name, term) in terms.filter(|(_, term)| term.origin != Origin::Training) {
+        put("terms", own(name), quoted(term.origin.as_str()));
+    }
     for (name, vaf) in &r.vaf {
         put("validation", quoted(name), number(*vaf));
     }

@@ -31,6 +31,8 @@ pub enum TarError {
     Incomplete,
     #[error("bytes follow the end of the archive")]
     Trailing,
+    #[error("a file in it has no name")]
+    NoName,
     #[error("the name `{}` could lead out of a folder", Untrusted(.0))]
     Name(String),
     #[error("`{0}` is {1}, and a bundle has files only")]
@@ -148,6 +150,9 @@ fn entry(block: &[u8; BLOCK]) -> Result<(String, usize), TarError> {
         String::from_utf8_lossy(&field[..end]).into_owned()
     };
     let name = field(0, MAX_NAME + 1);
+    if name.is_empty() {
+        return Err(TarError::NoName);
+    }
     if !is_plain(&name) || block[345] != 0 {
         return Err(TarError::Name(name));
     }

@@ -1,4 +1,5 @@
 use super::*;
+use crate::model::coverage::{Determined, Origin};
 use crate::recording::force_curve::{self, Source, Stated as OfCurve};
 
 /// A model file of an earlier release, so that the address of its bundle is that of then.
@@ -157,6 +158,7 @@ fn every_wrong_bundle_is_refused_with_its_cause() {
         ),
         (byte(end - 1025, 1), "was changed"),
         // names, links, sizes
+        (named(""), "a file in it has no name"),
         (
             named("../../.bashrc"),
             "`../../.bashrc` could lead out of a folder",
@@ -219,6 +221,10 @@ fn every_wrong_bundle_is_refused_with_its_cause() {
         (
             manifest("2024-05-17", "2024-17-05"),
             "`2024-17-05` is not a date",
+        ),
+        (
+            manifest("2024-05-17", "2023-02-29"),
+            "`2023-02-29` is not a date",
         ),
         (
             manifest("measured by ThereminGoat", "measured by us"),
@@ -333,6 +339,55 @@ fn what_cannot_be_packed_is_named() {
         let found = pack(own(), missing);
         assert!(found.contains(key), "{found}");
     }
+}
+
+/// A model of another switch, or in other units, that names a recording as its source.
+#[test]
+fn a_model_that_has_nothing_to_do_with_its_recording_is_refused() {
+    let mut other = realization(MODEL_FILE.as_bytes()).unwrap();
+    for branch in [&mut other.positive, &mut other.negative] {
+        let numbers = branch.k_n_per_mm.iter_mut().chain(&mut branch.f0_n);
+        numbers.for_each(|number| *number *= 20.0);
+    }
+    let model = file::write(&other);
+    let recordings = vec![("akko-blue".to_owned(), recording())];
+    let packed = Bundle::pack(model.as_bytes(), recordings, stated());
+    let found = packed.unwrap_err().to_string();
+    assert!(
+        found.contains("`akko-blue`, but predicts its force worse than a constant (VAF -3"),
+        "{found}"
+    );
+}
+
+#[test]
+fn days_are_those_of_the_calendar() {
+    for day in ["2024-02-29", "2000-02-29", "2024-04-30", "2023-12-31"] {
+        assert!(is_day(day), "{day}");
+    }
+    for none in ["2023-02-29", "1900-02-29", "2024-04-31", "2024-13-01"] {
+        assert!(!is_day(none), "{none}");
+    }
+}
+
+/// What a person stated of a model is told apart from what recordings say.
+#[test]
+fn a_stated_mass_is_a_fact_of_the_bundle() {
+    let mut weighed = realization(MODEL_FILE.as_bytes()).unwrap();
+    let mass = Determined {
+        value: Some(0.002),
+        origin: Origin::Stated,
+        ..Determined::default()
+    };
+    (weighed.provenance.terms).insert("m_kg".to_owned(), mass);
+    let model = file::write(&weighed);
+    let recordings = vec![("akko-blue".to_owned(), recording())];
+    let bundle = Bundle::pack(model.as_bytes(), recordings, stated()).unwrap();
+    let stated = (bundle.facts().iter()).find(|fact| fact.section == "terms");
+    let stated = stated.map(|fact| (fact.key.as_str(), fact.value.as_str()));
+    assert_eq!(stated, Some(("m_kg", "\"stated\"")));
+    assert_eq!(Bundle::open(&bundle.bytes).unwrap(), bundle);
+    let of_recordings = (packed().facts.iter()).any(|fact| fact.section == "terms");
+    assert!(!of_recordings);
 }
 
 /// A recording with which the model was only validated goes by its name, which may have anything.

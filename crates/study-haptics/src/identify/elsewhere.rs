@@ -33,6 +33,10 @@ const DIFFERENT: f64 = 2.576;
 const SAME_TARGET: [f64; 2] = [0.2, 5.0];
 /// Beyond this range a sensor of another calibration is likelier than another speed.
 const ALIKE: [f64; 2] = [0.75, 1.35];
+/// A quick hand: five strokes back and forth a second.
+const QUICK_RAD_S: f64 = 5.0 * std::f64::consts::TAU;
+/// A stated value whose force in quick strokes is so many times that by position is doubted.
+const OUTWEIGHS: f64 = 3.0;
 /// The share of the force of the table that motion does not explain, from which on that number says something.
 const LEAST_OWN: f64 = 0.02;
 
@@ -166,6 +170,8 @@ impl Elsewhere {
                         said,
                     });
                 }
+                let doubt = outweighs(Term::BOTH[i], value, realization);
+                cell.warnings.extend(doubt);
                 cell.terms.push(Estimate::stated(Term::BOTH[i], value));
                 set(realization, Term::BOTH[i], value);
             } else if let Some(said) = said.filter(|_| asks) {
@@ -196,6 +202,29 @@ impl Elsewhere {
         }
         Ok(())
     }
+}
+
+/// A doubt about a stated value whose force in quick strokes over the travel would be far above
+/// every force by position: such as a mass in grams.
+fn outweighs(term: Term, stated: f64, realization: &Realization) -> Option<Warning> {
+    let [low, high] = realization.trained.x_mm;
+    let amplitude_mm = 0.5 * (high - low);
+    let needs_n = match term {
+        Term::Mass => 1e-3 * stated * amplitude_mm * QUICK_RAD_S.powi(2),
+        Term::Damping => stated * amplitude_mm * QUICK_RAD_S,
+    };
+    let branches = [&realization.positive, &realization.negative];
+    let forces = branches.into_iter().flat_map(|branch| {
+        let rows = realization.x_mm.iter().zip(&branch.k_n_per_mm);
+        rows.zip(&branch.f0_n).map(|((x, k), f0)| k * x + f0)
+    });
+    let most_n = forces.fold(0.0, |most: f64, force| most.max(force.abs()));
+    (needs_n > OUTWEIGHS * most_n).then_some(Warning::Outweighs {
+        term,
+        stated,
+        needs_n,
+        most_n,
+    })
 }
 
 /// Whether recordings say something else than what is stated.

@@ -305,8 +305,11 @@ pub fn run(
         grid::run_in_steps(&training, &plan, lookup, &scored, cell_done, step)
             .map(|cells| (cells, None, elsewhere))
     };
-    let (mut cells, comparison, elsewhere) = identify()
-        .map_err(|error| IdentificationError::Estimator(training[0].path.clone(), error))?;
+    let (mut cells, comparison, elsewhere) = identify().map_err(|error| {
+        let at_fault = dynamic.first().filter(|_| error.is_of_dynamic());
+        let path = &at_fault.unwrap_or(&training[0]).path;
+        IdentificationError::Estimator(path.clone(), error)
+    })?;
     let others = training.iter().skip(1).chain(&dynamic).chain(&recordings);
     warn_about_filters(&training[0].recording, others, &mut say);
     let filter = request.filter_description(&training[0].recording);

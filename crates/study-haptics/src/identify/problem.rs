@@ -80,6 +80,14 @@ pub enum IdentifyError {
 }
 
 impl IdentifyError {
+    /// Whether it is about the dynamic recordings.
+    pub(super) fn is_of_dynamic(&self) -> bool {
+        matches!(
+            self,
+            Self::DynamicRange { .. } | Self::DynamicTooShort { .. } | Self::OtherForce(_)
+        )
+    }
+
     /// What to do about it.
     pub fn hint(&self) -> Option<&'static str> {
         match self {
@@ -210,6 +218,17 @@ pub enum Warning {
     /// The experimenter states something else than the recordings say.
     #[error("{} of {} is stated, but the {} say {}", .said.term.as_str(), .said.term.shown(*.stated), .said.by(), what_is_said(.said))]
     Stated { stated: f64, said: Evidence },
+    /// A stated mass or damping would outweigh everything that was measured.
+    #[error(
+        "{} of {} is stated: five strokes a second over the travel would take {needs_n:.3} N for it alone, and the force by position is at most {most_n:.3} N; is it in {}?",
+        .term.as_str(), .term.shown(*.stated), .term.unit()
+    )]
+    Outweighs {
+        term: Term,
+        stated: f64,
+        needs_n: f64,
+        most_n: f64,
+    },
     /// The mass of a table is not that which the recordings show.
     #[error("mass: this table has {}, but the recordings say {}: the rest stands for something that the table lacks; compare the methods (without --method), or choose another dx or --direction", .said.term.shown(*.table_kg), what_is_said(.said))]
     OtherMass { table_kg: f64, said: Evidence },

@@ -18,7 +18,7 @@ mod time;
 
 use super::names::linear;
 use super::rows::{number, separator, shown};
-use super::{Columns, acceleration, resolution, velocity, write};
+use super::{Columns, acceleration, range, resolution, velocity, write};
 use std::fmt::Write as _;
 use study_base::text::Untrusted;
 use time::{Time, moment, rate, time_of};
@@ -27,6 +27,8 @@ use time::{Time, moment, rate, time_of};
 pub const USUAL_RATE_HZ: f64 = 10.0;
 /// Column names are looked for in this many lines.
 const MOST_HEADER_LINES: usize = 100;
+/// Curves of one target differ by less than this factor, unless it is a damper at other speeds.
+const UNLIKE: f64 = 5.0;
 /// Fewest rows of a curve: second differences need three.
 const LEAST_ROWS: usize = 3;
 
@@ -449,6 +451,35 @@ pub struct Stated<'c> {
     pub license: Option<&'c str>,
     /// Rows a second of curves without a time.
     pub rate_hz: Option<f64>,
+}
+
+/// Doubts that all curves are of one target in one unit: the force or the displacement of one varies by
+/// many times that of another. Untrusted.
+pub fn unlike(curves: &[Source<'_>]) -> Vec<String> {
+    let quantities = [
+        ("force", "N", "`force_gf` or `force_n`"),
+        ("displacement", "mm", "`displacement_mm`"),
+    ];
+    let mut doubts = Vec::new();
+    for (what, unit, names) in quantities {
+        let spread = |source: &Source<'_>| {
+            let ForceCurve { x_mm, f_n, .. } = source.curve;
+            let [low, high] = range(if what == "force" { f_n } else { x_mm });
+            high - low
+        };
+        let mut spreads: Vec<(f64, &str)> = (curves.iter())
+            .map(|source| (spread(source), source.file))
+            .collect();
+        spreads.sort_by(|a, b| a.0.total_cmp(&b.0));
+        if let [(small, one), .., (large, other)] = spreads[..]
+            && large > UNLIKE * small
+        {
+            doubts.push(format!(
+                "the {what} varies by {small:.4} {unit} in {one} and by {large:.4} {unit} in {other}: if both are of one target, their units differ, and the names of the columns have to say them, such as {names}"
+            ));
+        }
+    }
+    doubts
 }
 
 /// One recording of all curves, one after the other, as the bytes of its CSV file. Each line of the

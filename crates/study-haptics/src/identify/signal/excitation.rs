@@ -106,8 +106,12 @@ impl Excitation {
     pub fn warning(&self) -> Option<String> {
         let median = self.median()?;
         (median > ILL_CONDITIONED).then(|| {
+            let median = match median < 1e6 {
+                true => format!("{median:.0}"),
+                false => format!("{median:.0e}"),
+            };
             format!(
-                "m, b and k are not identifiable, because a, v and x hardly vary independently: the median condition number of [a v x 1] is {median:.0}, above {ILL_CONDITIONED}; record a swept sine"
+                "m, b and k are not identifiable, because a, v and x hardly vary independently: the median condition number of [a v x 1] is {median}, above {ILL_CONDITIONED}; record a swept sine"
             )
         })
     }

@@ -222,6 +222,11 @@ fn a_time_in_numbers_gives_the_rate_and_a_wrong_one_is_named() {
             "0.460 s apart here and 0.020 s usually",
         ),
         (["0", "12:00:01", "0.04", "0.06"], 3, "the time is"),
+        (
+            ["12:00:03", "12:00:04", "12:00:01", "12:00:02"],
+            4,
+            "does not increase",
+        ),
     ] {
         let error = with("time", times).unwrap_err().to_string();
         assert!(
@@ -247,6 +252,33 @@ fn a_decimal_comma_is_read_in_quotes_and_refused_without() {
         "{error}"
     );
     assert!(error.contains("semicolons"), "{error}");
+}
+
+/// Repeated measurements, one of them in N with a column name that says nothing, which means gf.
+#[test]
+fn curves_of_other_units_are_doubted_and_repetitions_are_not() {
+    let [gf, n, slow] = [
+        "force,displacement\n0,0\n60,1\n0,0.1\n",
+        "force,displacement\n0,0\n0.588,1\n0,0.1\n",
+        "force,displacement\n0,0\n40,1\n0,0.1\n",
+    ]
+    .map(|text| read(text).unwrap());
+    let source = |curve, file| Source {
+        curve,
+        file,
+        sha256: "",
+    };
+    assert_eq!(
+        unlike(&[source(&gf, "a.csv"), source(&slow, "b.csv")]),
+        [""; 0]
+    );
+    let doubts = unlike(&[source(&gf, "a.csv"), source(&n, "b.csv")]);
+    assert_eq!(doubts.len(), 1);
+    assert!(
+        doubts[0].starts_with("the force varies by 0.0058 N in b.csv and by 0.5884 N in a.csv"),
+        "{doubts:?}"
+    );
+    assert_eq!(unlike(&[source(&gf, "a.csv")]), [""; 0]);
 }
 
 #[test]

@@ -57,6 +57,9 @@ pub(super) fn rate(times: &[(usize, Moment)]) -> Result<Option<f64>, (usize, Fau
         })
         .collect();
     if of_day.len() == times.len() {
+        if let Some(at) = goes_back(&of_day) {
+            return Err((times[at].0, Fault::TimeBackwards));
+        }
         return Ok(rate_of(&of_day));
     }
     let mut intervals = Vec::new();
@@ -96,6 +99,12 @@ pub(super) fn seconds_of(text: &str) -> Option<f64> {
         None => hours,
     };
     Some(3600.0 * hours + 60.0 * minutes + seconds)
+}
+
+/// The first row whose time of day is before that of the row above it, unless it is past midnight.
+fn goes_back(seconds: &[f64]) -> Option<usize> {
+    (1..seconds.len())
+        .find(|i| (seconds[*i] - seconds[i - 1]).rem_euclid(SECONDS_A_DAY) > 0.5 * SECONDS_A_DAY)
 }
 
 /// Rows a second from their times in whole seconds: between the first and the last time that
