@@ -31,6 +31,36 @@ enum Missing {
     Random,
     /// Two of five: each participant rates another triple.
     Blocks,
+    /// The first and the last realization but for three participants.
+    Extremes,
+    /// Of the first half of the participants the last realization, of the others the first.
+    Overlap,
+    /// Of the first half those above the middle, of the others those below it.
+    Bridge,
+    /// The same, and the middle one of the others, but for one participant who rates all.
+    Thin,
+    /// The same without that participant.
+    Apart,
+}
+
+impl Missing {
+    /// Whether a participant rates a realization, but for the random ones.
+    fn rates(self, p: u32, participants: u32, m: usize, k: usize) -> bool {
+        let (first, middle) = (p < participants / 2, k / 2);
+        match self {
+            Self::None | Self::Random => true,
+            // The ten pairs of five that are missing.
+            Self::Blocks => {
+                let (a, step) = ((p % 5) as usize, 1 + (p as usize / 5) % 2);
+                m != a && m != (a + step) % 5
+            }
+            Self::Extremes => p < 3 || (m > 0 && m + 1 < k),
+            Self::Overlap => m != if first { k - 1 } else { 0 },
+            Self::Bridge => m == middle || first == (m < middle),
+            Self::Thin => p == 0 || first == (m <= middle),
+            Self::Apart => first == (m <= middle),
+        }
+    }
 }
 
 /// A design, and how its participants differ.
@@ -48,6 +78,12 @@ struct World {
     camps: f64,
     /// What the camps disagree about.
     about: About,
+    /// The first half of the participants rates higher by this, the others lower.
+    severity: f64,
+    /// How often the last realization is rated in a repetition.
+    last: u32,
+    /// Everybody feels the realizations in the same order, and the rating falls by 0.2 per trial.
+    one_order: bool,
 }
 
 /// What two camps of participants disagree about.
@@ -70,6 +106,46 @@ const COMPLETE: World = World {
     taste: 0.5,
     camps: 0.0,
     about: About::Vaf,
+    severity: 0.0,
+    last: 1,
+    one_order: false,
+};
+const EXTREMES: World = World {
+    name: "extremes",
+    participants: 20,
+    missing: Missing::Extremes,
+    ..COMPLETE
+};
+const OVERLAP: World = World {
+    name: "overlap",
+    missing: Missing::Overlap,
+    severity: 0.75,
+    ..EXTREMES
+};
+const BRIDGE: World = World {
+    name: "bridge",
+    missing: Missing::Bridge,
+    ..OVERLAP
+};
+const THIN: World = World {
+    name: "thin bridge",
+    missing: Missing::Thin,
+    ..OVERLAP
+};
+const APART: World = World {
+    name: "apart",
+    missing: Missing::Apart,
+    ..OVERLAP
+};
+const UNEVEN: World = World {
+    name: "uneven",
+    last: 4,
+    ..COMPLETE
+};
+const ONE_ORDER: World = World {
+    name: "one order",
+    one_order: true,
+    ..COMPLETE
 };
 const RANDOM: World = World {
     name: "random",
@@ -178,7 +254,12 @@ fn study(world: &World, truth: Truth, number: u32) -> Vec<Trial> {
     }
     let mut trials = Vec::new();
     for p in 0..world.participants {
-        let level = 4.0 + 0.7 * noise.normal();
+        let severe = if p < world.participants / 2 {
+            world.severity
+        } else {
+            -world.severity
+        };
+        let level = 4.0 + 0.7 * noise.normal() + severe;
         let rises = match world.about {
             About::Vaf | About::Anything => p % 2 == 0,
             About::VafByChance => camps.below(2) == 0,
@@ -189,30 +270,36 @@ fn study(world: &World, truth: Truth, number: u32) -> Vec<Trial> {
             .collect();
         let rated: Vec<bool> = (0..k)
             .map(|m| match world.missing {
-                Missing::None => true,
                 Missing::Random => noise.below(5) > 0,
-                // The ten pairs of five that are missing.
-                Missing::Blocks => {
-                    let (a, step) = ((p % 5) as usize, 1 + (p as usize / 5) % 2);
-                    m != a && m != (a + step) % 5
-                }
+                other => other.rates(p, world.participants, m, k),
             })
             .collect();
         let mut before = 0.0;
         for r in 0..world.repetitions {
             let mut order: Vec<usize> = (0..k).filter(|&m| rated[m]).collect();
-            noise.shuffle(&mut order);
-            for m in order {
+            if !world.one_order {
+                noise.shuffle(&mut order);
+            }
+            let again = |m: usize| if m + 1 == k { world.last } else { 1 };
+            let order = order
+                .into_iter()
+                .flat_map(|m| (0..again(m)).map(move |i| (m, i)));
+            for (place, (m, again)) in order.enumerate() {
                 let carried = if truth == Truth::Carried {
                     0.3 * before
                 } else {
                     0.0
                 };
-                let rating = (own[m] + carried + 0.8 * noise.normal())
+                let drift = if world.one_order {
+                    -0.2 * place as f64
+                } else {
+                    0.0
+                };
+                let rating = (own[m] + carried + drift + 0.8 * noise.normal())
                     .round()
                     .clamp(1.0, 7.0);
                 before = rating - level;
-                trials.push((p, m, r, rating));
+                trials.push((p, m, r * world.last + again, rating));
             }
         }
     }
@@ -223,7 +310,9 @@ fn study(world: &World, truth: Truth, number: u32) -> Vec<Trial> {
 type Results = BTreeMap<String, Option<bool>>;
 
 /// Statistics of the analysis that are compared with 5 %.
-const TESTS: [&str; 12] = [
+const TESTS: [&str; 14] = [
+    "corr_adjusted/trend/p",
+    "within_cells/p",
     "rmanova/p_gg",
     "rmanova/p_hf",
     "rmanova/p",
@@ -436,6 +525,10 @@ fn main() {
     let (null, power) = (number("--studies", 10_000), number("--power", 1000));
     let all = [&COMPLETE, &RANDOM, &BLOCKS, &FEW, &CAMPS, &CAMPS_RANDOM];
     let with = |truth: Truth| all.map(|world| (world, truth));
+    let unlike = [
+        &EXTREMES, &OVERLAP, &BRIDGE, &THIN, &APART, &UNEVEN, &ONE_ORDER,
+    ];
+    let in_unlike = |truth: Truth| unlike.map(|world| (world, truth));
     table(
         "No realization is better",
         null,
@@ -451,10 +544,24 @@ fn main() {
         verdicts,
     );
     table(
+        "No realization is better: means of unlike precision",
+        null,
+        true,
+        &in_unlike(Truth::Equal),
+        verdicts,
+    );
+    table(
         "They differ, unrelated to VAF",
         null,
         true,
         &with(Truth::Unrelated),
+        verdicts,
+    );
+    table(
+        "They differ, unrelated to VAF: means of unlike precision",
+        null,
+        true,
+        &in_unlike(Truth::Unrelated),
         verdicts,
     );
     table(
@@ -469,6 +576,13 @@ fn main() {
         power,
         false,
         &with(Truth::Vaf),
+        verdicts,
+    );
+    table(
+        "Power: 0.5 per standard deviation of VAF: means of unlike precision",
+        power,
+        false,
+        &in_unlike(Truth::Vaf),
         verdicts,
     );
     let worlds = |truth: Truth| {

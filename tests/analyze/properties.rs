@@ -184,10 +184,11 @@ fn changed(csv: &str, rating: impl Fn(f64) -> f64, name: impl Fn(&str) -> String
 }
 
 /// Groups that have the unit of a rating, or its origin.
-const WITH_UNITS: [&str; 22] = [
+const WITH_UNITS: [&str; 23] = [
     "adjusted",
     "finding",
     "lmm_cells",
+    "within_cells",
     "pair",
     "desc",
     "desc_all",
@@ -243,6 +244,7 @@ fn a_shift_and_a_scale_leave_every_standardized_statistic() {
         "posthoc/A|B/t",
         "icc_subjects/ICC2",
         "lmm_cells/F",
+        "within_cells/F",
         "pair/A|B/p_holm",
         "finding/differ/p",
         "finding/best/p",

@@ -20,9 +20,10 @@ fn analysis(delivered: bool, rules: &Rules) -> Analysis {
         ("P2", [1, 2, 4, 4, 6, 7]),
         ("P3", [3, 2, 4, 3, 6, 6]),
     ];
-    for (who, ratings) in people {
+    for (shift, (who, ratings)) in people.into_iter().enumerate() {
         for (i, rating) in ratings.iter().enumerate() {
             let n = i + 1;
+            let place = (i + shift) % 6 + 1;
             let (verdict, vaf, gain) = match (who, n) {
                 ("P2", 6) => ("flag", "0.75", "0.5"),
                 ("P3", 6) => ("too-little", "", ""),
@@ -33,7 +34,7 @@ fn analysis(delivered: bool, rules: &Rules) -> Analysis {
                 false => String::new(),
             };
             text += &format!(
-                "s,{who},1,1,{n},1,{n},{n},M{n},test,1,false,false,false,1,{rating},false,1,ok,0.9{n},\
+                "s,{who},1,1,{place},1,{place},{place},M{n},test,1,false,false,false,1,{rating},false,1,ok,0.9{n},\
                  {verdict},{vaf},{own},{gain}\n"
             );
         }

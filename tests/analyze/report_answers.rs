@@ -32,10 +32,10 @@ fn incomplete() -> Analysis {
 }
 
 #[test]
-fn with_incomplete_tables_the_mixed_model_decides() {
+fn with_incomplete_tables_participants_are_compared_with_themselves() {
     let a = incomplete();
     assert!(a.values.number("rmanova/F").is_none());
-    let f = a.values.number("lmm_cells/F").unwrap();
+    let f = a.values.number("within_cells/F").unwrap();
     let text = words(&html(&a));
     for text in [text.clone(), terminal(&a)] {
         assert!(!text.contains("too few subjects rated both"), "{text}");
@@ -43,10 +43,7 @@ fn with_incomplete_tables_the_mixed_model_decides() {
             text.contains("None of 6 participants rated every realization"),
             "{text}"
         );
-        assert!(
-            text.contains("contrast of the linear mixed model"),
-            "{text}"
-        );
+        assert!(text.contains("t test within participants"), "{text}");
         assert!(text.contains(&format!(") = {f:.2}, p")), "{text}");
     }
     assert!(text.contains("Do the realizations differ?"));
@@ -57,7 +54,7 @@ fn with_incomplete_tables_the_mixed_model_decides() {
     );
     let results = part(&text, "Results ", "Included and excluded");
     assert!(
-        results.contains("(linear mixed model, 6 participants)"),
+        results.contains("(analysis of variance within participants, 6 participants)"),
         "{results}"
     );
 }
@@ -177,7 +174,7 @@ fn the_methods_give_the_numbers_of_participants_and_realizations() {
         ),
         "{text}"
     );
-    // One of four: the mixed model uses them all.
+    // One of four: they are compared with themselves.
     let incomplete = analysis_of(&kept_of(&all, |l| !l.starts_with("S0,c")));
     let text = words(&html(&incomplete));
     assert!(
@@ -185,7 +182,7 @@ fn the_methods_give_the_numbers_of_participants_and_realizations() {
         "{text}"
     );
     assert!(
-        text.contains("(linear mixed model, 4 participants)"),
+        text.contains("(analysis of variance within participants, 4 participants)"),
         "{text}"
     );
 }

@@ -133,19 +133,23 @@ fn the_methods_name_exactly_the_tests_that_were_done() {
             ("Pearson", defined("corr/pearson/r", "")),
             (
                 "all permutations",
-                defined("corr/pearson/p_exact_two_sided", ""),
+                decided(Question::Vaf) == Some(TestKind::PermutationExact),
             ),
             (
                 "random permutations",
-                defined("corr/pearson/p_monte_carlo_two_sided", ""),
+                decided(Question::Vaf) == Some(TestKind::PermutationMonteCarlo),
+            ),
+            (
+                "generalized least squares",
+                decided(Question::Vaf) == Some(TestKind::WeightedTrend),
             ),
             (
                 "mixed model of the ratings on VAF",
                 defined("lmm_vaf_crossed/slope", ""),
             ),
             (
-                "mixed model of all cell means",
-                decided(Question::Differ) == Some(TestKind::MixedModel),
+                "analysis of variance of all cell means",
+                decided(Question::Differ) == Some(TestKind::WithinParticipants),
             ),
         ] {
             let told = methods.contains(word);

@@ -40,6 +40,7 @@ mod record;
 mod reference;
 mod rendering;
 pub mod results;
+mod same_order;
 mod select;
 mod sites;
 mod subjects;

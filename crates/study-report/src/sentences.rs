@@ -32,6 +32,9 @@ pub(super) fn test_name(kind: TestKind) -> &'static str {
         TestKind::Friedman => "Friedman's test, Iman and Davenport's approximation",
         TestKind::MixedModel => "linear mixed model",
         TestKind::MixedContrast => "contrast of the linear mixed model",
+        TestKind::WithinParticipants => "analysis of variance within participants",
+        TestKind::WithinContrast => "t test within participants",
+        TestKind::WeightedTrend => "t test of the means weighted by their precision",
         TestKind::PairedT => "paired t test",
         TestKind::PermutationExact => "permutation test, exact",
         TestKind::PermutationMonteCarlo => "permutation test",
@@ -123,6 +126,23 @@ pub(super) fn permutation_p(a: &Analysis, found: Option<(f64, bool)>) -> String 
     found.map_or_else(String::new, |(p, exact)| {
         let kind = if exact { "exact p" } else { "permutation p" };
         format!(", {kind} {}", apa::p_beside(p, a.alpha))
+    })
+}
+
+/// The p that decides whether VAF predicts the rating, as [`permutation_p`] or with the weighted means.
+pub(super) fn p_of_vaf(a: &Analysis) -> String {
+    let Some(trend) = &a.correlation().trend else {
+        return permutation_p(a, a.correlation().pearson.permutation_p());
+    };
+    let all = (trend.t.number())
+        .zip(trend.df.number())
+        .zip(trend.p.number());
+    all.map_or_else(String::new, |((t, df), p)| {
+        format!(
+            "; with the means weighted by their precision t({df}) = {}, p {}",
+            apa::two(t),
+            apa::p_beside(p, a.alpha)
+        )
     })
 }
 
@@ -227,7 +247,7 @@ pub(super) fn ties(a: &Analysis) -> Vec<String> {
     let limit = "exchanging them does not change r, which limits how small p can be.";
     let mut found = Vec::new();
     let permutation = a.correlation().pearson.permutation_p();
-    if !permutation.is_some_and(|(_, exact)| exact) {
+    if a.correlation().trend.is_some() || !permutation.is_some_and(|(_, exact)| exact) {
         return found;
     }
     let vaf = a.tied_vaf();

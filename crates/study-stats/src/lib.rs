@@ -8,6 +8,7 @@
 //! | Do the realizations differ? | [`anova`], [`friedman`] (rank test), [`lmm`] (unbalanced data), [`clm`] and [`clmm`] (ordered categories) |
 //! | Do groups of subjects differ, or does a difference depend on the group? | [`between`] (equal variances), [`between::welch`] (variances of their own) |
 //! | Do the ratings follow a given order? | [`friedman::page`] |
+//! | The same where not everybody rated everything, within subjects | [`within`] |
 //! | Which pairs differ? Are they equivalent? | [`paired`] |
 //! | Are the ratings correlated with a covariate? | [`correlation`], [`permutation`] (exact p), [`bootstrap`] (interval), [`bayes`] |
 //! | What is the slope on a covariate? | [`regression`], [`two_way_slope`] (beside two fixed factors), [`lmm`] (random effects) |
@@ -74,6 +75,7 @@ pub mod random;
 pub mod rank;
 pub mod regression;
 pub mod two_way_slope;
+pub mod within;
 
 /// The number, unless it is infinite or NaN.
 pub(crate) fn finite(x: f64) -> Option<f64> {

@@ -1,16 +1,20 @@
-//! Adjusted means (`adjusted/*`, `lmm_cells/*`): the marginal means of the mixed model
-//! cell mean ~ realization + (1 | subject).
+//! Adjusted means (`adjusted/*`, `within_cells/*`): what a mean participant would rate, by the model
+//! cell mean ~ realization + subject. Beside it the mixed model with random subjects (`lmm_cells/*`).
 //!
-//! Verdicts rest on them where cells are missing: they compare realizations as if the
-//! same participants had rated all of them. In designs without a missing cell they are
-//! the means over participants.
+//! Verdicts rest on them where cells are missing: realizations are compared within
+//! participants, so that it does not matter who rated which of them. A mixed model would also compare
+//! participants with each other, which shows their severity where groups rated different
+//! realizations. In designs without a missing cell they are the means over participants.
 
 use super::cells::{Cell, Cells};
 use super::design::Design;
 use super::record::{Interval, RealizationName, Stat, Why, statistics};
 use std::collections::BTreeMap;
 use study_stats::describe::mean;
-use study_stats::lmm::{AdjustedMeans, ContrastT, FixedEffects, LmmData, LmmError, adjusted_means};
+use study_stats::lmm::{
+    AdjustedMeans, CellSummary, ContrastT, FixedEffects, LmmData, LmmError, adjusted_means,
+};
+use study_stats::within::{Within, WithinError};
 
 /// Most realizations that are compared pair by pair.
 pub(super) const MAX_COMPARED: usize = 60;
@@ -22,8 +26,10 @@ pub(super) struct Adjusted {
     /// Indices of the realizations.
     pub(super) models: Vec<usize>,
     /// Their means, or why there are none.
-    pub(super) means: Result<Vec<f64>, LmmError>,
-    /// The fitted model.
+    pub(super) means: Result<Vec<f64>, WithinError>,
+    /// The comparison within participants.
+    pub(super) within: Result<Within, WithinError>,
+    /// The mixed model, for the standard errors of means.
     pub(super) fit: Result<AdjustedMeans, LmmError>,
 }
 
@@ -31,30 +37,38 @@ impl Adjusted {
     pub(super) fn of(cells: &Cells<'_>) -> Self {
         let models = cells.tested();
         let design = Design::of(cells);
-        let fit = fitted(cells, &models);
+        let own: Vec<CellSummary> = (cells.cells.iter())
+            .filter(|c| models.binary_search(&c.model).is_ok())
+            .filter_map(Cell::summary)
+            .collect();
+        let fit = fitted(&own, &models);
+        let within = Within::of(&own).and_then(|found| match found.realizations == models {
+            true => Ok(found),
+            false => Err(WithinError::Overflow),
+        });
         let by_model = cells.subject_means();
-        let raw = || (models.iter()).map(|&m| mean(&by_model[m]).ok_or(LmmError::NoData));
-        let means = match &fit {
-            // To the last bit, also where the model has no fit.
+        let raw = || (models.iter()).map(|&m| mean(&by_model[m]).ok_or(WithinError::NoData));
+        let means = match &within {
+            // To the last bit.
             _ if design.is_complete() => raw().collect(),
-            Err(LmmError::ConstantRatings | LmmError::OneRealization) => raw().collect(),
+            Err(WithinError::OneRealization) => raw().collect(),
             Err(error) => Err(*error),
-            Ok(fit) => Ok(fit.means.iter().map(|t| t.estimate).collect()),
+            // Nothing makes them comparable: as they are.
+            Ok(found) if !found.is_connected() => raw().collect(),
+            Ok(found) => Ok(found.means.clone()),
         };
         Self {
             design,
             models,
             means,
+            within,
             fit,
         }
     }
 }
 
-fn fitted(cells: &Cells<'_>, models: &[usize]) -> Result<AdjustedMeans, LmmError> {
-    let own = (cells.cells.iter())
-        .filter(|c| models.binary_search(&c.model).is_ok())
-        .filter_map(Cell::summary);
-    let table = LmmData::new(&own.collect::<Vec<_>>(), FixedEffects::Intercept)?;
+fn fitted(own: &[CellSummary], models: &[usize]) -> Result<AdjustedMeans, LmmError> {
+    let table = LmmData::new(own, FixedEffects::Intercept)?;
     let found = adjusted_means(&table)?;
     if found.realizations == models {
         Ok(found)
@@ -82,7 +96,23 @@ statistics! {
         p: Stat,
     }
 
-    /// The marginal mean of a realization in the model of cells; if no cell is missing, `desc/M/subject_mean/mean`.
+    /// Cell mean ~ realization + subject of the test realizations by least squares, with both as fixed factors: realizations are compared within participants only (the intrablock analysis of Yates 1936), so that it does not matter whether severe participants rated other realizations than lenient ones. Each cell counts once. If no cell is missing, F is that of `rmanova`.
+    pub struct WithinCells {
+        /// sets of realizations that participants link, directly or by way of others; differences between sets cannot be told
+        sets: Stat,
+        /// variance of a cell mean about the model
+        var_error: Stat,
+        /// realizations less sets
+        df1: Stat,
+        /// of the differences between realizations of a set
+        f: Stat as "F",
+        /// cells less participants less `df1`
+        df2: Stat,
+        /// of `F`
+        p: Stat,
+    }
+
+    /// What a mean participant would rate, by the model `within_cells`; if no cell is missing, or if nothing links the realizations, `desc/M/subject_mean/mean`. Standard error and interval, about the mean, are those of the marginal mean in `lmm_cells`, for other participants.
     pub struct AdjustedMean {
         /// the mean
         mean: Stat,
@@ -94,7 +124,9 @@ statistics! {
 
     /// The means on which verdicts rest.
     pub struct AdjustedCells {
-        /// the model of cell means
+        /// the comparison within participants
+        within: WithinCells as "within_cells",
+        /// the mixed model of cell means
         model: CellModel as "lmm_cells",
         /// the mean of each test realization
         means: BTreeMap<RealizationName, AdjustedMean> as "adjusted",
@@ -102,9 +134,10 @@ statistics! {
 }
 
 pub(super) fn adjusted(cells: &Cells<'_>, found: &Adjusted) -> AdjustedCells {
-    let why = |error: &LmmError| Why::from(error.to_string());
-    let no_fit = found.fit.as_ref().err().map_or_else(Why::default, why);
-    let no_mean = found.means.as_ref().err().map_or_else(Why::default, why);
+    let of_fit = |error: &LmmError| Why::from(error.to_string());
+    let no_fit = (found.fit.as_ref().err()).map_or_else(Why::default, of_fit);
+    let of_means = |error: &WithinError| Why::from(error.to_string());
+    let no_mean = (found.means.as_ref().err()).map_or_else(Why::default, of_means);
     let fit = found.fit.as_ref().ok();
     let flat = match fit {
         Some(_) => "the likelihood is too flat for degrees of freedom".into(),
@@ -124,7 +157,7 @@ pub(super) fn adjusted(cells: &Cells<'_>, found: &Adjusted) -> AdjustedCells {
     let means = found.models.iter().enumerate().map(|(i, &m)| {
         let mean = found.means.as_ref().ok().map(|means| means[i]);
         let t = fit.map(|f| &f.means[i]);
-        // About the mean above, from which the model's differs by rounding.
+        // About the mean above.
         let about = |(t, mean): (&ContrastT, f64)| {
             let shift = mean - t.estimate + cells.offset;
             t.ci95.map(|(low, high)| (low + shift, high + shift))
@@ -138,6 +171,25 @@ pub(super) fn adjusted(cells: &Cells<'_>, found: &Adjusted) -> AdjustedCells {
     });
     AdjustedCells {
         means: means.collect(),
+        within: within_cells(&found.within),
         model,
+    }
+}
+
+fn within_cells(found: &Result<Within, WithinError>) -> WithinCells {
+    let found = match found {
+        Ok(found) => found,
+        Err(why) => return WithinCells::undefined(why.to_string()),
+    };
+    let why = "the ratings leave no variance of error";
+    let or = |x: Option<f64>| Stat::or(x, why);
+    let effect = found.effect;
+    WithinCells {
+        sets: Stat::count(found.sets.iter().max().map_or(0, |last| last + 1)),
+        var_error: or(found.error.map(|(variance, _)| variance)),
+        df1: or(effect.map(|f| f.df1)),
+        f: or(effect.map(|f| f.f)),
+        df2: or(effect.and_then(|f| f.df2)),
+        p: or(effect.and_then(|f| f.p)),
     }
 }

@@ -10,6 +10,7 @@ use study_stats::bayes::correlation_bf10;
 use study_stats::correlation::{fisher_interval, kendall, p_of_r, pearson, spearman};
 use study_stats::describe::is_constant;
 use study_stats::permutation::{self, Statistic};
+use study_stats::within;
 
 pub(super) const FEW: &str = "fewer than three realizations with a VAF";
 
@@ -95,6 +96,26 @@ statistics! {
         var_model_crossed: Option<Stat>,
     }
 
+    /// The slope of the means on VAF where the design is not balanced: a cell is missing, or not all cells hold equally many ratings. Generalized least squares over the realizations, with the covariance of their differences in `within_cells` (cells with fewer ratings count as less precise) plus a variance of the realizations about the line, by restricted maximum likelihood; the standard error is scaled by the weighted residuals (Knapp & Hartung 2003). With equally precise means it is Pearson's t.
+    pub struct Trend {
+        /// change of the rating per unit of VAF
+        slope: Stat,
+        /// its standard error
+        se: Stat,
+        /// `slope`/`se`
+        t: Stat,
+        /// realizations less 2
+        df: Stat,
+        /// two-sided
+        p: Stat,
+        /// interval of `slope`
+        ci95: Interval,
+        /// t/√(t² + df), a correlation that weighs the means by their precision
+        r: Stat,
+        /// standard deviation of the realizations about the line, beyond the errors of their means
+        sd_realizations: Stat,
+    }
+
     /// Correlations over realizations of x, a VAF, with y, a mean.
     pub struct Correlation {
         /// realizations
@@ -109,6 +130,8 @@ statistics! {
         leave_one_out: Option<LeaveOneOut>,
         /// what VAF explains
         share: Option<Share>,
+        /// decides instead where the design is not balanced
+        trend: Option<Trend>,
     }
 }
 
@@ -186,7 +209,30 @@ impl Correlation {
             kendall: None,
             leave_one_out: None,
             share: None,
+            trend: None,
         }
+    }
+
+    /// With the trend, which decides where not all means are equally precise.
+    pub(super) fn with_trend(mut self, found: Option<within::Trend>) -> Self {
+        let Some(found) = found else {
+            self.trend = Some(Trend::undefined(
+                "fewer than three realizations with a VAF, or participants do not link them, or no variance of error",
+            ));
+            return self;
+        };
+        let why = "the means lie on a line";
+        self.trend = Some(Trend {
+            slope: Stat::of(found.slope),
+            se: Stat::of(found.se),
+            t: Stat::or(found.t, why),
+            df: Stat::of(found.df),
+            p: Stat::or(found.p, why),
+            ci95: Interval::or(found.ci95, why),
+            r: Stat::or(found.r, why),
+            sd_realizations: Stat::of(found.sd),
+        });
+        self
     }
 }
 

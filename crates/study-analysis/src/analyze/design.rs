@@ -21,6 +21,8 @@ pub struct Design {
     pub cells: usize,
     /// Whether a cell holds two ratings.
     pub repeated: bool,
+    /// Whether all cells hold equally many ratings.
+    pub even: bool,
 }
 
 impl Design {
@@ -35,6 +37,11 @@ impl Design {
             realizations: models.len(),
             cells: own().count(),
             repeated: own().any(|c| c.rows.len() > 1),
+            even: own().all(|c| {
+                own()
+                    .next()
+                    .is_some_and(|first| first.rows.len() == c.rows.len())
+            }),
         }
     }
 
@@ -43,8 +50,14 @@ impl Design {
         self.cells == self.participants * self.realizations
     }
 
+    /// Whether the means of all realizations are equally precise, whatever the ratings are: every
+    /// participant rated every realization equally often.
+    pub fn is_balanced(self) -> bool {
+        self.is_complete() && self.even
+    }
+
     /// Whether tests use the participants who rated everything: those who did not are at
-    /// most one in ten. Otherwise a mixed model of all cells is used.
+    /// most one in ten. Otherwise all cells are compared within participants.
     pub fn uses_complete(self) -> bool {
         let left_out = self.participants - self.complete;
         left_out as f64 <= MAX_LEFT_OUT * self.participants as f64

@@ -9,6 +9,7 @@ mod differ;
 mod others;
 mod pairs;
 mod sites;
+mod told_apart;
 mod vaf;
 
 use super::Rules;
@@ -83,16 +84,22 @@ pub enum TestKind {
     AnovaGreenhouseGeisser,
     /// The same with the Huynh–Feldt correction.
     AnovaHuynhFeldt,
-    /// F of the mixed model of all cell means, Satterthwaite's degrees of freedom.
+    /// F of a mixed model, Satterthwaite's degrees of freedom.
     MixedModel,
+    /// F of the realizations within participants, over all cell means.
+    WithinParticipants,
     /// Friedman's test with its exact distribution.
     FriedmanExact,
     /// Friedman's test with Iman and Davenport's F.
     Friedman,
     /// Paired t test.
     PairedT,
-    /// Contrast of the mixed model of all cell means, Kenward and Roger's degrees of freedom.
+    /// Contrast of a mixed model.
     MixedContrast,
+    /// Difference within participants, over all cell means.
+    WithinContrast,
+    /// t test of the slope of means that are weighted by their precision.
+    WeightedTrend,
     /// Permutation test over all orders of the realizations.
     PermutationExact,
     /// Permutation test over random orders of the realizations.
@@ -129,10 +136,13 @@ impl TestKind {
             Self::AnovaGreenhouseGeisser => "anova-greenhouse-geisser",
             Self::AnovaHuynhFeldt => "anova-huynh-feldt",
             Self::MixedModel => "mixed-model",
+            Self::WithinParticipants => "within-participants",
             Self::FriedmanExact => "friedman-exact",
             Self::Friedman => "friedman",
             Self::PairedT => "paired-t",
             Self::MixedContrast => "mixed-contrast",
+            Self::WithinContrast => "within-contrast",
+            Self::WeightedTrend => "weighted-trend",
             Self::PermutationExact => "permutation-exact",
             Self::PermutationMonteCarlo => "permutation-monte-carlo",
             Self::Interaction => "interaction",
@@ -359,7 +369,9 @@ pub(super) fn findings(
     others::disagreement_as_caveat(&mut found);
     found.extend(others::repeats(&facts));
     found.extend(sites::sites(&facts));
-    (found, facts.pairs)
+    let mut pairs = facts.pairs;
+    told_apart::withdraw(cells, evidence, &mut found, &mut pairs);
+    (found, pairs)
 }
 
 /// The numbers of all findings.

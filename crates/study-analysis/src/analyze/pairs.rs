@@ -1,7 +1,7 @@
 //! The comparison of pairs on which verdicts rest: `pair/a|b/*`.
 //!
 //! The paired t test of cell means over the participants who rated everything; where
-//! they are too few, contrasts of the mixed model of all cells. Holm's correction is
+//! they are too few, the differences within participants over all cells. Holm's correction is
 //! over all pairs. Up to [`MAX_PAIRED`] realizations every pair is given, above the
 //! best-rated realization against each other one; the correction counts the pairs that are
 //! not given, because the best is chosen by the ratings. With a
@@ -28,7 +28,7 @@ statistics! {
         ci90: Interval,
     }
 
-    /// The comparison of two realizations on which verdicts rest: the paired t test over the participants who rated every realization or, where these are too few, a contrast of `lmm_cells`.
+    /// The comparison of two realizations on which verdicts rest: the paired t test over the participants who rated every realization or, where these are too few, a difference in `within_cells`; pairs that no participants link are left out.
     pub struct PairTest {
         /// participants
         n: Stat,
@@ -82,19 +82,19 @@ pub(super) fn pairs(cells: &Cells<'_>, adjusted: &Adjusted, rules: &Rules) -> Op
         };
         (of_complete(cells, &adjusted.models), why.into())
     } else {
-        match &adjusted.fit {
-            Ok(fit) => {
+        match &adjusted.within {
+            Ok(within) => {
                 let places = (0..k).flat_map(|a| (a + 1..k).map(move |b| (a, b)));
-                let found = places
-                    .zip(&fit.pairs)
-                    .map(|((first, second), t)| Difference {
+                let found = places.filter_map(|(first, second)| {
+                    Some(Difference {
                         first,
                         second,
                         n: adjusted.design.participants,
-                        t: *t,
+                        t: within.difference(first, second)?,
                         dz: None,
-                    });
-                let why = "the likelihood is too flat for degrees of freedom";
+                    })
+                });
+                let why = "the ratings leave no variance of error";
                 (found.collect(), why.into())
             }
             Err(error) => (Vec::new(), error.to_string().into()),

@@ -1,10 +1,10 @@
 //! The statistics of an analysis as records.
 
-pub use super::adjusted::{AdjustedCells, AdjustedMean, CellModel};
+pub use super::adjusted::{AdjustedCells, AdjustedMean, CellModel, WithinCells};
 pub use super::agreement::{Agreement, Coefficient, Intraclass, Krippendorff, Repeatability};
 pub use super::checks::{Ends, Residuals};
 pub use super::correlation::{
-    Correlation, Kendall, LeaveOneOut, Pearson, Permuted, Share, Spearman, Without,
+    Correlation, Kendall, LeaveOneOut, Pearson, Permuted, Share, Spearman, Trend, Without,
 };
 pub use super::describe::{
     CousineauMorey, Described, DescribedAll, Descriptives, Regression, Sizes, SubjectMean,

@@ -17,9 +17,9 @@ use study_stats::bootstrap;
 use study_stats::correlation::{pearson, spearman, within_subjects};
 use study_stats::describe::{is_constant, mean};
 use study_stats::friedman::page;
-use study_stats::lmm::LmmError;
 use study_stats::paired::one_sample;
 use study_stats::regression::slope;
+use study_stats::within::WithinError;
 
 statistics! {
     /// The cells of a complete participant on VAF.
@@ -167,6 +167,7 @@ pub(super) fn correlations(
         let points = adjusted_points(cells, adjusted);
         points.map_or_else(Correlation::without_means, |p| p.correlate(rules))
     };
+    let of_adjusted = weighted(of_adjusted, adjusted, |m| cells.vaf[m]);
     (raw, of_adjusted)
 }
 
@@ -179,9 +180,24 @@ pub(super) fn raw(cells: &Cells<'_>, rules: &Rules) -> Correlation {
 /// Of `corr_adjusted/*` what the finding rests on.
 pub(super) fn deciding(cells: &Cells<'_>, adjusted: &Adjusted, rules: &Rules) -> Correlation {
     let points = adjusted_points(cells, adjusted);
-    points.map_or_else(Correlation::without_means, |p| {
+    let found = points.map_or_else(Correlation::without_means, |p| {
         Correlation::of_pearson(&p.vaf, &p.means, rules)
-    })
+    });
+    weighted(found, adjusted, |m| cells.vaf[m])
+}
+
+/// With the trend on the VAF of each realization, unless all means are equally precise.
+fn weighted(
+    found: Correlation,
+    adjusted: &Adjusted,
+    vaf: impl Fn(usize) -> Option<f64>,
+) -> Correlation {
+    if adjusted.design.is_balanced() {
+        return found;
+    }
+    let vaf: Vec<Option<f64>> = adjusted.models.iter().map(|&m| vaf(m)).collect();
+    let within = adjusted.within.as_ref().ok();
+    found.with_trend(within.and_then(|within| within.trend(&vaf)))
 }
 
 /// The realizations with their means over participants.
@@ -192,12 +208,15 @@ fn raw_points<'a>(cells: &'a Cells<'_>) -> Points<'a> {
 }
 
 /// The realizations with the means on which verdicts rest.
-fn adjusted_points<'a>(cells: &'a Cells<'_>, adjusted: &Adjusted) -> Result<Points<'a>, LmmError> {
+fn adjusted_points<'a>(
+    cells: &'a Cells<'_>,
+    adjusted: &Adjusted,
+) -> Result<Points<'a>, WithinError> {
     let of = adjusted_mean(adjusted)?;
     Ok(Points::of(cells, &with_vaf(cells), |m| cells.vaf[m], of))
 }
 
-fn adjusted_mean(adjusted: &Adjusted) -> Result<impl Fn(usize) -> Option<f64>, LmmError> {
+fn adjusted_mean(adjusted: &Adjusted) -> Result<impl Fn(usize) -> Option<f64>, WithinError> {
     let means = adjusted.means.as_ref().map_err(|why| *why)?;
     Ok(|m: usize| Some(means[adjusted.models.binary_search(&m).ok()?]))
 }
@@ -223,9 +242,10 @@ pub(super) fn against_delivered(
     } else {
         adjusted_mean(adjusted).map(|of| Points::of(cells, &models, |m| delivered[m], of))
     };
-    points.map_or_else(Correlation::without_means, |p| {
+    let found = points.map_or_else(Correlation::without_means, |p| {
         Correlation::of_pearson(&p.vaf, &p.means, rules)
-    })
+    });
+    weighted(found, adjusted, |m| delivered[m])
 }
 
 /// The realizations as points.

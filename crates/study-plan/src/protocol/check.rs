@@ -45,7 +45,44 @@ pub fn warnings(protocol: &Protocol, spans: &Spans, unread: &[&ModelId]) -> Vec<
     }
     duration(protocol, spans, &mut faults);
     roles(protocol, spans, &mut faults);
+    apart(protocol, spans, &mut faults);
     faults
+}
+
+/// Groups that share no realization, directly or by way of other groups.
+fn apart(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
+    let Some(groups) = &protocol.groups else {
+        return;
+    };
+    let tested = |id: &&ModelId| {
+        let of = protocol.models.iter().find(|model| model.id == **id);
+        of.is_some_and(|model| model.role == Role::Test)
+    };
+    let own: Option<Vec<Vec<&ModelId>>> = (groups.list.iter())
+        .map(|group| Some(group.models.as_ref()?.iter().filter(tested).collect()))
+        .collect();
+    // A group without a list has all of them.
+    let Some(own) = own.filter(|own| own.iter().all(|models| !models.is_empty())) else {
+        return;
+    };
+    let mut linked = vec![false; own.len()];
+    linked[0] = true;
+    for _ in 0..own.len() {
+        for i in 0..own.len() {
+            let shares = |j: usize| linked[j] && own[j].iter().any(|id| own[i].contains(id));
+            linked[i] = linked[i] || (0..own.len()).any(shares);
+        }
+    }
+    if let Some(i) = linked.iter().position(|linked| !linked) {
+        faults.push(
+            Fault::warning(format!(
+                "the groups `{}` and `{}` share no realization: whether realizations of different groups differ cannot be told from whether their participants do",
+                groups.list[0].id, groups.list[i].id
+            ))
+            .at(spans.get(&format!("groups.list[{i}].models")).cloned())
+            .hint("let both rate at least one of them, better two"),
+        );
+    }
 }
 
 /// Fixed sentences that the language of the study lacks.
@@ -371,6 +408,7 @@ fn first_line(span: Range<usize>) -> Range<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::protocol::groups::{Assign, GroupRules, Groups};
     use crate::protocol::{Breaks, example};
 
     fn messages(protocol: &Protocol) -> Vec<String> {
@@ -473,6 +511,48 @@ mod tests {
                 warned,
                 "{every}: {found:?}"
             );
+        }
+    }
+
+    #[test]
+    fn groups_that_share_no_realization_give_a_warning() {
+        let mut protocol = example::protocol(8, 2);
+        let ids: Vec<ModelId> = protocol.models.iter().map(|m| m.id.clone()).collect();
+        let id = |i: usize| ids[i].clone();
+        let group = |name: &str, models: Option<Vec<usize>>| GroupRules {
+            id: name.parse().unwrap(),
+            share: 1,
+            parts: None,
+            models: models.map(|all| all.into_iter().map(id).collect()),
+        };
+        let cases = [
+            (
+                vec![group("a", Some(vec![0, 1])), group("b", Some(vec![2, 3]))],
+                true,
+            ),
+            (
+                vec![group("a", Some(vec![0, 1])), group("b", Some(vec![1, 2]))],
+                false,
+            ),
+            (vec![group("a", Some(vec![0, 1])), group("b", None)], false),
+            // a and c by way of b
+            (
+                vec![
+                    group("a", Some(vec![0, 1])),
+                    group("c", Some(vec![3, 4])),
+                    group("b", Some(vec![1, 3])),
+                ],
+                false,
+            ),
+        ];
+        for (list, warned) in cases {
+            protocol.groups = Some(Groups {
+                assign: Assign::Given,
+                list,
+            });
+            let found = messages(&protocol);
+            let about = |m: &String| m.contains("`a` and `b` share no realization");
+            assert_eq!(found.iter().any(about), warned, "{found:?}");
         }
     }
 }

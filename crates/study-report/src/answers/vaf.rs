@@ -14,6 +14,13 @@ pub(super) fn predicts(a: &Analysis) -> Option<Answer> {
     let correlation = a.correlation();
     let (mut answer, f) = Answer::to(a, &Question::Vaf)?;
     if f.test.is_none() {
+        answer.main.extend(correlation.pearson.r.number().map(|r| {
+            format!(
+                "Over these {} realizations the means correlate with VAF at r = {}.",
+                f.realizations,
+                apa::r(r)
+            )
+        }));
         return Some(answer);
     }
     let caveats = std::mem::take(&mut answer.main);

@@ -3,6 +3,7 @@
 use super::{cells, number};
 use study_analysis::analyze::results::{
     Coefficients, Correlation, Differences, Interval, Number, PairName, PairTest, Permuted, Stat,
+    Trend,
 };
 use study_analysis::analyze::{Analysis, Finding, Question};
 
@@ -91,6 +92,17 @@ fn of_ranks(tests: [&'static str; 2], of: &Correlation) -> Vec<Model> {
     [spearman, kendall].into_iter().flatten().collect()
 }
 
+/// The trend of means that are weighted by their precision.
+fn weighted(trend: &Trend) -> Model {
+    Model {
+        std_error: trend.se.number(),
+        statistic: trend.t.number(),
+        df: [trend.df.number(), None],
+        ci: trend.ci95.ends(),
+        ..correlation("weighted-trend", &trend.slope, &trend.p)
+    }
+}
+
 /// The tests that decide nothing.
 fn models(a: &Analysis) -> Vec<Model> {
     let (evidence, mixed, ordinal) = (&a.results.evidence, &a.results.mixed, &a.results.ordinal);
@@ -124,6 +136,14 @@ fn models(a: &Analysis) -> Vec<Model> {
         df,
         &cells.p,
     ));
+    let within = &evidence.cells.within;
+    let df: [&dyn Number; 2] = [&within.df1, &within.df2];
+    all.push(by_statistic(
+        ("differ", "within-participants"),
+        &within.f,
+        df,
+        &within.p,
+    ));
     let pearson = &evidence.corr.pearson;
     let permuted = pearson.permuted.as_ref();
     let of_pearson = |test, p: &dyn Number| Model {
@@ -144,6 +164,7 @@ fn models(a: &Analysis) -> Vec<Model> {
         "adjusted-kendall-permutation-exact",
     ];
     all.extend(of_ranks(adjusted, &evidence.corr_adjusted));
+    all.extend(evidence.corr_adjusted.trend.as_ref().map(weighted));
     let crossed = &ordinal.clmm_vaf_crossed;
     let within = &a.results.over_participants.rmcorr_cells;
     all.extend([

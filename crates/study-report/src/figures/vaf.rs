@@ -5,8 +5,8 @@ use crate::apa;
 use crate::apa::digits;
 use crate::chart::{Axis, Color, Dash, Figure, Label, Look, Mark, PALETTE, Panel, Whisker};
 use crate::chart::{MAX_LABEL, SMALL, shortened, text_width};
-use study_analysis::analyze::Question;
 use study_analysis::analyze::results::Number as _;
+use study_analysis::analyze::{Question, TestKind};
 use study_stats::distribution::t_quantile;
 use study_stats::regression::{Line, line};
 
@@ -126,7 +126,13 @@ pub(super) fn against_vaf(scene: &Scene<'_>) -> Option<Drawn> {
         .and_then(|f| f.test.as_ref());
     let r = scene.a.correlation().pearson.r.number();
     let found = r.map_or_else(String::new, |r| {
-        let p = decided.map_or_else(String::new, |t| format!(", permutation p {}", apa::p(t.p)));
+        let p = decided.map_or_else(String::new, |t| {
+            let how = match t.kind {
+                TestKind::WeightedTrend => "weighted by their precision, p",
+                _ => "permutation p",
+            };
+            format!(", {how} {}", apa::p(t.p))
+        });
         format!(" r = {}{p}.", apa::r(r))
     });
     let bars = match (dots.iter().any(|d| d.ci95.is_some()), scene.adjusted()) {

@@ -261,9 +261,9 @@ fn differences(a: &Analysis) -> Option<String> {
                 + &correction("Huynh–Feldt")
                 + ", because there are not more participants than realizations"
         }
-        TestKind::MixedModel => format!(
-            "a linear mixed model of all cell means with random intercepts of participants and \
-             Satterthwaite's degrees of freedom, because only {} of {} rated every realization",
+        TestKind::WithinParticipants => format!(
+            "an analysis of variance of all cell means with participants and realizations as fixed factors \
+             (comparisons within participants), because only {} of {} rated every realization",
             a.design.complete,
             counted(a.design.participants, "participant", "participants")
         ),
@@ -303,18 +303,22 @@ fn tests(a: &Analysis) -> Vec<String> {
     let mut text = Vec::new();
     if let Some(test) = finding(&Question::Vaf).and_then(|f| f.test.as_ref()) {
         let p = match test.kind {
-            TestKind::PermutationExact => "all permutations".to_owned(),
-            _ => format!("{DRAWS} random permutations"),
+            TestKind::PermutationExact => "p is from all permutations of the realizations".to_owned(),
+            TestKind::WeightedTrend => "because not all means are equally precise, p is from the slope on VAF \
+                 by generalized least squares with the covariance of the means and a variance of the \
+                 realizations about the line (Knapp & Hartung 2003)"
+                .to_owned(),
+            _ => format!("p is from {DRAWS} random permutations of the realizations"),
         };
         let means = if a.design.is_complete() {
             "means of the realizations (averages of the participants' cell means)"
         } else {
-            "adjusted means of the realizations (marginal means of a linear mixed model of the \
-             cell means)"
+            "adjusted means of the realizations (what a mean participant would rate, by comparisons \
+             within participants)"
         };
         text.push(format!(
             "Whether the variance accounted for (VAF) predicts the rating was tested by Pearson's \
-             correlation over the {means}; p is from {p} of the realizations."
+             correlation over the {means}; {p}."
         ));
     }
     text.extend(differences(a));
@@ -323,7 +327,7 @@ fn tests(a: &Analysis) -> Vec<String> {
     let test = test.or_else(|| finding(&Question::Best)?.test.as_ref());
     if let Some(test) = test {
         let how = match test.kind {
-            TestKind::MixedContrast => "contrasts of the same model by Kenward and Roger's method",
+            TestKind::WithinContrast => "t tests within participants, by the same model",
             _ => "paired t tests",
         };
         let wilcoxon = if wilcoxon {

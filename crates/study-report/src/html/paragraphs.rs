@@ -76,7 +76,7 @@ fn adjusted_means(a: &Analysis) -> Option<String> {
         .collect();
     (1..=MAX_LISTED).contains(&means.len()).then(|| {
         format!(
-            "Means adjusted for who rated which realization (linear mixed model): {}.",
+            "Means adjusted for who rated which realization (comparisons within participants): {}.",
             means.join("; ")
         )
     })

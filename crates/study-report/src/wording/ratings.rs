@@ -45,10 +45,10 @@ fn texts(f: &Finding) -> Wording {
             yes: "Realizations with a higher VAF were rated {way}",
             not_shown: "A relation with VAF was not shown",
             answer: either(
-                "{verdict}: over these {n} realizations, those with a higher VAF are rated {way}: r = {r}{permutation} (two-sided).",
-                "{verdict} over these {n} realizations: r = {r}{permutation} (two-sided).",
+                "{verdict}: over these {n} realizations, those with a higher VAF are rated {way}: r = {r}{p-of-vaf} (two-sided).",
+                "{verdict} over these {n} realizations: r = {r}{p-of-vaf} (two-sided).",
             ),
-            paper: "{said}: over the {n} realizations the {mean} of {asked} correlated with VAF at r({df}) = {r}{permutation}{rho}.{raw-and-adjusted}{crossed}",
+            paper: "{said}: over the {n} realizations the {mean} of {asked} correlated with VAF at r({df}) = {r}{p-of-vaf}{rho}.{raw-and-adjusted}{crossed}",
             ..USUAL
         },
         Question::Delivered => Wording {
@@ -250,7 +250,7 @@ fn value(a: &Analysis, f: &Finding, key: &str) -> Option<String> {
         "friedman" => (f.effect.filter(|e| e.name != KENDALLS_W))
             .and_then(|_| sentences::friedman(a))
             .map_or_else(String::new, |s| format!("; {s}")),
-        "permutation" => sentences::permutation_p(a, a.correlation().pearson.permutation_p()),
+        "p-of-vaf" => sentences::p_of_vaf(a),
         "rho" => {
             let rho = a.correlation().spearman.as_ref().map(|s| &s.rho).number();
             rho.map_or_else(String::new, |x| format!("; Spearman's ρ = {}", apa::r(x)))

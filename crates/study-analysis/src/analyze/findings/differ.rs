@@ -11,7 +11,7 @@ use study_stats::level::rejects;
 fn chosen(facts: &Facts<'_>) -> TestKind {
     let d = facts.design;
     match (d.complete, d.realizations) {
-        _ if !d.uses_complete() => TestKind::MixedModel,
+        _ if !d.uses_complete() => TestKind::WithinParticipants,
         (_, 2) => TestKind::Anova,
         (2, _) => TestKind::FriedmanExact,
         (_, k) if k > MAX_COLUMNS => TestKind::Friedman,
@@ -41,10 +41,10 @@ pub(super) fn differ(facts: &Facts<'_>) -> Option<Finding> {
     let Differences {
         friedman, rmanova, ..
     } = &facts.evidence.differences;
-    let model = &facts.evidence.cells.model;
+    let within = &facts.evidence.cells.within;
     let Some(test) = found else {
         let p = match kind {
-            TestKind::MixedModel => &model.p,
+            TestKind::WithinParticipants => &within.p,
             TestKind::Friedman | TestKind::FriedmanExact => &friedman.p,
             _ => &rmanova.p,
         };
@@ -57,31 +57,24 @@ pub(super) fn differ(facts: &Facts<'_>) -> Option<Finding> {
         TestKind::FriedmanExact | TestKind::Friedman => {
             Some(("Kendall's W", friedman.kendall_w.number()))
         }
-        TestKind::MixedModel => None,
+        TestKind::WithinParticipants => None,
         _ => Some(("generalized eta squared", rmanova.ges.number())),
     };
     found.effect = effect.and_then(|(name, value)| Estimate::of(name, value?));
-    if used == TestKind::MixedModel {
+    if used == TestKind::WithinParticipants {
         let complete = match d.complete {
             0 => "none".to_owned(),
             n => n.to_string(),
         };
         found.caveat(
-            "mixed-model",
+            "within-participants",
             format!(
-                "{complete} of {} rated every realization; the mixed model uses the ratings of all, \
-                 and assumes that ratings are missing at random and that all pairs of realizations \
-                 correlate alike",
+                "{complete} of {} rated every realization; realizations are compared within \
+                 participants, by the ratings of all, assuming that what is missing does not depend on \
+                 what the rating would have been and that all pairs of realizations correlate alike",
                 counted(d.participants, "participant", "participants")
             ),
         );
-        if model.connected.number() == Some(0.0) {
-            found.caveat(
-                "not-connected",
-                "no participants link all realizations: some are compared only between different \
-                 participants",
-            );
-        }
     } else if d.complete < d.participants {
         found.caveat(
             "complete-only",
@@ -141,11 +134,11 @@ fn test(facts: &Facts<'_>, kind: TestKind) -> Option<Test> {
             rmanova.p_hf.number(),
             rmanova.eps_hf_unclipped.number()?.min(1.0),
         ),
-        TestKind::MixedModel => {
-            let model = &facts.evidence.cells.model;
-            let df = [model.df1.number(), model.df2.number()];
-            let test = Test::single(kind, model.p.number()?, alpha);
-            Some(test.with("F", model.f.number(), &df))
+        TestKind::WithinParticipants => {
+            let within = &facts.evidence.cells.within;
+            let df = [within.df1.number(), within.df2.number()];
+            let test = Test::single(kind, within.p.number()?, alpha);
+            Some(test.with("F", within.f.number(), &df))
         }
         TestKind::FriedmanExact => of_friedman(friedman.exact_p.number()),
         TestKind::Friedman => {

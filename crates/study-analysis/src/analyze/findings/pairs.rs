@@ -60,7 +60,7 @@ pub(super) fn all(
     let kind = if design.uses_complete() {
         TestKind::PairedT
     } else {
-        TestKind::MixedContrast
+        TestKind::WithinContrast
     };
     let comparisons = tests.n_compared.number().unwrap_or(0.0) as usize;
     let names: Vec<&str> = (cells.tested().iter())
@@ -136,7 +136,7 @@ fn not_compared(facts: &Facts<'_>, pair: Option<&Pair>) -> String {
     } else if let Some(Verdict::Undefined(why)) = pair.map(|p| &p.verdict) {
         why.clone()
     } else {
-        let why = facts.evidence.cells.model.f.reason();
+        let why = facts.evidence.cells.within.f.reason();
         why.unwrap_or("fewer than two participants rated every realization")
             .to_owned()
     }

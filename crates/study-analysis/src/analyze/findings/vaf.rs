@@ -4,7 +4,9 @@ use super::{Design, Direction, Estimate, Facts, Finding, Question, Test, TestKin
 use crate::analyze::Rules;
 use crate::analyze::cells::Cells;
 use crate::analyze::rendering::NO_RECORDING;
-use crate::analyze::results::{Correlation, EquivalenceOfVaf, Interval, Number as _, Pearson};
+use crate::analyze::results::{
+    Correlation, EquivalenceOfVaf, Interval, Number as _, Pearson, Trend,
+};
 use study_base::apa;
 use study_stats::level::rejects;
 
@@ -33,11 +35,13 @@ pub(in crate::analyze) fn vaf(
         return None;
     }
     let pearson = &about.adjusted.pearson;
-    let mut found = correlation(Question::Vaf, pearson, n, design, rules.alpha);
+    let mut found = correlation(Question::Vaf, about.adjusted, n, design, rules.alpha);
     if let Some((_, equivalence)) = about.beside {
         equivalent(equivalence, rules.alpha, &mut found);
     }
-    too_few(pearson, rules.alpha, &mut found);
+    if about.adjusted.trend.is_none() {
+        too_few(pearson, rules.alpha, &mut found);
+    }
     interval_and_p(rules.alpha, &mut found);
     if let Some((raw, _)) = about.beside.filter(|_| !design.is_complete()) {
         raw_and_adjusted(&raw.pearson, pearson, rules.alpha, &mut found);
@@ -48,29 +52,37 @@ pub(in crate::analyze) fn vaf(
 /// The finding about a correlation over `n` realizations.
 fn correlation(
     question: Question,
-    pearson: &Pearson,
+    correlation: &Correlation,
     n: usize,
     design: Design,
     alpha: f64,
 ) -> Finding {
+    let pearson = &correlation.pearson;
     let r = pearson.r.number();
-    let found = match r.zip(permutation(pearson, alpha)) {
-        Some((r, test)) => Finding {
-            direction: Some(Direction::of(r)).filter(|_| test.is_significant()),
+    let decided = match &correlation.trend {
+        Some(trend) => (trend.slope.number()).zip(weighted(trend, alpha)),
+        None => r.zip(permutation(pearson, alpha)),
+    };
+    let found = match decided {
+        Some((slope, test)) => Finding {
+            direction: Some(Direction::of(slope)).filter(|_| test.is_significant()),
             ..Finding::decided(question, test, design)
         },
         None => {
-            let why = pearson.r.reason();
+            let of_trend = correlation.trend.as_ref().and_then(|t| t.p.reason());
+            let why = pearson.r.reason().or(of_trend);
             let why = why.unwrap_or("the permutation test is undefined");
             Finding::undefined(question, why, design)
         }
     };
+    // Fisher's z takes the means as equally precise.
+    let equal = correlation.trend.is_none();
     Finding {
         realizations: n,
         estimate: r.map(|value| Estimate {
             name: "r",
             value,
-            ci95: pearson.ci95.as_ref().and_then(Interval::ends),
+            ci95: (pearson.ci95.as_ref().filter(|_| equal)).and_then(Interval::ends),
         }),
         ..found
     }
@@ -86,10 +98,18 @@ pub(super) fn delivered(facts: &Facts<'_>) -> Option<Finding> {
             ..Finding::undefined(Question::Delivered, NO_RECORDING, facts.design)
         });
     }
-    let (pearson, alpha) = (&delivered.pearson, facts.rules.alpha);
-    let mut found = correlation(Question::Delivered, pearson, n, facts.design, alpha);
-    too_few(pearson, alpha, &mut found);
+    let alpha = facts.rules.alpha;
+    let mut found = correlation(Question::Delivered, delivered, n, facts.design, alpha);
+    if delivered.trend.is_none() {
+        too_few(&delivered.pearson, alpha, &mut found);
+    }
     Some(found)
+}
+
+/// The test of the slope of weighted means.
+fn weighted(trend: &Trend, alpha: f64) -> Option<Test> {
+    let test = Test::single(TestKind::WeightedTrend, trend.p.number()?, alpha);
+    Some(test.with("t", trend.t.number(), &[trend.df.number()]))
 }
 
 /// The permutation test of a correlation over realizations.

@@ -1,0 +1,259 @@
+//! Realizations compared within subjects, where not everybody rated all of them.
+//!
+//! In the model cell mean ~ subject + realization, both as fixed factors, a difference
+//! between two realizations rests on subjects who link them only. Who rates severely and
+//! who leniently does not matter, also if lenient subjects rated other realizations than
+//! severe ones (the intrablock analysis of block designs: Yates 1936, Ann. Eugenics 7,
+//! 121–140). Least squares; F and t are exact for normal errors of equal variance. Each cell
+//! counts once, however often it was rated. In complete tables F is that of the analysis of
+//! variance, and the differences are those of the means over subjects.
+//!
+//! Realizations that no chain of subjects links cannot be compared: see [`Within::sets`].
+
+mod trend;
+
+pub use trend::Trend;
+
+use crate::distribution::{f_upper, t_quantile, t_two_sided};
+use crate::finite;
+use crate::lmm::{CellSummary, ContrastF, ContrastT};
+use crate::matrix::{Cholesky, Matrix, SymmetricMatrix};
+
+/// Most realizations: the work grows with their cube.
+pub const MAX_REALIZATIONS: usize = 300;
+
+/// Why realizations are not compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum WithinError {
+    /// No cell.
+    #[error("there are no ratings")]
+    NoData,
+    /// One realization.
+    #[error("there is only one realization")]
+    OneRealization,
+    /// Too many of them.
+    #[error("realizations are compared within participants up to {MAX_REALIZATIONS}")]
+    TooMany,
+    /// A number is not finite.
+    #[error("the ratings are too large to be squared")]
+    Overflow,
+}
+
+/// Realizations, compared within subjects.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Within {
+    /// The numbers that identify the realizations, sorted.
+    pub realizations: Vec<usize>,
+    /// For each of them the set of realizations that subjects link, numbered from 0 by its first member.
+    pub sets: Vec<usize>,
+    /// What a mean subject would rate: the mean over subjects of their level, plus the
+    /// effect of the realization. Levels of different sets cannot be compared.
+    pub means: Vec<f64>,
+    /// The test that all realizations of a set have one mean, over all sets; `None` without
+    /// degrees of freedom or without residuals.
+    pub effect: Option<ContrastF>,
+    /// Variance of a cell mean about the model, and its degrees of freedom.
+    pub error: Option<(f64, f64)>,
+    /// Effects, 0 for the reference of each set.
+    effects: Vec<f64>,
+    /// Their covariance over the variance of a cell mean.
+    unit: Matrix,
+    /// Their covariance, by the variance of each cell, which depends on how often it was rated.
+    covariance: Option<Matrix>,
+}
+
+/// The cells of one subject: realization as a position, mean, ratings.
+type Own = Vec<(usize, f64, usize)>;
+
+impl Within {
+    /// Compares the realizations of some cells, whatever their covariate. Those of one subject
+    /// have to be adjacent.
+    ///
+    /// # Errors
+    /// [`WithinError`].
+    pub fn of(cells: &[CellSummary]) -> Result<Self, WithinError> {
+        let mut realizations: Vec<usize> = cells.iter().map(|c| c.realization).collect();
+        realizations.sort_unstable();
+        realizations.dedup();
+        let k = realizations.len();
+        match k {
+            0 => return Err(WithinError::NoData),
+            1 => return Err(WithinError::OneRealization),
+            _ if k > MAX_REALIZATIONS => return Err(WithinError::TooMany),
+            _ => {}
+        }
+        let place = |c: &CellSummary| realizations.binary_search(&c.realization).unwrap_or(0);
+        let subjects: Vec<Own> = (cells.chunk_by(|a, b| a.subject == b.subject))
+            .map(|own| own.iter().map(|c| (place(c), c.mean, c.n)).collect())
+            .collect();
+        let sets = linked(&subjects, k);
+
+        // The normal equations without the levels of the subjects.
+        let (mut normal, mut right, mut total) = (SymmetricMatrix::zero(k), vec![0.0; k], 0.0);
+        for own in &subjects {
+            let n = own.len() as f64;
+            let mean = own.iter().map(|c| c.1).sum::<f64>() / n;
+            for (i, &(a, y, _)) in own.iter().enumerate() {
+                right[a] += y - mean;
+                total += (y - mean).powi(2);
+                normal.add(a, a, 1.0 - 1.0 / n);
+                for &(b, ..) in &own[..i] {
+                    normal.add(a, b, -1.0 / n);
+                }
+            }
+        }
+        // The last realization of each set is its reference.
+        let is_reference = |j: usize| !sets[j + 1..].contains(&sets[j]);
+        let free: Vec<usize> = (0..k).filter(|j| !is_reference(*j)).collect();
+        let reduced = SymmetricMatrix::from_fn(free.len(), |i, j| normal.get(free[i], free[j]));
+        let factor = Cholesky::semidefinite(&reduced, |_| 1e-11)
+            .filter(|factor| factor.rank() == free.len())
+            .ok_or(WithinError::Overflow)?;
+        let mut effects = vec![0.0; k];
+        let solved = factor.solve(&free.iter().map(|&j| right[j]).collect::<Vec<_>>());
+        let inverse = factor.inverse();
+        let mut at = vec![None; k];
+        for (i, &j) in free.iter().enumerate() {
+            (effects[j], at[j]) = (solved[i], Some(i));
+        }
+        let unit = Matrix::from_fn(k, k, |a, b| match (at[a], at[b]) {
+            (Some(a), Some(b)) => inverse[(a, b)],
+            _ => 0.0,
+        });
+
+        let residual = |own: &Own| -> (f64, f64) {
+            let n = own.len() as f64;
+            let level = own.iter().map(|&(j, y, _)| y - effects[j]).sum::<f64>() / n;
+            let squares = own
+                .iter()
+                .map(|&(j, y, _)| (y - effects[j] - level).powi(2));
+            (level, squares.sum())
+        };
+        let (levels, squares): (Vec<f64>, Vec<f64>) = subjects.iter().map(residual).unzip();
+        let squares: f64 = squares.iter().sum();
+        let level = levels.iter().sum::<f64>() / levels.len() as f64;
+        let means: Vec<f64> = effects.iter().map(|effect| level + effect).collect();
+        if !(squares.is_finite() && means.iter().all(|mean| mean.is_finite())) {
+            return Err(WithinError::Overflow);
+        }
+        let df1 = free.len() as f64;
+        let df2 = cells.len() as f64 - subjects.len() as f64 - df1;
+        // Equal thirds differ in their last bits only.
+        let size = cells.iter().fold(0.0f64, |size, c| size.max(c.mean.abs()));
+        let varies = squares > 1e-24 * size * size * cells.len() as f64;
+        let error = (df2 >= 1.0 && varies).then(|| (squares / df2, df2));
+        let effect = error.filter(|_| df1 >= 1.0).and_then(|(variance, df2)| {
+            let f = finite(((total - squares) / df1).max(0.0) / variance)?;
+            Some(ContrastF {
+                f,
+                df1,
+                df2: Some(df2),
+                p: f_upper(f, df1, df2),
+            })
+        });
+        let mut found = Self {
+            realizations,
+            sets,
+            means,
+            effect,
+            error,
+            effects,
+            unit,
+            covariance: None,
+        };
+        found.covariance = found.by_cell(cells, &subjects);
+        Ok(found)
+    }
+
+    /// Whether subjects link all realizations, directly or by way of others.
+    pub fn is_connected(&self) -> bool {
+        self.sets.iter().all(|set| *set == 0)
+    }
+
+    /// The difference of two realizations, by their positions: the first minus the second. `None` if no
+    /// subjects link them, or without residuals.
+    pub fn difference(&self, first: usize, second: usize) -> Option<ContrastT> {
+        let (variance, df) = self
+            .error
+            .filter(|_| self.sets[first] == self.sets[second])?;
+        let estimate = self.effects[first] - self.effects[second];
+        let se = (variance * spread(&self.unit, first, second)).sqrt();
+        let t = finite(estimate / se);
+        let half = t_quantile(0.975, df).map(|t| t * se);
+        Some(ContrastT {
+            estimate,
+            se,
+            t,
+            df: Some(df),
+            p: t.and_then(|t| t_two_sided(t, df)),
+            ci95: half.map(|half| (estimate - half, estimate + half)),
+        })
+    }
+
+    /// The covariance of the effects. A cell mean of n ratings has the variance a + b/n: b is the
+    /// variance of the ratings within cells, a the rest of the variance of a cell mean about the model.
+    fn by_cell(&self, cells: &[CellSummary], subjects: &[Own]) -> Option<Matrix> {
+        let (variance, _) = self.error?;
+        let k = self.realizations.len();
+        let even = cells.iter().all(|c| c.n == cells[0].n);
+        let df: f64 = cells.iter().map(|c| c.n as f64 - 1.0).sum();
+        if even || df < 1.0 {
+            return Some(Matrix::from_fn(k, k, |i, j| variance * self.unit[(i, j)]));
+        }
+        let within = cells.iter().map(|c| c.within).sum::<f64>() / df;
+        let inverse = cells.iter().map(|c| 1.0 / c.n as f64).sum::<f64>() / cells.len() as f64;
+        let between = (variance - within * inverse).max(0.0);
+        // Σ over subjects of M diag(v) M, with M = I − 11ᵀ/n.
+        let mut inner = SymmetricMatrix::zero(k);
+        for own in subjects {
+            let n = own.len() as f64;
+            let v: Vec<f64> = own.iter().map(|c| between + within / c.2 as f64).collect();
+            let sum = v.iter().sum::<f64>() / (n * n);
+            for i in 0..own.len() {
+                for j in 0..=i {
+                    let same = if i == j { v[i] } else { 0.0 };
+                    inner.add(own[i].0, own[j].0, same - (v[i] + v[j]) / n + sum);
+                }
+            }
+        }
+        let half = Matrix::from_fn(k, k, |i, j| {
+            (0..k).map(|l| self.unit[(i, l)] * inner.get(l, j)).sum()
+        });
+        let full = Matrix::from_fn(k, k, |i, j| {
+            (0..k).map(|l| half[(i, l)] * self.unit[(l, j)]).sum()
+        });
+        full.elements()
+            .iter()
+            .all(|x| x.is_finite())
+            .then_some(full)
+    }
+}
+
+/// Variance of the difference of two effects.
+fn spread(covariance: &Matrix, i: usize, j: usize) -> f64 {
+    covariance[(i, i)] + covariance[(j, j)] - 2.0 * covariance[(i, j)]
+}
+
+/// For each realization the number of its set, by the first member.
+fn linked(subjects: &[Own], k: usize) -> Vec<usize> {
+    let mut sets: Vec<usize> = (0..k).collect();
+    loop {
+        let before = sets.clone();
+        for own in subjects {
+            let least = own.iter().map(|c| sets[c.0]).min().unwrap_or(0);
+            own.iter().for_each(|c| sets[c.0] = least);
+        }
+        if sets == before {
+            break;
+        }
+    }
+    let mut first: Vec<usize> = sets.clone();
+    first.sort_unstable();
+    first.dedup();
+    (sets.iter())
+        .map(|set| first.binary_search(set).unwrap_or(0))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests;
