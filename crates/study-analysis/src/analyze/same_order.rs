@@ -50,7 +50,7 @@ mod tests {
 
     /// The chance of some blocks of a table.
     fn of(blocks: &[(&str, &str)]) -> Option<f64> {
-        let mut table = String::from("subject,model,rating,trial\n");
+        let mut table = String::from("subject,model,rating,trial_index\n");
         let mut last = "";
         let mut trial = 0;
         for (i, (subject, order)) in blocks.iter().enumerate() {
