@@ -45,7 +45,7 @@ pub(super) fn test_name(kind: TestKind) -> &'static str {
         TestKind::OneSampleT => "t test over participants",
         TestKind::Wald => "z test",
         TestKind::Welch => "Welch's analysis of variance between groups",
-        TestKind::WaldClustered => "z test, participants as clusters",
+        TestKind::ClusteredT => "t test, participants as clusters",
         TestKind::BetweenWithin => {
             "analysis of variance between and within participants, Greenhouse–Geisser correction"
         }

@@ -118,8 +118,8 @@ pub enum TestKind {
     OneSampleT,
     /// An estimate over its standard error.
     Wald,
-    /// The same, with a standard error over participants as clusters.
-    WaldClustered,
+    /// The same, with a standard error over participants as clusters and t.
+    ClusteredT,
     /// F of the interaction of site and realization, with the Greenhouse–Geisser correction.
     BetweenWithin,
     /// F of the differences between sites in one number of each participant.
@@ -151,7 +151,7 @@ impl TestKind {
             Self::Equivalence => "equivalence",
             Self::OneSampleT => "one-sample-t",
             Self::Wald => "wald",
-            Self::WaldClustered => "wald-clustered",
+            Self::ClusteredT => "clustered-t",
             Self::BetweenWithin => "between-within",
             Self::BetweenSites => "between-sites",
             Self::Welch => "welch",

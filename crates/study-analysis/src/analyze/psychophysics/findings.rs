@@ -2,7 +2,7 @@
 
 use super::again::Again;
 use super::over_participants::{ConditionModel, Contrast, FTest, GroupSensitivity};
-use super::preferences::{AbilityDifference, ENOUGH_CLUSTERS, Preferences};
+use super::preferences::{AbilityDifference, Preferences};
 use crate::analyze::design::Design;
 use crate::analyze::findings::{Direction, Estimate, Finding, Pair, Test, TestKind, Verdict};
 use crate::analyze::identifiers::group_id;
@@ -93,18 +93,17 @@ pub(super) fn of_preferences(
     preferences: &Preferences,
 ) -> (Vec<PartFinding>, Vec<Pair>) {
     let kind = match facts.participants {
-        n if n >= ENOUGH_CLUSTERS => TestKind::WaldClustered,
-        _ => TestKind::Wald,
+        0 | 1 => TestKind::Wald,
+        _ => TestKind::ClusteredT,
     };
     let comparisons = preferences.pairs.len();
     let of_pair = |(name, pair): (&PairName, &AbilityDifference)| {
         let difference = pair.difference.number()?;
-        let se = pair.se_clustered.number();
-        let se = se.filter(|_| kind == TestKind::WaldClustered);
-        let z = se.or(pair.se.number()).map(|se| difference / se);
+        let symbol = if kind == TestKind::Wald { "z" } else { "t" };
+        let df: Vec<Option<f64>> = pair.statistic_df.iter().map(Number::number).collect();
         let test = pair.p_holm.number().map(|p| Test {
             comparisons,
-            ..Test::single(kind, p, facts.alpha).with("z", z, &[None])
+            ..Test::single(kind, p, facts.alpha).with(symbol, pair.statistic.number(), &df)
         });
         let estimate = estimate("difference", difference, &pair.ci95);
         Some(compared(facts, name, estimate, test, &pair.p))
@@ -167,13 +166,10 @@ fn preferred(facts: &PartFacts, preferences: &Preferences, pairs: &[Pair]) -> Pa
         .collect();
     abilities.sort_by(|a, b| b.1.total_cmp(&a.1));
     found.names = abilities.iter().map(|a| a.0.to_owned()).collect();
-    if facts.participants < ENOUGH_CLUSTERS {
+    if facts.participants < 2 {
         found.caveat(
-            "few-clusters",
-            format!(
-                "with fewer than {ENOUGH_CLUSTERS} participants, standard errors take all answers for \
-                 independent: intervals may be too short"
-            ),
+            "one-participant",
+            "with one participant the answers are taken for independent: it holds for this participant only",
         );
     }
     found
