@@ -11,7 +11,10 @@ use study_analysis::analyze::{
 };
 use study_session::outcome::ratings::Ratings;
 
-fn rating_table(rows: &[(usize, usize, usize, f64)], vaf: impl Fn(usize) -> Option<f64>) -> String {
+pub(crate) fn rating_table(
+    rows: &[(usize, usize, usize, f64)],
+    vaf: impl Fn(usize) -> Option<f64>,
+) -> String {
     let mut csv = "subject,model,repetition,rating,vaf\n".to_owned();
     for (s, m, k, rating) in rows {
         let vaf = vaf(*m).map_or_else(String::new, |v| v.to_string());
@@ -20,11 +23,11 @@ fn rating_table(rows: &[(usize, usize, usize, f64)], vaf: impl Fn(usize) -> Opti
     csv
 }
 
-fn finding(a: &Analysis, question: Question) -> &Finding {
+pub(crate) fn finding(a: &Analysis, question: Question) -> &Finding {
     a.finding(&question).unwrap()
 }
 
-fn kind(a: &Analysis, question: Question) -> TestKind {
+pub(crate) fn kind(a: &Analysis, question: Question) -> TestKind {
     finding(a, question).test.as_ref().unwrap().kind
 }
 
@@ -115,104 +118,6 @@ fn with_nobody_complete_the_verdict_keeps_its_level() {
         .sum();
     // Binomial: 15 ± 3 · 3.8 of 300 at the level .05.
     assert!((4..=26).contains(&yes), "{yes} of {studies}");
-}
-
-/// A study in which some realizations are rated by lenient participants and others by severe ones: the
-/// first half of the participants rates the realizations before `middle`, the others those after it, and
-/// all the middle one if `bridged`. No realization is better.
-fn unlike_groups(seed: u64, bridged: bool) -> Analysis {
-    let mut random = Numbers::new(seed);
-    let mut rows = Vec::new();
-    for s in 0..20 {
-        let lenient = s < 10;
-        let level = random.normal() + if lenient { 1.5 } else { -1.5 };
-        let rates = |m: usize| match m {
-            2 => bridged || lenient,
-            m => lenient == (m < 2),
-        };
-        for m in (0..5).filter(|m| rates(*m)) {
-            let taste = 0.5 * random.normal();
-            for k in 1..=2 {
-                rows.push((s, m, k, level + taste + 0.8 * random.normal()));
-            }
-        }
-    }
-    analysis_of(&rating_table(&rows, |m| Some(0.7 + 0.05 * m as f64)))
-}
-
-/// A model that compares participants with each other says "they differ" in 95 % of these studies, and
-/// permutations of its means "VAF predicts" in 45 %.
-#[test]
-fn severe_groups_that_share_one_realization_keep_the_level() {
-    let studies = 300;
-    let yes: Vec<[bool; 3]> = (0..studies)
-        .into_par_iter()
-        .map(|seed| {
-            let a = unlike_groups(seed, true);
-            assert_eq!(kind(&a, Question::Vaf), TestKind::WeightedTrend);
-            [Question::Vaf, Question::Differ, Question::Pairs].map(|q| finding(&a, q).is_yes())
-        })
-        .collect();
-    // Binomial: 15 ± 3 · 3.8 of 300 at the level .05; pairs are at most at it.
-    let count = |at: usize| yes.iter().filter(|yes| yes[at]).count();
-    for at in 0..2 {
-        assert!((4..=26).contains(&count(at)), "{at}: {}", count(at));
-    }
-    assert!(count(2) <= 26, "{}", count(2));
-}
-
-#[test]
-fn what_no_participant_links_cannot_be_told() {
-    let a = unlike_groups(1, false);
-    for question in [Question::Vaf, Question::Differ, Question::Best] {
-        let why = finding(&a, question).reason().unwrap();
-        assert!(why.contains("2 sets that no participant links"), "{why}");
-    }
-    // r and the means are still given, and pairs within a set
-    assert!(a.values.number("corr_adjusted/pearson/r").is_some());
-    assert!(a.pair("m00", "m01").unwrap().test.is_some());
-    assert_eq!(a.pair("m01", "m03"), None);
-    Printed::of(&a).answers(&[
-        "Do the realizations differ? Cannot be determined: the realizations fall into 2 sets that no participant links",
-        "Over these 5 realizations the means correlate with VAF at r = ",
-    ]);
-}
-
-/// Ratings fall by the trial, and everybody has the same order.
-#[test]
-fn an_order_that_all_share_cannot_be_told_from_the_realizations() {
-    let table = |shuffled: bool| {
-        let mut random = Numbers::new(4);
-        let mut csv = "subject,model,repetition,rating,vaf,trial_index\n".to_owned();
-        for s in 0..10 {
-            for place in 0..5 {
-                let m = if shuffled { (s + place) % 5 } else { place };
-                let rating = 5.0 - 0.5 * place as f64 + 0.3 * random.normal();
-                let vaf = 0.7 + 0.05 * m as f64;
-                let _ = writeln!(csv, "S{s},m{m},1,{rating},{vaf},{}", place + 1);
-            }
-        }
-        analysis_of(&csv)
-    };
-    let a = table(false);
-    for question in [
-        Question::Vaf,
-        Question::Differ,
-        Question::Best,
-        Question::Pairs,
-    ] {
-        let why = finding(&a, question).reason().unwrap();
-        assert!(
-            why.contains("everybody felt the realizations in the same order"),
-            "{why}"
-        );
-    }
-    assert!(a.pairs.iter().all(|p| p.test.is_none()));
-    let printed = Printed::of(&a);
-    printed.answers(&["present them in several orders"]);
-    // In orders of their own the same drift is no obstacle.
-    let a = table(true);
-    assert_eq!(finding(&a, Question::Differ).reason(), None);
 }
 
 /// Two realizations are equally good and three are far below: the case in which the second

@@ -28,6 +28,7 @@ mod rows;
 mod rules;
 mod schema;
 mod study;
+mod told_apart;
 mod trials;
 mod verdicts;
 #[path = "../support/world.rs"]

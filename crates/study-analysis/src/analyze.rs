@@ -26,6 +26,7 @@ mod exclude;
 pub mod findings;
 mod headline;
 mod identifiers;
+mod influence;
 mod keys;
 mod memory;
 mod mixed;
@@ -501,6 +502,7 @@ fn evidence(
         sites: sites::sites(cells, rules),
         disagreement: disagreement::disagreement(cells),
         covariates: memory::memory(cells),
+        influence: influence::influence(cells, adjusted),
         variance: headline::components(cells),
         lmm_variance: None,
     }

@@ -29,6 +29,7 @@ pub fn deciding(ratings: &Ratings, rules: &Rules) -> Deciding {
     let about = findings::AboutVaf {
         adjusted: &corr_adjusted,
         beside: None,
+        influence: None,
     };
     Deciding {
         finding: findings::of_vaf(&cells, Design::of(&cells), rules, &about),

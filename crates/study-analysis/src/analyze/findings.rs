@@ -356,6 +356,7 @@ pub(super) fn findings(
     let about_vaf = AboutVaf {
         adjusted: &evidence.corr_adjusted,
         beside: Some((&evidence.corr, &evidence.equivalence)),
+        influence: Some(&evidence.influence),
     };
     found.extend(vaf::vaf(cells, design, rules, &about_vaf));
     found.extend(vaf::delivered(&facts));

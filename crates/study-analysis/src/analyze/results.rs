@@ -16,6 +16,7 @@ pub use super::headline::{
     EquivalenceOfVaf, Realistic, Sensitivity, SmallCorrelation, SmallEffect, Variance,
     VarianceShares,
 };
+pub use super::influence::Influence;
 pub use super::memory::{Covariates, Line, LogMemory, Quadratic};
 pub use super::mixed::{
     Coefficients, Likelihood, LmmCrossed, LmmModel, LmmVaf, LmmVafCrossed, LmmVafSlope,
@@ -76,6 +77,8 @@ statistics! {
         disagreement: Disagree,
         /// covariates of the realizations, above all the forgetting factor
         covariates: Covariates as "covariate",
+        /// how much of it hangs on one realization or one participant
+        influence: Influence,
         /// components of the variance of the ratings
         variance: Variance,
         /// the same by a mixed model, for an effect size

@@ -5,9 +5,10 @@ use crate::analyze::Rules;
 use crate::analyze::cells::Cells;
 use crate::analyze::rendering::NO_RECORDING;
 use crate::analyze::results::{
-    Correlation, EquivalenceOfVaf, Interval, Number as _, Pearson, Trend,
+    Correlation, EquivalenceOfVaf, Influence, Interval, Number as _, Pearson, Trend,
 };
 use study_base::apa;
+use study_base::text::counted;
 use study_stats::level::rejects;
 
 /// What the finding about VAF rests on.
@@ -17,6 +18,8 @@ pub(in crate::analyze) struct AboutVaf<'a> {
     pub(in crate::analyze) adjusted: &'a Correlation,
     /// For caveats: the correlation with the means as they are, and equivalence.
     pub(in crate::analyze) beside: Option<(&'a Correlation, &'a EquivalenceOfVaf)>,
+    /// For caveats: on whom and on what it hangs.
+    pub(in crate::analyze) influence: Option<&'a Influence>,
 }
 
 /// The finding about VAF; `None` if no realization has one.
@@ -43,6 +46,10 @@ pub(in crate::analyze) fn vaf(
         too_few(pearson, rules.alpha, &mut found);
     }
     interval_and_p(rules.alpha, &mut found);
+    if let Some(influence) = about.influence {
+        one_realization(influence, about.adjusted, &mut found);
+        one_participant(influence, rules.alpha, &mut found);
+    }
     if let Some((raw, _)) = about.beside.filter(|_| !design.is_complete()) {
         raw_and_adjusted(&raw.pearson, pearson, rules.alpha, &mut found);
     }
@@ -183,6 +190,68 @@ fn interval_and_p(alpha: f64, found: &mut Finding) {
              distributed VAF and means, the permutation test does not; rely on p",
         );
     }
+}
+
+/// A realization with this leverage decides alone where the line goes.
+const FAR: f64 = 0.9;
+
+/// Says so if the VAF of one realization is far from all others. Three realizations always have one.
+fn one_realization(influence: &Influence, correlation: &Correlation, found: &mut Finding) {
+    let far = (influence.leverage.iter())
+        .filter_map(|(name, h)| Some((name, h.number()?)))
+        .find(|(_, h)| *h >= FAR && influence.leverage.len() > 3);
+    let Some((name, leverage)) = far else {
+        return;
+    };
+    let without = correlation.leave_one_out.as_ref();
+    let without = without.and_then(|all| all.without.get(name.as_str())?.pearson.number());
+    let without = without.map_or_else(String::new, |r| {
+        format!("; over the others r = {}", apa::r(r))
+    });
+    found.caveat(
+        "one-realization",
+        format!(
+            "the VAF of {} is far from all others, so that the relation rests on this realization (leverage {}){without}",
+            name.as_str(),
+            apa::share(leverage, 2)
+        ),
+    );
+}
+
+/// Says so if the answer turns without one participant.
+fn one_participant(influence: &Influence, alpha: f64, found: &mut Finding) {
+    let yes = found.verdict == Verdict::Yes;
+    let agrees = |p: f64| rejects(p, alpha) == yes;
+    // Only where the test that is repeated says the same of everybody.
+    if found.reason().is_some() || !influence.p_with_all.number().is_some_and(agrees) {
+        return;
+    }
+    let turning: Vec<(&str, f64)> = (influence.p_without.iter())
+        .filter_map(|(name, p)| Some((name.as_str(), p.number()?)))
+        .filter(|(_, p)| !agrees(*p))
+        .collect();
+    let Some((name, p)) = turning.first() else {
+        return;
+    };
+    let it = if yes {
+        "it is not shown"
+    } else {
+        "it is shown"
+    };
+    let more = match turning.len() - 1 {
+        0 => String::new(),
+        n => format!(
+            ", and so without any other of {}",
+            counted(n, "participant", "participants")
+        ),
+    };
+    found.caveat(
+        "one-participant-turns-it",
+        format!(
+            "without {name} {it} (t test, p {}){more}",
+            apa::p_beside(*p, alpha)
+        ),
+    );
 }
 
 /// Says so if the means as they are lead to another conclusion.
