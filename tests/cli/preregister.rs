@@ -176,7 +176,7 @@ fn pairs_of_groups_and_sessions_are_declared_and_compared() {
         "Part `more-real`: 3 pairs of realizations, 2 trials each, in both orders in turn, “no difference” is an answer.",
         "(choice of 3, primary)",
         "α = .05",
-        "Part `more-real`: Is a realization preferred to another? Decided by: z test, participants as \
+        "Part `more-real`: Is a realization preferred to another? Decided by: t test, participants as \
          clusters, Holm's correction over 3 pairs; level .05.",
         "Does VAF predict which is preferred? Decided by: permutation test, exact; level .05.",
         "In 200 simulated studies (seed ",
