@@ -25,6 +25,7 @@ pub mod plan;
 pub mod power;
 pub mod question;
 pub mod questionnaires;
+pub mod relative;
 pub mod rules;
 pub mod scale;
 pub mod schema;
@@ -42,6 +43,7 @@ pub use parts::{
 pub use plan::{Seat, Stimuli, Trial};
 pub use question::Question;
 pub use questionnaires::{Inventory, Questionnaire};
+pub use relative::Relative;
 pub use rules::Exclusion;
 pub use scale::Scale;
 

@@ -102,6 +102,7 @@ pub(super) fn caveats(part: &PartAnalysis) -> Vec<String> {
 /// The results, for a paper.
 pub(super) fn results(part: &PartAnalysis) -> String {
     let mut text: Vec<String> = thresholds(part);
+    text.extend(webers_law(part));
     text.extend(scores(part));
     text.extend(exponent(part));
     let tested = part.findings.iter().filter(|f| f.test.is_some());
@@ -152,6 +153,21 @@ fn thresholds(part: &PartAnalysis) -> Vec<String> {
         ))
     })
     .collect()
+}
+
+/// How increments grow with the standard.
+fn webers_law(part: &PartAnalysis) -> Option<String> {
+    let law = part.results.over.webers_law.as_ref()?;
+    let test = match (law.t.number(), law.df.number(), law.p.number()) {
+        (Some(t), Some(df), Some(p)) => format!(", t({df}) = {}, p {}", apa::two(t), apa::p(p)),
+        _ => String::new(),
+    };
+    Some(format!(
+        "Increments grew with the standard to the power of {}{}, where Weber's law says 1{test} (n = {}).",
+        apa::two(law.exponent.number()?),
+        ci(law.exponent_ci95.ends(), apa::two),
+        law.n.number()?
+    ))
 }
 
 /// The exponent of estimated magnitudes of levels.

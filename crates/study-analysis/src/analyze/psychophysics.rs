@@ -17,6 +17,7 @@ mod preferences;
 mod questionnaires;
 pub mod results;
 mod scales;
+mod standards;
 mod study;
 mod table;
 mod tracks;

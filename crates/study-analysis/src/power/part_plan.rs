@@ -8,7 +8,7 @@ use crate::analyze::psychophysics::track_settings;
 use study_base::text::{ModelId, PartId};
 use study_plan::procedure::Ladder;
 use study_plan::protocol::pairs::{IntervalOrder, Pairs};
-use study_plan::protocol::parts::{Part, Task, TrackRules, Vary};
+use study_plan::protocol::parts::{Part, Task, TrackRules};
 use study_plan::protocol::power::{PowerPlan, PowerTrack};
 use study_plan::protocol::{Method, Protocol, check};
 use study_stats::power::covariate::Spread;
@@ -276,8 +276,7 @@ fn of_tracks(
     defaults: &mut Defaults,
 ) -> Result<Planned, PlanError> {
     let tracks: Vec<&TrackRules> = ids.iter().filter_map(|id| protocol.track(id)).collect();
-    let family = |track: &&TrackRules| track.family().and_then(|id| protocol.family(id));
-    let ratios = !(tracks.iter().filter_map(family)).any(|f| f.vary == Vary::Blend);
+    let ratios = have_ratios(protocol, &tracks);
     let ladders: Vec<Option<Ladder>> = (tracks.iter())
         .map(|track| track.family().map(|_| protocol.ladder(track)))
         .collect();

@@ -315,7 +315,7 @@ table! {
             .empty("the realization does not have it").repeats(Repeats::Covariate),
         Part: text("part", "part of the session").with_parts(),
         Track: text("track", "track").empty("the trial belongs to none").with_parts(),
-        Level: number("level", "level of the comparison, in units of its family")
+        Level: number("level", "level of the comparison, in units of its family; of a track with `relative`, its distance from the standard as the track counts it")
             .empty("the trial has no family, or was never presented").with_parts(),
         Correct: flag("correct", "whether the answer is correct, after corrections")
             .empty("no answer is correct or wrong, or it was not answered").with_parts(),
@@ -383,7 +383,7 @@ table! {
             .empty("the record of the attempt's start is damaged"),
         Level: number("level", "level that was presented, in units of its family")
             .empty("the realization is no level of a family"),
-        LevelProposed: number("level_proposed", "level that the rule proposed for the trial, before it was rounded to the ladder")
+        LevelProposed: number("level_proposed", "level that the rule proposed for the trial, before it was rounded to the ladder; as the track counts levels")
             .empty("the trial belongs to no track, or is an easy or catch trial"),
         Track: text("track", "track").empty("the trial belongs to none"),
         TrackTrial: whole("track_trial", "trial of the track, from 1, in the planned order")

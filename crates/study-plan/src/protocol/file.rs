@@ -109,7 +109,7 @@ const FORMATS: &[Word] = &[
 const OF_FORMAT_2: [&str; 5] = ["parts", "families", "tracks", "groups", "sessions"];
 
 /// Keys that need [`FORMAT_3`], without the places in lists.
-pub const OF_FORMAT_3: [&str; 1] = ["design.order_version"];
+pub const OF_FORMAT_3: [&str; 2] = ["design.order_version", "tracks.relative"];
 
 /// Largest protocol file that is read, bytes.
 pub const MAX_FILE_BYTES: usize = 1024 * 1024;

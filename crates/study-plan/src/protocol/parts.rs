@@ -6,7 +6,7 @@
 //! [`crate::procedure`].
 
 use super::keys::words;
-use super::{Answer, Design, Order, Pairs, Protocol, Seat};
+use super::{Answer, Design, Order, Pairs, Protocol, Relative, Seat};
 use crate::procedure::{Ladder, ProcedureError, Rule, Track};
 use serde::{Deserialize, Serialize};
 use study_base::rng::Stream;
@@ -161,6 +161,9 @@ pub struct TrackRules {
     pub method: Method,
     /// What is compared.
     pub compared: Compared,
+    /// How levels are counted; `None`: as the family does.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub relative: Option<Relative>,
     /// Which level comes next.
     pub rule: Rule,
     /// Whether the participant is told if the answer was correct.
@@ -432,17 +435,34 @@ impl Protocol {
         standard.or_else(|| self.families.iter().find_map(|f| f.level_of(model)))
     }
 
-    /// The levels that a track may present. Two realizations that are compared have one,
-    /// level 1.
+    /// The levels that a track may present, as it counts them. Two realizations that are
+    /// compared have one, level 1.
     pub fn ladder(&self, track: &TrackRules) -> Ladder {
         let family = track.family().and_then(|id| self.family(id));
-        family.map_or_else(one_step, |family| family.ladder.clone())
+        let ladder = family.and_then(|family| track.ladder_of(&family.ladder));
+        ladder.unwrap_or_else(one_step)
+    }
+
+    /// What the levels of a track are, with their unit, as the label of an axis.
+    pub fn dimension(&self, track: &TrackRules) -> Option<String> {
+        let family = self.family(track.family()?)?;
+        Some(match track.relative {
+            None => family.dimension(),
+            Some(Relative::Increment) => format!("{} above the standard", family.dimension()),
+            Some(Relative::Fraction) => {
+                format!("{} above the standard, as a fraction of it", family.id)
+            }
+        })
     }
 
     /// The realization of a step of a track's ladder, from 0.
     pub fn comparison(&self, track: &TrackRules, step: usize) -> Option<ModelId> {
         match &track.compared {
-            Compared::Levels { family, .. } => Some(self.family(family)?.realization(step)),
+            Compared::Levels { family, .. } => {
+                let family = self.family(family)?;
+                let first = track.steps_left_out(&family.ladder);
+                Some(family.realization(first + step))
+            }
             Compared::Models { models } => Some(models[1].clone()),
         }
     }

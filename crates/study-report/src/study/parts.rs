@@ -5,9 +5,9 @@ use crate::html::PartReport;
 use study_analysis::analyze::psychophysics::PartAnalysis;
 use study_base::text::counted;
 use study_plan::procedure::Rule;
-use study_plan::protocol::Protocol;
 use study_plan::protocol::pairs::IntervalOrder;
 use study_plan::protocol::parts::{Compared, Part, Task, TrackRules};
+use study_plan::protocol::{Protocol, Relative};
 
 /// Figures and sentences on the trials of each part.
 pub(super) fn part_reports(protocol: &Protocol, parts: &[PartAnalysis]) -> Vec<PartReport> {
@@ -106,12 +106,20 @@ pub fn track_in_words(protocol: &Protocol, track: &TrackRules) -> String {
             let levels = levels.levels();
             let unit = protocol.family(family).and_then(|f| f.unit.clone());
             let unit = unit.map_or_else(String::new, |u| format!(" {u}"));
-            format!(
-                "{family} at {} from {} to {}{unit} against the standard {standard}{unit}",
-                counted(levels.len(), "level", "levels"),
-                levels.first().copied().unwrap_or_default(),
-                levels.last().copied().unwrap_or_default(),
-            )
+            let first = levels.first().copied().unwrap_or_default();
+            let last = levels.last().copied().unwrap_or_default();
+            let number = counted(levels.len(), "level", "levels");
+            match track.relative {
+                None => format!(
+                    "{family} at {number} from {first} to {last}{unit} against the standard {standard}{unit}"
+                ),
+                Some(Relative::Increment) => format!(
+                    "{family} at {number}, {first} to {last}{unit} above the standard {standard}{unit}"
+                ),
+                Some(Relative::Fraction) => format!(
+                    "{family} at {number}, {first} to {last} of the standard {standard}{unit} above it"
+                ),
+            }
         }
     };
     let rule = match &track.rule {

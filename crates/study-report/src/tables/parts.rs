@@ -70,6 +70,8 @@ fn thresholds(results: &PartResults) -> Table {
         staircase.estimate.number()
     };
     let interval = |head: &str| page("95 %").file(head);
+    // Of tracks that count their levels from a standard.
+    let above = results.psy.values().any(|f| f.above_standard.is_some());
     let table = of_cells::<Function>("Thresholds", results.psy.iter())
         .field(column("trials", "n_trials"), count, |c| {
             &c.1.trials.n_trials
@@ -80,6 +82,24 @@ fn thresholds(results: &PartResults) -> Table {
         })
         .ends(interval("threshold_ci95"), plain, &|c| {
             c.1.posterior.threshold.ci95.as_ref()?.ends()
+        })
+        .number(column("ΔI", "increment").when(above), plain, &|c| {
+            c.1.above_standard.as_ref()?.increment.number()
+        })
+        .ends(interval("increment_ci95").when(above), plain, &|c| {
+            c.1.above_standard.as_ref()?.increment_ci95.ends()
+        })
+        .number(
+            column("Weber fraction", "weber_fraction").when(above),
+            plain,
+            &|c| c.1.above_standard.as_ref()?.weber_fraction.number(),
+        )
+        .ends(interval("weber_fraction_ci95").when(above), plain, &|c| {
+            c.1.above_standard
+                .as_ref()?
+                .weber_fraction_ci95
+                .as_ref()?
+                .ends()
         })
         .field(column("width", "width"), plain, |c| {
             &c.1.posterior.width.mean
@@ -99,6 +119,12 @@ fn thresholds(results: &PartResults) -> Table {
     }
     let logarithms = results.psy.values().any(|f| f.trials.log_scale.is_some());
     let mut notes = vec![threshold_note(logarithms, staircases)];
+    if above {
+        notes.push(
+            "ΔI: the distance of the threshold from the standard; Weber fraction: ΔI divided by the standard."
+                .to_owned(),
+        );
+    }
     let mut reasons: BTreeMap<&str, Vec<String>> = BTreeMap::new();
     for (cell, function) in &results.psy {
         if let Some(why) = function.ml.threshold.reason() {

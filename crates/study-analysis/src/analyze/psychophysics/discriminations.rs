@@ -5,10 +5,12 @@ use super::detection::Sensitivity;
 use super::over_participants::{Measured, Threshold, Told, mixed, sensitivities};
 use super::part_data::{Found, LevelData, PartData, StudyData, chosen, groups, sessions_of};
 use super::results::PartResults;
+use super::standards::{AboveStandard, webers_law};
 use super::tracks::of_session;
 use super::trials::{Asked, TrialCount, TrialSettings, discrimination, level};
 use crate::analyze::keys::CellName;
 use crate::analyze::record::Number as _;
+use crate::analyze::warning::Warning;
 use std::collections::{BTreeMap, BTreeSet};
 use study_base::text::PartId;
 use study_plan::protocol::Protocol;
@@ -33,6 +35,8 @@ pub(super) fn of_tracks(
     let mut names = Vec::new();
     let groups = groups(rows);
     let sessions = sessions_of(protocol, part);
+    let apart = have_different_standards(tracks);
+    let mut increments = Vec::new();
     for (rules, session) in (tracks.iter()).flat_map(|t| sessions.iter().map(move |s| (*t, *s))) {
         let (asked, name) = *Asked::NAMES.iter().find(|n| n.1 == rules.method.as_str())?;
         if methods.len() == 1 {
@@ -48,7 +52,17 @@ pub(super) fn of_tracks(
             .collect();
         trials += counts.len();
         names.push(condition.clone());
-        let found = discrimination(asked, &counts, &settings(protocol, rules));
+        let mut found = discrimination(asked, &counts, &settings(protocol, rules));
+        for (name, function) in &mut found.psy {
+            let own = AboveStandard::of(rules, &function.posterior.threshold);
+            if let Some(standard) = rules.standard_level()
+                && let Some(increment) = own.as_ref().and_then(|own| own.increment.number())
+            {
+                let participant = name.participant.as_str().to_owned();
+                increments.push((participant, standard, increment));
+            }
+            function.above_standard = own;
+        }
         let mut people: Vec<&str> = counts.iter().map(|c| c.participant.as_str()).collect();
         people.sort_unstable();
         people.dedup();
@@ -56,6 +70,8 @@ pub(super) fn of_tracks(
             let cell = CellName::of(participant, condition);
             let threshold = found.psy.get(&cell);
             let threshold = threshold.and_then(|f| f.posterior.threshold.median.as_ref()?.number());
+            let from = rules.standard_level().filter(|_| apart).unwrap_or(0.0);
+            let threshold = threshold.map(|threshold| threshold - from);
             let told_apart = sensitivity(asked, rules.method, found.sdt.get(&cell));
             if let Some(value) = threshold.or(told_apart.map(|t| t.0)) {
                 measured.push(Measured {
@@ -103,6 +119,18 @@ pub(super) fn of_tracks(
         }
     }
     results.over.sdt_group = sensitivities(&told);
+    let of_increment =
+        |(who, standard, increment): &(String, f64, f64)| (who.as_str(), *standard, *increment);
+    let increments: Vec<_> = increments.iter().map(of_increment).collect();
+    results.over.webers_law = webers_law(&increments);
+    if apart && !thresholds.is_empty() {
+        warnings.push(Warning {
+            code: "different-standards",
+            text: "the tracks have different standards: their thresholds are compared by the distance from \
+                   the standard"
+                .to_owned(),
+        });
+    }
     let families = tracks.iter().filter_map(|t| protocol.family(t.family()?));
     let families: Vec<_> = families.collect();
     // Sensitivities have no ratios.
@@ -113,10 +141,8 @@ pub(super) fn of_tracks(
     let ids: Vec<&str> = sessions.iter().flatten().map(|s| s.as_str()).collect();
     results.over.again = again(&measured, &ids, ratios);
     data.measured = measured;
-    if let Some(first) = families.first()
-        && families.iter().all(|f| f.id == first.id)
-    {
-        data.dimension = Some(first.dimension());
+    if families.windows(2).all(|two| two[0].id == two[1].id) {
+        data.dimension = tracks.first().and_then(|track| protocol.dimension(track));
     }
     Some(Found {
         task,
@@ -128,10 +154,23 @@ pub(super) fn of_tracks(
     })
 }
 
-/// Whether the levels of these tracks have ratios, as those of a blend have not.
+/// Whether the levels of these tracks have ratios, as those of a blend have not; their distances
+/// from a standard have.
 pub(crate) fn have_ratios(protocol: &Protocol, tracks: &[&TrackRules]) -> bool {
-    let mut families = tracks.iter().filter_map(|t| protocol.family(t.family()?));
+    let counted = tracks.iter().filter(|t| t.relative.is_none());
+    let mut families = counted.filter_map(|t| protocol.family(t.family()?));
     !families.any(|f| f.vary == Vary::Blend)
+}
+
+/// Whether levels above different standards are compared, of tracks that do not count them from
+/// there: equal increments would then be different thresholds. Yes–no needs no standard.
+fn have_different_standards(tracks: &[&TrackRules]) -> bool {
+    let of = |track: &&TrackRules| {
+        let plain = track.relative.is_none() && track.method != Method::YesNo;
+        track.standard_level().filter(|_| plain)
+    };
+    let standards: Vec<Option<f64>> = tracks.iter().map(of).collect();
+    standards.windows(2).any(|two| two[0] != two[1])
 }
 
 /// The threshold of each participant and track, over the sessions.
@@ -244,9 +283,7 @@ pub(crate) fn settings(protocol: &Protocol, track: &TrackRules) -> TrialSettings
     };
     let support = family.and_then(|f| Support::of(places(f.ladder.levels())?));
     // Where a stimulus equals the standard, if all levels are above it.
-    let origin = track
-        .standard_level()
-        .and_then(|level| spacing.place(level));
+    let origin = (track.counted_standard()).and_then(|level| spacing.place(level));
     let origin = origin.filter(|origin| support.is_some_and(|s| *origin <= s.low));
     let width = match (origin, spacing) {
         (Some(origin), _) => WidthPrior::FromOrigin(origin),
@@ -268,6 +305,105 @@ pub(crate) fn settings(protocol: &Protocol, track: &TrackRules) -> TrialSettings
 mod tests {
     use super::*;
     use crate::analyze::record::Stat;
+
+    /// A part with tracks on the standards 0.2, 0.4 and 0.8.
+    fn on_standards(relative: &str) -> Protocol {
+        let mut text = String::from(
+            r#"
+format = "study-protocol/3"
+study = { id = "example", title = "An example", seed = 1 }
+design = { participants = 10 }
+device = { kind = "simulated", limits = { force_n = 12.0, velocity_mm_s = 1000.0 } }
+analysis = { primary = "more" }
+
+[[families]]
+id = "friction"
+from = "static.toml"
+vary = "friction"
+range = [0.02, 1.6]
+steps = 80
+
+[[parts]]
+id = "more"
+kind = "discrimination"
+prompt = "Which one had more friction?"
+tracks = ["low", "middle", "high"]
+"#,
+        );
+        for (id, standard) in [("low", 0.2), ("middle", 0.4), ("high", 0.8)] {
+            text += &format!(
+                "[[tracks]]\nid = \"{id}\"\nmethod = \"2ifc\"\nfamily = \"friction\"\nstandard = {standard}\n\
+                 procedure = {{ rule = \"quest+\", trials = 40 }}\n{relative}\n"
+            );
+        }
+        let parsed = study_plan::protocol::file::parse("protocol.toml", &text);
+        let shown = parsed.findings.render(false);
+        parsed.protocol.unwrap_or_else(|| panic!("{shown}"))
+    }
+
+    /// Answers that rise along the levels above each standard.
+    #[test]
+    fn thresholds_are_counted_from_the_standard() {
+        let of = |relative: &str| {
+            let found = crate::preregister::complete_parts(&on_standards(relative), 4);
+            found.into_iter().next().unwrap()
+        };
+        let cell = CellName::of("000000", "high");
+        let increments = of("relative = \"increment\"");
+        let function = &increments.results.psy[&cell];
+        let threshold = function.posterior.threshold.median.as_ref().unwrap();
+        let threshold = threshold.number().unwrap();
+        let above = function.above_standard.as_ref().unwrap();
+        assert!(threshold > 0.0 && threshold < 0.8, "{threshold}");
+        assert_eq!(above.increment.number(), Some(threshold));
+        assert!((above.level.number().unwrap() - 0.8 - threshold).abs() < 1e-12);
+        let fraction = above.weber_fraction.as_ref().unwrap().number().unwrap();
+        assert!((fraction - threshold / 0.8).abs() < 1e-12);
+        let ends = function.posterior.threshold.ci95.as_ref().unwrap().ends();
+        let (low, high) = ends.unwrap();
+        let own = above.weber_fraction_ci95.as_ref().unwrap().ends().unwrap();
+        assert!((own.0 - low / 0.8).abs() < 1e-12 && (own.1 - high / 0.8).abs() < 1e-12);
+        assert!(increments.results.over.webers_law.is_some());
+        assert_eq!(
+            increments.data.dimension.as_deref(),
+            Some("friction above the standard")
+        );
+
+        let fractions = of("relative = \"fraction\"");
+        let function = &fractions.results.psy[&cell];
+        let threshold = function.posterior.threshold.median.as_ref().unwrap();
+        let above = function.above_standard.as_ref().unwrap();
+        assert_eq!(
+            above.weber_fraction.as_ref().unwrap().number(),
+            threshold.number()
+        );
+    }
+
+    /// Thresholds at different standards are never compared as levels.
+    #[test]
+    fn levels_above_different_standards_are_compared_by_their_distances() {
+        let part = &crate::preregister::complete_parts(&on_standards(""), 4)[0];
+        assert!(
+            part.warnings
+                .iter()
+                .any(|w| w.code == "different-standards")
+        );
+        for (who, condition, standard) in [("000001", "low", 0.2), ("000002", "high", 0.8)] {
+            let function = &part.results.psy[&CellName::of(who, condition)];
+            let level = function.posterior.threshold.median.as_ref().unwrap();
+            let level = level.number().unwrap();
+            let compared = part.data.measured.iter();
+            let compared: Vec<f64> = compared
+                .filter(|m| m.participant == who && m.condition == condition)
+                .map(|m| m.value)
+                .collect();
+            assert!(
+                (compared[0] + standard - level).abs() < 1e-12,
+                "{compared:?} {level}"
+            );
+        }
+        assert!(part.results.over.webers_law.is_none());
+    }
 
     /// Tracks are compared, not tracks in a session.
     #[test]

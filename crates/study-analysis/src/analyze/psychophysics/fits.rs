@@ -1,6 +1,7 @@
 //! Psychometric functions of participants and conditions: `psy/…`, `psy_group/…`.
 
 use super::over_participants::NOT_POSITIVE;
+use super::standards::AboveStandard;
 use crate::analyze::draws::Draws;
 use crate::analyze::keys::{At, CellName, ConditionName};
 use crate::analyze::record::{Interval, Key as _, Number as _, Stat, statistics};
@@ -133,6 +134,8 @@ statistics! {
         map: Mode,
         /// the posterior: the headline
         posterior: Posterior,
+        /// of a track that counts its levels from a standard
+        above_standard: Option<AboveStandard>,
     }
 
     /// The function of summed counts, which is flatter than anybody's.
@@ -298,6 +301,7 @@ impl Function {
                 .map(|most| lapses(&levels, most, settings)),
             map: mode(&levels, settings),
             posterior: bayesian(&levels, settings),
+            above_standard: None,
         }
     }
 }

@@ -13,6 +13,7 @@ pub use super::preferences::{Ability, AbilityDifference, OrderEffect, Preference
 pub use super::scales::{
     GeometricMean, Magnitudes, MeanExponent, Mushra, OwnExponent, PowerLaw, Rated, Screened,
 };
+pub use super::standards::{AboveStandard, WebersLaw};
 pub use super::tracks::{
     EasyTrials, MarginalResult, QuestPlusResult, StaircaseResult, TrackResult,
 };
@@ -58,6 +59,8 @@ statistics! {
         psy_group: BTreeMap<ConditionName, GroupThresholds>,
         /// thresholds in several conditions
         psy_mixed: Option<ConditionModel>,
+        /// Weber's law, of tracks that count levels from several standards
+        webers_law: Option<WebersLaw>,
         /// sensitivities of a condition
         sdt_group: BTreeMap<ConditionName, GroupSensitivity>,
         /// estimated magnitudes

@@ -169,6 +169,7 @@ fn track(method: Method, compared: Compared, rule: Rule, truth: Truth) -> TrackW
             id: PartId::new("a").unwrap(),
             method,
             compared,
+            relative: None,
             rule,
             feedback: false,
             catch: 0.0,

@@ -225,7 +225,7 @@ fn target(track: &TrackRules) -> Option<Fault> {
 /// Levels on both sides of the standard, where the share of correct answers does not rise
 /// with the level.
 fn one_side(protocol: &Protocol, track: &TrackRules) -> Option<Fault> {
-    let standard = track.standard_level()?;
+    let standard = track.counted_standard()?;
     let below = protocol.ladder(track).first() < standard;
     let modeled = matches!(track.rule, Rule::QuestPlus(_));
     (below && modeled && track.method != Method::YesNo).then(|| {
@@ -233,7 +233,7 @@ fn one_side(protocol: &Protocol, track: &TrackRules) -> Option<Fault> {
             "levels below the standard of the track `{}`: its function rises with the level, and there the share of correct answers falls",
             track.id
         ))
-        .hint("begin the family at the standard")
+        .hint("begin the family at the standard, or count levels from it: relative = \"increment\"")
     })
 }
 

@@ -10,9 +10,10 @@ use super::questions::PartialQuestion;
 use super::tracks::{RawRule, RawTrack};
 use super::{Content, Named};
 use crate::procedure::{Constant, Ladder, QuestPlus, Rule, Staircase, Track};
+use crate::protocol::relative::relative_ladder;
 use crate::protocol::{
     Compared, FamilyRules, Method, Mushra, OrderVersion, Pairs, Part, Presentations, QuestionKind,
-    Task, TrackRules, kinds,
+    Relative, Task, TrackRules, kinds,
 };
 use study_base::diagnostic::Fault;
 use study_base::diagnostic::table::Document;
@@ -366,6 +367,11 @@ impl Raw {
                 looked.fault_at(&place, fault.hint("make a part of each"));
             }
             method = method.or(track.method);
+            if track.relative != self.track(&tracks[0]).and_then(|first| first.relative) {
+                let what = "the tracks of a part count levels alike, all of them with the same \
+                            `relative` or none";
+                looked.fault_at(&place, Fault::error(what).hint("make a part of each"));
+            }
         }
         (!tracks.is_empty()).then_some(())
     }
@@ -382,9 +388,20 @@ impl Looked<'_> {
                 self.models(models, &format!("{path}.models"));
                 Ladder::new(vec![1.0]).ok()?
             }
-            Compared::Levels { family, .. } => self.family(family, families?, path)?.ladder.clone(),
+            Compared::Levels { family, standard } => {
+                let family = self.family(family, families?, path)?;
+                match raw.relative {
+                    None => family.ladder.clone(),
+                    Some(relative) => self.above(relative, *standard, family, path)?,
+                }
+            }
         };
-        let rule = self.rule(raw.rule.clone()?, method, &compared, &ladder);
+        // Counted from the standard, that is 0 and below the ladder.
+        let standard = match (&compared, raw.relative) {
+            (Compared::Levels { standard, .. }, None) => Some(*standard),
+            _ => None,
+        };
+        let rule = self.rule(raw.rule.clone()?, method, standard, &ladder);
         if let Rule::Staircase(Staircase {
             min_level: Some(standard),
             start,
@@ -417,6 +434,7 @@ impl Looked<'_> {
             id,
             method,
             compared,
+            relative: raw.relative,
             rule,
             feedback: raw.feedback,
             catch,
@@ -425,14 +443,29 @@ impl Looked<'_> {
         })
     }
 
-    /// The rule with its defaults.
-    fn rule(&self, raw: RawRule, method: Method, compared: &Compared, ladder: &Ladder) -> Rule {
+    /// The levels of a family above a standard, as a track counts them.
+    fn above(
+        &self,
+        relative: Relative,
+        standard: f64,
+        family: &FamilyRules,
+        path: &str,
+    ) -> Option<Ladder> {
+        let found = relative_ladder(relative, standard, &family.ladder);
+        if found.is_none() {
+            let (id, last) = (&family.id, family.ladder.last());
+            let what = format!("no level of `{id}` is above the standard {standard}");
+            let hint = format!("its highest is {last}: raise the range, or lower the standard");
+            self.fault(path, "standard", Fault::error(what).hint(hint));
+        }
+        found
+    }
+
+    /// The rule with its defaults. `standard`: as the ladder counts, if the ladder may have
+    /// levels below it.
+    fn rule(&self, raw: RawRule, method: Method, standard: Option<f64>, ladder: &Ladder) -> Rule {
         match raw {
             RawRule::Staircase(rule) => {
-                let standard = match compared {
-                    Compared::Levels { standard, .. } => Some(*standard),
-                    Compared::Models { .. } => None,
-                };
                 // Below the standard a smaller level is easier, not harder.
                 let min_level = standard.filter(|s| *s > ladder.first());
                 Rule::Staircase(Staircase { min_level, ..rule })
@@ -459,10 +492,6 @@ impl Looked<'_> {
                     slope,
                     guess,
                     lapse,
-                };
-                let standard = match compared {
-                    Compared::Levels { standard, .. } => Some(*standard),
-                    Compared::Models { .. } => None,
                 };
                 let parameters = grids.parameters(&rule.function, method, ladder, standard);
                 Rule::QuestPlus(QuestPlus { parameters, ..rule })

@@ -552,6 +552,7 @@ mod fits;
 mod keys;
 mod parts;
 mod questionnaires;
+mod relative;
 
 mod random {
     use super::*;

@@ -3,7 +3,7 @@
 use crate::procedure::{Function, Parameter, QuestPlus, Scale, Staircase, Stop};
 use crate::protocol::keys::{Id, Key, Kind, Shape, Variants, Word, Words, keys};
 use crate::protocol::section::{Section, Variant, shapes};
-use crate::protocol::{Compared, FitRules, Method};
+use crate::protocol::{Compared, FitRules, Method, Relative};
 use std::ops::Bound;
 use study_base::diagnostic::Fault;
 use study_base::text::{ModelId, PartId};
@@ -22,6 +22,11 @@ pub(super) const TRACKS: &[Key] = keys! {
     /// The level of the other intervals. It need not be a level of the ladder, but has to pass
     /// the certificate, too.
     "standard": Kind::ANY_NUMBER, "1.0", derived("`models` are compared");
+    /// How the track counts levels. With this key, all levels of the `procedure` and all
+    /// thresholds are counted from the standard, and only levels above it are presented; "do
+    /// thresholds differ?" compares them as they are counted. Without it they are levels of the
+    /// family. Needs the format `study-protocol/3`.
+    "relative": Kind::Word(Relative::WORDS), r#""increment""#;
     /// Two realizations instead of levels of a family: the standard and the comparison.
     "models": Kind::ModelIds, r#"["lambda-0.9991", "lambda-0.9995"]"#;
     /// The rule by which the next level is chosen.
@@ -200,6 +205,7 @@ pub(super) struct RawTrack {
     pub(super) id: Option<PartId>,
     pub(super) method: Option<Method>,
     pub(super) compared: Option<Compared>,
+    pub(super) relative: Option<Relative>,
     pub(super) rule: Option<RawRule>,
     pub(super) feedback: bool,
     pub(super) catch: Option<f64>,
@@ -228,6 +234,22 @@ pub(super) enum RawRule {
 pub(super) fn read(mut section: Section<'_, '_>) -> RawTrack {
     let (id, method) = (section.part_id("id"), section.word::<Method>("method"));
     let compared = compared(&mut section);
+    let relative = section.word("relative");
+    if relative.is_some() && matches!(compared, Some(Compared::Models { .. })) {
+        let what = format!(
+            "`{}` compares two models, which have no levels",
+            section.path()
+        );
+        section.fault_at("relative", Fault::error(what).hint("leave `relative` out"));
+    }
+    if let (Some(Relative::Fraction), Some(Compared::Levels { standard, .. })) =
+        (relative, &compared)
+        && *standard <= 0.0
+    {
+        let what = format!("there are no fractions of the standard {standard}");
+        let hint = "relative = \"increment\", or a standard above 0";
+        section.fault_at("relative", Fault::error(what).hint(hint));
+    }
     let rule = section.variant("procedure", &RULES);
     if rule.is_none() && section.value("procedure").is_none() {
         let hint = "such as procedure = { rule = \"quest+\", trials = 40 }";
@@ -267,6 +289,7 @@ pub(super) fn read(mut section: Section<'_, '_>) -> RawTrack {
         id,
         method,
         compared,
+        relative,
         rule,
         feedback: section.flag("feedback").unwrap_or(false),
         catch,
