@@ -110,6 +110,51 @@ fn thresholds_of_a_forced_choice() {
     assert_eq!(same, found);
 }
 
+/// As the programs of experiments write their trials: the same functions as from counts.
+#[test]
+fn tables_of_psychopy_and_jspsych_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = golden("fit_sim_group");
+    let counts = csv("participant,level,positive,trials", &file, joined);
+    let args = ["--task", "2ifc", "--json"];
+    let expected = values(&mut analyze(folder.path(), &counts, &args));
+    // PsychoPy: all columns of all components, an empty row for the instructions.
+    let mut psychopy =
+        "level,trials.thisN,key_resp.keys,key_resp.corr,key_resp.rt,participant,session,date\n\
+                        ,,,,,P01,001,2026-03-02\n,,None,None,,P01,001,2026-03-02\n"
+            .to_owned();
+    // jsPsych: every cell in quotes, null for what was no answer.
+    let mut jspsych = "\"rt\",\"stimulus\",\"response\",\"trial_type\",\"trial_index\",\"subject\",\"level\",\"correct\"\n\
+                       \"2310\",\"<p>Welcome</p>\",\" \",\"html-keyboard-response\",\"0\",\"P01\",\"\",\"\"\n"
+        .to_owned();
+    for row in file["input"]["rows"].as_array().unwrap() {
+        for trial in 0..row[3].as_u64().unwrap() {
+            let correct = trial < row[2].as_u64().unwrap();
+            let (who, level) = (plain(&row[0]), &row[1]);
+            let one = u8::from(correct);
+            writeln!(
+                psychopy,
+                "{level},{trial},left,{one},0.{trial}1,{who},001,2026-03-02"
+            )
+            .unwrap();
+            writeln!(
+                jspsych,
+                "\"612\",\"a.png\",\"f\",\"image-keyboard-response\",\"{trial}\",\"{who}\",\"{level}\",\"{correct}\""
+            )
+            .unwrap();
+        }
+    }
+    for table in [psychopy, jspsych] {
+        let found = values(&mut analyze(folder.path(), &table, &args));
+        assert_eq!(found, expected);
+    }
+    // `response` is the answer where the target is known.
+    let table = "participant,level,target,response\nP1,1,first,first\nP1,1,second,first\n";
+    let answered = table.replace("response", "answer");
+    let found = [table, &answered].map(|t| values(&mut analyze(folder.path(), t, &args)));
+    assert_eq!(found[0], found[1]);
+}
+
 #[test]
 fn names_are_printed_as_the_data_have_them() {
     let folder = tempfile::tempdir().unwrap();
@@ -392,6 +437,16 @@ fn what_is_undefined_says_why() {
 fn a_bad_table_is_refused_with_line_and_column() {
     let folder = tempfile::tempdir().unwrap();
     for (table, task, said) in [
+        (
+            "participant;level;correct\nP1;0,1;1\n",
+            "2ifc",
+            "t.csv: the columns are separated by semicolons; a table has commas, and decimal points",
+        ),
+        (
+            "participant,level,correct\nP1,1,yes\n",
+            "2ifc",
+            "t.csv:2: correct is `yes`, expected true, false, 1 or 0",
+        ),
         (
             "participant,level\nP1,1\n",
             "2ifc",

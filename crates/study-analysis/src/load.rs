@@ -282,6 +282,8 @@ fn open(path: &Path, purpose: Purpose<'_>) -> (Option<Loaded>, Vec<Findings>) {
     findings
         .faults
         .extend(check::warnings(&protocol, &spans, &unread));
+    let started = purpose.has_started(&protocol.study.id);
+    (findings.faults).extend(check::coarse(&protocol, &spans, started));
     findings.sort();
 
     let mut files = vec![(FILE_NAME.to_owned(), bytes)];

@@ -154,8 +154,11 @@ impl Study {
         if pilots && !rows.iter().any(is_real) {
             return Err(StudyError::OnlyPilots(self.folder.path().to_owned()));
         }
-        let parts = self.analyze_parts(options.include);
-        if !parts.is_empty() && options.question.is_none() && !is_rated(protocol) {
+        let mut parts = self.analyze_parts(options.include);
+        let changed = self.deviations()?;
+        let only_parts = !parts.is_empty() && options.question.is_none() && !is_rated(protocol);
+        warn_of_changes(protocol, &changed, only_parts, &mut parts);
+        if only_parts {
             let source = Source {
                 preregistration: preregistered::of_parts(self, &parts)?,
                 ..self.source()
@@ -259,6 +262,7 @@ impl Study {
         let mut found = Vec::new();
         let mut before: Option<Protocol> = None;
         let versions = &self.folder.manifest().versions;
+        let registered = versions.len() > 1 && preregistered::has_document(self)?;
         for version in versions.iter().filter(|_| versions.len() > 1) {
             let after = load::frozen_version(&self.folder, version.version)?.protocol;
             if let Some(before) = &before {
@@ -271,12 +275,37 @@ impl Study {
                         version.reason,
                         change.text
                     ),
+                    registered,
                     ..change
                 }));
             }
             before = Some(after);
         }
         Ok(found)
+    }
+}
+
+/// Adds changes of the analysis to the warnings of parts: those of a track to its part, the others
+/// to the first one, if there is no analysis of ratings that warns of them.
+fn warn_of_changes(
+    protocol: &Protocol,
+    changed: &[Deviation],
+    only_parts: bool,
+    parts: &mut [PartAnalysis],
+) {
+    for change in changed {
+        let has = |own: &PartAnalysis, track| match protocol.part(&own.part).map(|p| &p.task) {
+            Some(Task::Discrimination { tracks }) => tracks.contains(track),
+            _ => false,
+        };
+        let own = match &change.track {
+            Some(track) => parts.iter_mut().find(|part| has(part, track)),
+            None if only_parts => parts.first_mut(),
+            None => None,
+        };
+        if let Some(part) = own {
+            part.warnings.push(change.warning());
+        }
     }
 }
 

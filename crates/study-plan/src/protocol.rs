@@ -10,6 +10,7 @@
 pub mod answer;
 pub mod check;
 pub mod columns;
+pub mod conditions;
 pub mod control;
 pub mod difference;
 pub mod example;

@@ -1,6 +1,8 @@
 //! Deviations: changes of the analysis rules after a study has begun.
 
+use super::warning::Warning;
 use std::fmt::Display;
+use study_base::text::PartId;
 use study_plan::protocol::{AnalysisRules, Exclusion, Protocol};
 
 /// A rule that a report calls preregistered unless it was changed.
@@ -25,10 +27,28 @@ pub struct Deviation {
     pub text: String,
     /// The rules that it changes; a report must not call them preregistered.
     pub affects: &'static [PreregisteredRule],
+    /// The track whose fit it changes.
+    pub track: Option<PartId>,
+    /// Whether an analysis had been preregistered, from which it deviates.
+    pub registered: bool,
 }
 
-/// The changes of `[analysis]`, the planned participants, VAF and covariates from
-/// one version of a protocol to a later one.
+impl Deviation {
+    /// The change as a warning: without a preregistration there is none to deviate from.
+    pub fn warning(&self) -> Warning {
+        let what = match self.registered {
+            true => "deviation from the preregistered analysis",
+            false => "the analysis was changed after the study began",
+        };
+        Warning {
+            code: "deviation",
+            text: format!("{what}: {}", self.text),
+        }
+    }
+}
+
+/// The changes of `[analysis]`, the planned participants, VAF and covariates, and of the fits and
+/// conditions of tracks, from one version of a protocol to a later one.
 pub fn deviations(before: &Protocol, after: &Protocol) -> Vec<Deviation> {
     // No `..`: a new field has to be compared.
     let AnalysisRules {
@@ -48,7 +68,12 @@ pub fn deviations(before: &Protocol, after: &Protocol) -> Vec<Deviation> {
     let mut compare = |what: &str, affects, old: String, new: String| {
         if old != new {
             let text = format!("{what}: {old} → {new}");
-            found.push(Deviation { text, affects });
+            found.push(Deviation {
+                text,
+                affects,
+                track: None,
+                registered: false,
+            });
         }
     };
     compare(
@@ -124,6 +149,30 @@ pub fn deviations(before: &Protocol, after: &Protocol) -> Vec<Deviation> {
             numbers(new),
         );
     }
+    for new in &after.tracks {
+        let Some(old) = before.track(&new.id) else {
+            continue;
+        };
+        let fits = [before.fit_in_words(old), after.fit_in_words(new)];
+        let [old_name, new_name] = [old, new].map(|track| track.condition().to_string());
+        let pairs = [
+            (format!("fit of track {}", new.id), fits),
+            (
+                format!("condition of track {}", new.id),
+                [old_name, new_name],
+            ),
+        ];
+        for (what, [old, new_value]) in pairs {
+            if old != new_value {
+                found.push(Deviation {
+                    text: format!("{what}: {old} → {new_value}"),
+                    affects: &[],
+                    track: Some(new.id.clone()),
+                    registered: false,
+                });
+            }
+        }
+    }
     found
 }
 
@@ -174,6 +223,54 @@ mod tests {
             found.contains("none → constant-rater, strokes-below strokes = 2"),
             "{found}"
         );
+    }
+
+    #[test]
+    fn a_change_of_a_fit_is_a_deviation_of_its_track() {
+        let protocol = |fit: &str| {
+            let text = format!(
+                r#"
+format = "study-protocol/3"
+study = {{ id = "example", title = "An example", seed = 1 }}
+design = {{ participants = 10 }}
+device = {{ kind = "simulated", limits = {{ force_n = 12.0, velocity_mm_s = 1000.0 }} }}
+analysis = {{ primary = "more" }}
+families = [{{ id = "friction", from = "static.toml", vary = "friction", range = [0.02, 0.6], steps = 30 }}]
+parts = [{{ id = "more", kind = "discrimination", prompt = "Which?", tracks = ["up"] }}]
+tracks = [{{ id = "up", method = "2ifc", family = "friction", standard = 0.0, procedure = {{ rule = "quest+", trials = 40 }}, {fit} }}]
+"#
+            );
+            let parsed = study_plan::protocol::file::parse("protocol.toml", &text);
+            let shown = parsed.findings.render(false);
+            parsed.protocol.unwrap_or_else(|| panic!("{shown}"))
+        };
+        let before = protocol("feedback = false");
+        assert_eq!(deviations(&before, &before), []);
+        for (fit, says) in [
+            (
+                "fit = { scale = \"log\" }",
+                "fit of track up: norm over lin levels, lapse rate 0.02 → gumbel over log levels, lapse rate 0.02",
+            ),
+            (
+                "fit = { lapse = 0.05 }",
+                "fit of track up: norm over lin levels, lapse rate 0.02 → norm over lin levels, lapse rate 0.05",
+            ),
+            ("condition = \"all\"", "condition of track up: up → all"),
+        ] {
+            let found = deviations(&before, &protocol(fit));
+            assert_eq!(found.len(), 1, "{found:?}");
+            assert_eq!(found[0].text, says);
+            assert_eq!(found[0].track.as_ref().map(PartId::as_str), Some("up"));
+            let said = |registered| {
+                let own = Deviation {
+                    registered,
+                    ..found[0].clone()
+                };
+                own.warning().text
+            };
+            assert!(said(false).starts_with("the analysis was changed after the study began: fit"));
+            assert!(said(true).starts_with("deviation from the preregistered analysis: fit"));
+        }
     }
 
     #[test]

@@ -73,11 +73,10 @@ pub(super) fn warnings(
             ),
         );
     }
-    for change in &rules.deviations {
-        warn(
-            "deviation",
-            format!("deviation from the preregistered analysis: {}", change.text),
-        );
+    // Those of tracks are warnings of their part.
+    for change in rules.deviations.iter().filter(|d| d.track.is_none()) {
+        let Warning { code, text } = change.warning();
+        warn(code, text);
     }
     if counts.participants == 1 && counts.rated > 0 {
         warn(

@@ -4,9 +4,10 @@ use super::parts::{PairsWorld, PartWorld, TrackWorld, TracksWorld, Truth};
 use super::plan::{Defaults, LeftOut, numbers, slope, targets, tests};
 use super::{Assumptions, Cell, Overrides, Pace, Plan, PlanError, Scale, Settings, Test, Vaf};
 use crate::analyze::ALPHA;
-use crate::analyze::psychophysics::track_settings;
+use crate::analyze::psychophysics::{have_ratios, track_settings};
 use study_base::text::{ModelId, PartId};
 use study_plan::procedure::Ladder;
+use study_plan::protocol::conditions::by_condition;
 use study_plan::protocol::pairs::{IntervalOrder, Pairs};
 use study_plan::protocol::parts::{Part, Task, TrackRules};
 use study_plan::protocol::power::{PowerPlan, PowerTrack};
@@ -22,6 +23,9 @@ const TIES: f64 = 0.2;
 const STUDIES_OF_PAIRS: u64 = 2000;
 /// Of tracks, each of which takes many fits.
 const STUDIES_OF_TRACKS: u64 = 200;
+/// Of tracks of one condition, where there is no test: the mean width of an interval is known from
+/// few.
+const STUDIES_WITHOUT_TEST: u64 = 40;
 
 /// The part that is meant: the one of the flag, or the one that asks the primary question;
 /// `None` if that is a part of ratings.
@@ -135,6 +139,7 @@ fn plan(protocol: &Protocol, flags: &Overrides, part: &Part) -> Result<Plan, Pla
     }
     let studies = match world {
         PartWorld::Pairs(_) => STUDIES_OF_PAIRS,
+        PartWorld::Tracks(_) if tests.is_empty() => STUDIES_WITHOUT_TEST,
         PartWorld::Tracks(_) => STUDIES_OF_TRACKS,
     };
     Ok(Plan {
@@ -189,7 +194,9 @@ fn of_part(
         }
         PartWorld::Tracks(tracks) => {
             let of = |truth: fn(&Truth) -> bool| {
-                tracks.tracks.iter().filter(|t| truth(&t.truth)).count()
+                let own = tracks.tracks.iter().filter(|t| truth(&t.truth));
+                let rules: Vec<&TrackRules> = own.map(|t| &t.rules).collect();
+                by_condition(&rules).len()
             };
             let mut all = Vec::new();
             all.extend((of(|t| matches!(t, Truth::Function(_))) >= 2).then_some(Test::Thresholds));
@@ -291,7 +298,11 @@ fn of_tracks(
     });
     let ratios = ratios && ends.is_some();
     let mut truths = Vec::new();
-    let with_levels = ladders.iter().flatten().count();
+    let conditions = by_condition(&tracks);
+    let with_levels = conditions
+        .iter()
+        .filter(|own| own[0].family().is_some())
+        .count();
     let typical = match ends {
         None => None,
         Some((low, high)) => {
@@ -321,12 +332,13 @@ fn of_tracks(
             Some((threshold, width, change, lapse))
         }
     };
-    let mut at = 0;
     for (track, ladder) in tracks.iter().zip(ladders) {
+        // Its place among the conditions with levels.
+        let at = (conditions.iter().filter(|own| own[0].family().is_some()))
+            .position(|own| own[0].condition() == track.condition());
         let truth = match (&ladder, typical) {
             (Some(_), Some((threshold, width, change, lapse))) => {
-                let along = at as f64 / (with_levels.max(2) - 1) as f64;
-                at += 1;
+                let along = at.unwrap_or(0) as f64 / (with_levels.max(2) - 1) as f64;
                 let factor = if ratios {
                     libm::exp(change * along)
                 } else {

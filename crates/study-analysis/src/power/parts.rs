@@ -18,6 +18,7 @@ use crate::analyze::psychophysics::{
 use std::f64::consts::SQRT_2;
 use study_base::rng::Stream;
 use study_plan::procedure::{Answer, Ladder, Track};
+use study_plan::protocol::conditions::by_condition;
 use study_plan::protocol::parts::{Method, TrackRules};
 use study_stats::detection::{
     rates_of_same_different, share_of_abx_by_differencing, share_of_choice, share_of_oddity,
@@ -263,6 +264,13 @@ impl<'a> PartJudge<'a> {
     ) -> Outcome {
         let settings = self.settings;
         let spread = &settings.assumptions.spread;
+        let rules: Vec<&TrackRules> = world.tracks.iter().map(|t| &t.rules).collect();
+        let conditions = by_condition(&rules);
+        let place = |track: &TrackWorld| {
+            let own = |all: &Vec<&TrackRules>| all[0].condition() == track.rules.condition();
+            conditions.iter().position(own).unwrap_or(0)
+        };
+        let places: Vec<usize> = world.tracks.iter().map(place).collect();
         let mut found: Vec<(String, String, f64)> = Vec::new();
         let mut first: Vec<f64> = Vec::new();
         let mut counts: Vec<Vec<TrialCount>> = vec![Vec::new(); world.tracks.len()];
@@ -270,39 +278,46 @@ impl<'a> PartJudge<'a> {
         for i in 0..self.cell.participants {
             let name = format!("{i:06}");
             let level = spread.subject * draws.normal();
-            let own: Vec<f64> = (world.tracks.iter())
+            let own: Vec<f64> = (conditions.iter())
                 .map(|_| level + spread.interaction * draws.normal())
                 .collect();
             if self.is_lost(draws) {
                 continue;
             }
+            let mut answered: Vec<Vec<Level>> = vec![Vec::new(); conditions.len()];
             for (t, track) in world.tracks.iter().enumerate() {
-                let Some(asked) = track.asked() else {
-                    continue;
-                };
+                let at = places[t];
                 // A stream of its own: the number of trials depends on the answers.
                 let path = [STREAM, &self.text, number, "track", &name, &t.to_string()];
                 let mut answers = Stream::new(settings.seed, &path);
                 match (track.truth, &fresh[t]) {
                     (Truth::Sensitivity(d), _) => {
-                        let d = (d + own[t]).max(0.0);
+                        let d = (d + own[at]).max(0.0);
                         counts[t].extend(trials(track, &name, d, &mut answers));
                     }
                     (Truth::Function(typical), Some(fresh)) => {
-                        let curve = of_participant(typical, own[t], world.ratios);
-                        let levels = run(track, fresh.clone(), &curve, &mut answers);
-                        match decided::threshold(asked, &levels, &track.settings) {
-                            Some(value) => {
-                                if t == 0 {
-                                    first.push(value);
-                                }
-                                let id = track.rules.id.as_str().to_owned();
-                                found.push((name.clone(), id, value));
-                            }
-                            None => whole = false,
-                        }
+                        let curve = of_participant(typical, own[at], world.ratios);
+                        answered[at].extend(run(track, fresh.clone(), &curve, &mut answers));
                     }
                     (Truth::Function(_), None) => whole = false,
+                }
+            }
+            // The tracks of a condition are fitted together.
+            for (at, levels) in answered.iter().enumerate().filter(|a| !a.1.is_empty()) {
+                let track = places.iter().position(|p| *p == at);
+                let track = track.map(|t| &world.tracks[t]);
+                let Some((track, asked)) = track.and_then(|t| Some((t, t.asked()?))) else {
+                    continue;
+                };
+                match decided::threshold(asked, levels, &track.settings) {
+                    Some(value) => {
+                        if at == 0 {
+                            first.push(value);
+                        }
+                        let id = track.rules.condition().as_str().to_owned();
+                        found.push((name.clone(), id, value));
+                    }
+                    None => whole = false,
                 }
             }
         }

@@ -44,6 +44,11 @@ fn document(study: &Study) -> Result<Option<(u32, Preregistration)>, StudyError>
     Ok(None)
 }
 
+/// Whether a study has a document.
+pub(super) fn has_document(study: &Study) -> Result<bool, StudyError> {
+    Ok(document(study)?.is_some())
+}
+
 /// The document, compared with what was done.
 fn comparison(study: &Study, done: &Done<'_>) -> Result<Option<Comparison>, StudyError> {
     let Some((version, document)) = document(study)? else {

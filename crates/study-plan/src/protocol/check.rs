@@ -3,8 +3,10 @@
 //! No finding here prevents a study from running. Warnings that need the models'
 //! tables or the orders are given where these are loaded.
 
+mod ladders;
 mod parts;
 
+pub use ladders::coarse;
 pub use parts::is_about_realizations;
 
 use super::phrases::{self, Phrase};

@@ -109,7 +109,11 @@ const FORMATS: &[Word] = &[
 const OF_FORMAT_2: [&str; 5] = ["parts", "families", "tracks", "groups", "sessions"];
 
 /// Keys that need [`FORMAT_3`], without the places in lists.
-pub const OF_FORMAT_3: [&str; 2] = ["design.order_version", "tracks.relative"];
+pub const OF_FORMAT_3: [&str; 3] = [
+    "design.order_version",
+    "tracks.relative",
+    "tracks.condition",
+];
 
 /// Largest protocol file that is read, bytes.
 pub const MAX_FILE_BYTES: usize = 1024 * 1024;

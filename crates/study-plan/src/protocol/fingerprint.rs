@@ -226,6 +226,10 @@ pub fn parts(
     if tracks.iter().any(|t| t.fit != FitRules::default()) {
         analysis["tracks"] = tracks.iter().map(fit).collect();
     }
+    if tracks.iter().any(|t| t.measures.is_some()) {
+        let condition = |t: &TrackRules| json!({ "id": t.id, "condition": t.condition() });
+        analysis["conditions"] = tracks.iter().map(condition).collect();
+    }
     if !questionnaires.is_empty() {
         analysis["questionnaires"] = json!(questionnaires);
     }

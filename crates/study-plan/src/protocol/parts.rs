@@ -175,6 +175,10 @@ pub struct TrackRules {
     /// How its psychometric functions are fitted, a matter of the analysis.
     #[serde(skip)]
     pub fit: FitRules,
+    /// The condition that it measures together with other tracks, a matter of the analysis;
+    /// `None`: one of its own.
+    #[serde(skip)]
+    pub measures: Option<PartId>,
 }
 
 /// How the psychometric functions of a track are fitted, where the protocol says it.
@@ -412,15 +416,6 @@ impl Protocol {
     /// A track by its id.
     pub fn track(&self, id: &PartId) -> Option<&TrackRules> {
         self.tracks.iter().find(|t| t.id == *id)
-    }
-
-    /// The scale and the shape of the functions of a track.
-    pub fn fit(&self, track: &TrackRules) -> (Spacing, Core) {
-        let family = track.family().and_then(|id| self.family(id));
-        let own = || family.map(|family| family.spacing);
-        let spacing = track.fit.scale.or_else(own).unwrap_or_default();
-        let core = track.fit.core.unwrap_or_else(|| spacing.usual_core());
-        (spacing, core)
     }
 
     /// A family by its id.

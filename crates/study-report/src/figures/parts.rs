@@ -216,7 +216,7 @@ fn tracks(name: &str, part: &PartAnalysis) -> Option<Drawn> {
     }
     let panel = |track: &TrackData| {
         // Of a track without a function, such as same-different, the level itself.
-        let of_track = |cell: &&LevelData| cell.condition == track.track;
+        let of_track = |cell: &&LevelData| cell.condition == track.condition;
         let spacing = part.data.levels.iter().find(of_track);
         let spacing = spacing.map_or_else(Spacing::default, |cell| cell.spacing);
         let points = |keep: &dyn Fn(usize) -> bool| -> Vec<(f64, f64)> {

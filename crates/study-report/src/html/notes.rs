@@ -72,7 +72,10 @@ fn rules(a: &Analysis) -> Markup {
         @if a.deviations.is_empty() {
             p { "No analysis rule was changed after the study began." }
         } @else {
-            h3 { "Deviations from the preregistered analysis" }
+            h3 {
+                @if a.deviations.iter().any(|d| d.registered) { "Deviations from the preregistered analysis" }
+                @else { "Changes of the analysis after the study began" }
+            }
             ul { @for d in &a.deviations { li { (safe(&d.text)) } } }
         }
     }
@@ -185,7 +188,7 @@ pub(super) fn provenance(source: &Source, d: &Details, question: Option<&str>) -
                         }
                     }
                     @if d.versions.len() > 1 {
-                        p.note { "Every version after the first is a deviation from the preregistered protocol." }
+                        p.note { "Every version after the first changed the protocol after the study began." }
                     }
                 }
             }

@@ -14,12 +14,14 @@ use crate::analyze::warning::Warning;
 use std::collections::{BTreeMap, BTreeSet};
 use study_base::text::PartId;
 use study_plan::protocol::Protocol;
+use study_plan::protocol::conditions::by_condition;
 use study_plan::protocol::parts::{Method, Part, TrackRules, Vary};
 use study_session::outcome::RatingRow;
 use study_stats::describe::mean;
 use study_stats::psychometric::{Core, Level, Priors, Spacing, Support, WidthPrior, pooled};
 
-/// Each track is fitted by itself; the priors refer to the range of its own ladder.
+/// Each condition is fitted by itself; the priors refer to the range of its own ladder. A track is a
+/// condition, unless several measure one together.
 pub(super) fn of_tracks(
     study: &StudyData<'_>,
     part: &Part,
@@ -37,15 +39,22 @@ pub(super) fn of_tracks(
     let sessions = sessions_of(protocol, part);
     let apart = have_different_standards(tracks);
     let mut increments = Vec::new();
-    for (rules, session) in (tracks.iter()).flat_map(|t| sessions.iter().map(move |s| (*t, *s))) {
+    let conditions = by_condition(tracks);
+    let cells = conditions
+        .iter()
+        .flat_map(|own| sessions.iter().map(move |s| (own, *s)));
+    for (own_tracks, session) in cells {
+        // Those of a condition are alike but for their procedures.
+        let rules = own_tracks[0];
         let (asked, name) = *Asked::NAMES.iter().find(|n| n.1 == rules.method.as_str())?;
         if methods.len() == 1 {
             (task, data.guess) = (name, rules.method.guess_rate());
         }
-        let condition = &condition(&rules.id, session);
+        let condition = &condition(rules.condition(), session);
         let own = rows.iter().filter(|row| {
             let in_session = session.is_none() || row.session_id.as_ref() == session;
-            in_session && row.track.as_ref() == Some(&rules.id)
+            let in_track = |track: &&TrackRules| row.track.as_ref() == Some(&track.id);
+            in_session && own_tracks.iter().any(|t| in_track(&t))
         });
         let counts: Vec<TrialCount> = own
             .filter_map(|row| trial(part, asked, row, condition))
@@ -78,7 +87,7 @@ pub(super) fn of_tracks(
                     participant: (*participant).to_owned(),
                     group: groups.get(*participant).cloned(),
                     session: session.map(|s| s.as_str().to_owned()),
-                    condition: rules.id.as_str().to_owned(),
+                    condition: rules.condition().as_str().to_owned(),
                     value,
                 });
             }
@@ -108,9 +117,12 @@ pub(super) fn of_tracks(
             };
             let participant = start.participant.as_str();
             let in_session = session.is_none() || start.assigned.session_id.as_ref() == session;
-            if in_session && people.binary_search(&participant).is_ok() {
-                let name = CellName::of(participant, condition);
-                let found = of_session(protocol, rules, history, &name, &mut warnings);
+            if !in_session || people.binary_search(&participant).is_err() {
+                continue;
+            }
+            for track in own_tracks {
+                let name = CellName::of(participant, &self::condition(&track.id, session));
+                let found = of_session(protocol, track, history, (&name, condition), &mut warnings);
                 if let Some((result, own)) = found {
                     results.track.insert(name, result);
                     data.tracks.push(own);
@@ -202,8 +214,8 @@ fn over_sessions(measured: &[Measured], ratios: bool) -> Vec<Threshold<'_>> {
         .collect()
 }
 
-/// The name of a track in the identifiers of its statistics; of a part that several sessions
-/// have, with the session.
+/// The name of a condition or track in the identifiers of its statistics; of a part that several
+/// sessions have, with the session.
 fn condition(track: &PartId, session: Option<&PartId>) -> String {
     match session {
         Some(session) => format!("{track}@{session}"),

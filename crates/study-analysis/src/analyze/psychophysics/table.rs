@@ -84,6 +84,16 @@ pub enum TableError {
         /// What would be right.
         expected: String,
     },
+    /// Columns that are not separated by commas.
+    #[error(
+        "{name}: the columns are separated by {separator}; a table has commas, and decimal points"
+    )]
+    Separator {
+        /// The file.
+        name: String,
+        /// What separates them.
+        separator: &'static str,
+    },
     /// Nothing to analyze.
     #[error("{name}: there are no rows")]
     Empty {
@@ -123,6 +133,9 @@ pub fn analyze_table(
     Ok((results, rows.records.len()))
 }
 
+/// Columns of the participant, in the order in which they are looked for.
+const PARTICIPANT: [&str; 4] = ["participant", "subject", "participant_id", "subject_id"];
+
 struct Rows<'a> {
     name: &'a str,
     kind: TableKind,
@@ -141,7 +154,15 @@ impl<'a> Rows<'a> {
             .from_reader(input);
         let header = reader.headers().map_err(fault)?.iter();
         let header = header.map(|h| h.trim_start_matches('\u{feff}').to_owned());
-        let header = header.collect();
+        let header: Vec<String> = header.collect();
+        if let [only] = &header[..] {
+            for (mark, separator) in [(';', "semicolons"), ('\t', "tabs")] {
+                if only.contains(mark) {
+                    let name = name.to_owned();
+                    return Err(TableError::Separator { name, separator });
+                }
+            }
+        }
         let mut records = Vec::new();
         for record in reader.records() {
             let record = record.map_err(fault)?;
@@ -164,15 +185,27 @@ impl<'a> Rows<'a> {
         self.header.iter().position(|h| h == column)
     }
 
+    /// The column that says whether an answer is correct: `correct`, or that of a keyboard or
+    /// mouse of PsychoPy, such as `key_resp.corr`, if there is one of them.
+    fn correct(&self) -> Option<usize> {
+        let of_component = || {
+            let mut all = self.header.iter().enumerate();
+            let (at, _) = all.find(|(_, name)| name.ends_with(".corr"))?;
+            all.all(|(_, name)| !name.ends_with(".corr")).then_some(at)
+        };
+        self.column("correct").or_else(of_component)
+    }
+
     fn required(&self, column: &'static str) -> Result<usize, TableError> {
         let found = match column {
-            "participant" => self.column(column).or_else(|| self.column("subject")),
+            "participant" => (PARTICIPANT.iter()).find_map(|name| self.column(name)),
             _ => self.column(column),
         };
         let (kind, columns) = match self.kind {
             TableKind::Trials(_) => (
                 "trials",
-                "participant[,condition][,level],target,answer[,trials] or participant[,condition],level,positive[,trials]",
+                "participant[,condition][,level],target,answer[,trials] or participant[,condition],level,positive[,trials]; \
+                 correct or key_resp.corr, as jsPsych and PsychoPy write them, is read in the place of positive",
             ),
             TableKind::Pairs => ("pairs", "[participant,]first,second,answer"),
             TableKind::Magnitude => ("magnitude estimation", "participant,level,estimate"),
@@ -232,6 +265,16 @@ impl<'a> Rows<'a> {
         found.ok_or_else(|| self.fault(*line, column, cell, words.join(", ")))
     }
 
+    /// Whether an answer is correct.
+    fn truth(&self, row: &(u64, csv::StringRecord), at: usize) -> Result<bool, TableError> {
+        let cell = &row.1[at];
+        match cell.to_ascii_lowercase().as_str() {
+            "true" | "1" | "1.0" => Ok(true),
+            "false" | "0" | "0.0" => Ok(false),
+            _ => Err(self.fault(row.0, "correct", cell, "true, false, 1 or 0")),
+        }
+    }
+
     fn trials(&self, asked: Asked) -> Result<Vec<TrialCount>, TableError> {
         let participant = self.required("participant")?;
         let (condition, level) = (self.column("condition"), self.column("level"));
@@ -239,28 +282,43 @@ impl<'a> Rows<'a> {
         let answer = self.column("answer");
         let positive = self.column("positive");
         let trials = self.column("trials");
-        if positive.is_none() {
-            self.required("answer")?;
-        } else {
-            self.required("level")?;
+        // jsPsych calls the answer its response.
+        let answer = answer.or_else(|| self.column("response").filter(|_| target.is_some()));
+        let correct = self
+            .correct()
+            .filter(|_| answer.is_none() && positive.is_none());
+        match (positive, correct) {
+            (None, None) if answer.is_none() => {
+                self.required("answer")?;
+            }
+            (None, None) => {}
+            _ => {
+                self.required("level")?;
+            }
         }
         let words = asked.answers();
+        // Programs of experiments also have rows of instructions and pauses.
+        let is_trial = |row: &&(u64, csv::StringRecord)| {
+            correct
+                .is_none_or(|at| !row.1[at].is_empty() && !row.1[at].eq_ignore_ascii_case("none"))
+        };
         let one = |row: &(u64, csv::StringRecord)| {
             let count = match trials {
                 Some(at) => self.number(row, ("trials", at), (0.0, 1e5))?,
                 None => 1.0,
             };
-            let correct = match target {
+            let right = match target {
                 Some(at) => Some(self.word(row, ("target", at), words)?),
                 None => None,
             };
-            let positive = match (positive, answer) {
-                (Some(at), _) => self.number(row, ("positive", at), (0.0, count))?,
-                (None, Some(at)) => {
+            let positive = match (positive, answer, correct) {
+                (Some(at), _, _) => self.number(row, ("positive", at), (0.0, count))?,
+                (None, Some(at), _) => {
                     let given = self.word(row, ("answer", at), words)?;
-                    count * f64::from(u8::from(given == correct.unwrap_or(0)))
+                    count * f64::from(u8::from(given == right.unwrap_or(0)))
                 }
-                (None, None) => 0.0,
+                (None, None, Some(at)) => count * f64::from(u8::from(self.truth(row, at)?)),
+                (None, None, None) => 0.0,
             };
             let level = match level {
                 Some(at) if !row.1[at].is_empty() => {
@@ -272,12 +330,20 @@ impl<'a> Rows<'a> {
                 participant: row.1[participant].to_owned(),
                 condition: condition.map_or("all", |at| &row.1[at]).to_owned(),
                 level,
-                target: correct,
+                target: right,
                 positive,
                 trials: count,
             })
         };
-        self.records.iter().map(one).collect()
+        let found: Vec<TrialCount> = (self.records.iter().filter(is_trial))
+            .map(one)
+            .collect::<Result<_, _>>()?;
+        match found.is_empty() {
+            true => Err(TableError::Empty {
+                name: self.name.to_owned(),
+            }),
+            false => Ok(found),
+        }
     }
 
     fn pairs(&self) -> Result<Vec<Preference>, TableError> {

@@ -1,12 +1,13 @@
 //! Adaptive tracks: `track/…`.
 
 use crate::analyze::keys::{CellName, ParameterName};
-use crate::analyze::record::{List, Stat, statistics};
+use crate::analyze::record::{List, Number as _, Stat, statistics};
 use crate::analyze::warning::Warning;
 use std::collections::BTreeMap;
-use study_plan::procedure::{Rule, Scale, Staircase, Summary};
+use study_plan::procedure::{Reversal, Rule, Scale, Staircase, Summary};
 use study_plan::protocol::{Protocol, TrackRules};
 use study_session::outcome::fold::History;
+use study_stats::describe::{mean, sd};
 
 statistics! {
     /// A track of a participant.
@@ -29,7 +30,7 @@ statistics! {
         level: List,
         /// the trials of its reversals, from 1
         reversal_trial: List,
-        /// the levels of its reversals
+        /// the levels that were presented in them
         reversal_level: List,
         /// number of reversals
         n_reversals: Stat,
@@ -87,6 +88,8 @@ pub struct TrackData {
     pub participant: String,
     /// Track, as in the identifiers of its statistics.
     pub track: String,
+    /// Condition that it measures, as in the identifiers of its statistics.
+    pub condition: String,
     /// Its trials in order, easy ones included.
     pub trials: Vec<TrackTrial>,
     /// Which of the trials turned the direction, from 0.
@@ -115,7 +118,7 @@ pub(super) fn of_session(
     protocol: &Protocol,
     rules: &TrackRules,
     history: &History,
-    name: &CellName,
+    (name, condition): (&CellName, &str),
     warnings: &mut Vec<Warning>,
 ) -> Option<(TrackResult, TrackData)> {
     let recorded = history.recorded(rules);
@@ -175,10 +178,14 @@ pub(super) fn of_session(
     let data = TrackData {
         participant: participant.to_owned(),
         track: track.to_owned(),
+        condition: condition.to_owned(),
         reversals: (summary.reversals.iter())
             .filter_map(|r| ruled.get((r.trial as usize).checked_sub(1)?).copied())
             .collect(),
-        estimate: summary.estimate,
+        estimate: match &result.staircase {
+            Some(staircase) => staircase.estimate.number(),
+            None => summary.estimate,
+        },
         trials,
     };
     Some((result, data))
@@ -197,11 +204,32 @@ impl TrackResult {
     }
 }
 
+/// The levels that were presented in the trials of the reversals.
+fn presented(levels: &[f64], summary: &Summary) -> Vec<f64> {
+    let at = |r: &Reversal| levels.get((r.trial as usize).checked_sub(1)?).copied();
+    summary.reversals.iter().filter_map(at).collect()
+}
+
+/// Mean and standard deviation of the last reversals, of the levels that were presented: under log
+/// and dB the geometric mean, and the deviation of log10.
+fn of_reversals(rule: &Staircase, levels: &[f64], summary: &Summary) -> (Option<f64>, Option<f64>) {
+    let levels = presented(levels, summary);
+    let Some(from) = levels.len().checked_sub(rule.estimate_last as usize) else {
+        return (None, None);
+    };
+    let ratios = rule.scale != Scale::Lin;
+    let scaled = |level: &f64| if ratios { libm::log10(*level) } else { *level };
+    let last: Vec<f64> = levels[from..].iter().map(scaled).collect();
+    let mean = mean(&last).map(|m| if ratios { libm::pow(10.0, m) } else { m });
+    (mean, sd(&last))
+}
+
 /// A staircase: its levels as presented, and what they add up to.
 pub fn staircase(rule: &Staircase, levels: &[f64], summary: &Summary) -> TrackResult {
     let few = "there are too few reversals";
     let reversals = summary.reversals.iter();
-    let spread = || Some(Stat::or(summary.spread, few));
+    let (estimate, spread) = of_reversals(rule, levels, summary);
+    let spread = || Some(Stat::or(spread, few));
     let (estimate_spread, estimate_spread_log10) = match rule.scale {
         Scale::Lin => (spread(), None),
         Scale::Log | Scale::Db => (None, spread()),
@@ -209,10 +237,10 @@ pub fn staircase(rule: &Staircase, levels: &[f64], summary: &Summary) -> TrackRe
     let staircase = StaircaseResult {
         level: List::of(levels.to_vec()),
         reversal_trial: List::of(reversals.clone().map(|r| f64::from(r.trial)).collect()),
-        reversal_level: List::of(reversals.clone().map(|r| r.level).collect()),
+        reversal_level: List::of(presented(levels, summary)),
         n_reversals: Stat::count(reversals.len()),
         n_held: Stat::of(f64::from(summary.held)),
-        estimate: Stat::or(summary.estimate, few),
+        estimate: Stat::or(estimate, few),
         estimate_spread,
         estimate_spread_log10,
         target: rule.target().map(Stat::of),

@@ -175,6 +175,7 @@ fn track(method: Method, compared: Compared, rule: Rule, truth: Truth) -> TrackW
             catch: 0.0,
             easy: 0.0,
             fit: FitRules::default(),
+            measures: None,
         },
         ladder: ladder.unwrap(),
         settings: TrialSettings {

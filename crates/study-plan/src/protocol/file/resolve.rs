@@ -139,13 +139,49 @@ impl Raw {
         let families: Option<Vec<FamilyRules>> =
             self.families.iter().map(|f| f.family.clone()).collect();
         let known = families.as_deref();
-        let tracks = self.tracks.iter().map(|t| looked.track(t, known)).collect();
+        let tracks: Option<Vec<TrackRules>> =
+            self.tracks.iter().map(|t| looked.track(t, known)).collect();
+        self.conditions(tracks.as_deref().unwrap_or_default(), &looked);
         let parts = self.parts.iter().map(|p| self.part(p, known, &looked));
         let parts = parts.collect();
         Resolved {
             parts,
             families,
             tracks,
+        }
+    }
+
+    /// Reports tracks that cannot measure one condition.
+    fn conditions(&self, tracks: &[TrackRules], looked: &Looked<'_>) {
+        for (i, (track, raw)) in tracks.iter().zip(&self.tracks).enumerate() {
+            let Some(condition) = &track.measures else {
+                continue;
+            };
+            let fault = |what: String, hint: &str| {
+                looked.fault(&raw.path, "condition", Fault::error(what).hint(hint));
+            };
+            if track.family().is_none() {
+                let what = format!("the track `{}` compares two models", track.id);
+                fault(
+                    what,
+                    "leave `condition` out; more trials of one track say the same",
+                );
+            }
+            let others = tracks[..i].iter();
+            let mut alike = others.filter(|other| other.condition() == condition);
+            if let Some((other, what)) = alike.find_map(|o| Some((o, track.differs_in(o)?))) {
+                let what = format!(
+                    "the tracks `{}` and `{}` measure the condition `{condition}`, and differ in {what}",
+                    other.id, track.id
+                );
+                fault(what, "what differs is a condition of its own");
+            }
+            let named =
+                |other: &&TrackRules| other.id == *condition && other.condition() != condition;
+            if tracks.iter().any(|other| named(&other)) {
+                let what = format!("`{condition}` is a track of another condition");
+                fault(what, "choose another name");
+            }
         }
     }
 
@@ -440,6 +476,7 @@ impl Looked<'_> {
             catch,
             easy: raw.easy,
             fit: raw.fit,
+            measures: raw.measures.clone(),
         })
     }
 

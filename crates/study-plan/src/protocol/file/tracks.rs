@@ -39,6 +39,11 @@ pub(super) const TRACKS: &[Key] = keys! {
     /// The share of trials at the top of the ladder, which show lapses. They move no staircase;
     /// QUEST+ learns from them.
     "easy": SHARE, "0.1", default("0");
+    /// The condition that the track measures. Tracks with the same one are fitted, compared and
+    /// tested as one, such as two interleaved staircases from above and from below. They have
+    /// the same method, family, standard and fit. It can be changed while a study runs. Needs
+    /// the format `study-protocol/3`.
+    "condition": Kind::Id(Id::Part), r#""damping""#, derived("one of its own, with the `id` of the track");
     /// How its psychometric functions are fitted. It can be changed while a study runs.
     "fit": Kind::Table(FIT), "{ core = \"logistic\" }";
 };
@@ -211,6 +216,7 @@ pub(super) struct RawTrack {
     pub(super) catch: Option<f64>,
     pub(super) easy: f64,
     pub(super) fit: FitRules,
+    pub(super) measures: Option<PartId>,
 }
 
 /// A rule whose defaults depend on family and method.
@@ -295,6 +301,7 @@ pub(super) fn read(mut section: Section<'_, '_>) -> RawTrack {
         catch,
         easy,
         fit: fitted,
+        measures: section.part_id("condition"),
     }
 }
 

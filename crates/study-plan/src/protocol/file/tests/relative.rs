@@ -1,4 +1,4 @@
-//! Tracks that count their levels from the standard.
+//! Tracks that count their levels from the standard, and tracks of one condition.
 
 use super::parts::{PARTS, good};
 use crate::procedure::{Answer, Rule};
@@ -111,4 +111,64 @@ fn what_cannot_be_counted_is_a_fault() {
     // A start that is a level of the family, but no increment.
     let start = text(relative, relative).replace("start = 0.15", "start = 0.45");
     assert_eq!(messages(&start).len(), 1);
+}
+
+/// Two tracks with these keys on the same standard.
+fn of_one_standard(of_first: &str, of_second: &str) -> String {
+    (PARTS.replace("study-protocol/2", "study-protocol/3"))
+        .replace(
+            "max_trials = 80 } }",
+            &format!("max_trials = 80 }} }}\n{of_first}"),
+        )
+        .replace("trials = 40 }", &format!("trials = 40 }}\n{of_second}"))
+}
+
+#[test]
+fn tracks_measure_one_condition_if_they_are_alike() {
+    let condition = "condition = \"damping\"";
+    let p = good(&of_one_standard(condition, condition));
+    let names = |p: &Protocol| -> Vec<String> {
+        let all = p.conditions(&p.parts[2]);
+        all.iter()
+            .map(|own| format!("{} {}", own[0].condition(), own.len()))
+            .collect()
+    };
+    assert_eq!(names(&p), ["damping 2"]);
+    assert_eq!(names(&good(&of_one_standard("", ""))), ["up 1", "quest 1"]);
+    // It can be changed while a study runs.
+    let print = |p: &Protocol| {
+        crate::protocol::fingerprint::parts(p, &Default::default(), None).fingerprints()
+    };
+    let (one, two) = (print(&p), print(&good(&of_one_standard("", ""))));
+    assert_eq!(one.stimulus, two.stimulus);
+    assert_ne!(one.analysis, two.analysis);
+    let messages = |text: &str| -> Vec<String> {
+        let faults = parse("protocol.toml", text).findings.faults;
+        faults.into_iter().map(|f| f.message).collect()
+    };
+    for (first, second, says) in [
+        (
+            condition.to_owned(),
+            format!("{condition}\nfit = {{ lapse = 0.05 }}"),
+            "the tracks `up` and `quest` measure the condition `damping`, and differ in fit",
+        ),
+        (String::new(), "condition = \"up\"".to_owned(), ""),
+        (
+            condition.to_owned(),
+            "condition = \"up\"".to_owned(),
+            "`up` is a track of another condition",
+        ),
+    ] {
+        let found = messages(&of_one_standard(&first, &second));
+        let expected: Vec<&str> = if says.is_empty() { vec![] } else { vec![says] };
+        assert_eq!(found, expected);
+    }
+    let other =
+        of_one_standard(condition, condition).replacen("standard = 1.0", "standard = 1.1", 1);
+    assert_eq!(
+        messages(&other),
+        [
+            "the tracks `up` and `quest` measure the condition `damping`, and differ in family or standard"
+        ]
+    );
 }
