@@ -160,6 +160,8 @@ fn preregistered_rules_and_their_changes_are_reported() {
         deviations: vec![Deviation {
             text: "protocol 2 of 2026-01-02, because \"typo\": vaf: a → b".to_owned(),
             affects: &[],
+            track: None,
+            registered: true,
         }],
         ..Rules::default()
     };
@@ -214,6 +216,8 @@ fn hostile_names_and_comments_stay_text() {
     a.deviations.push(Deviation {
         text: EVIL.to_owned(),
         affects: &[],
+        track: None,
+        registered: true,
     });
     let figures = figures::all(&a, &[trace]);
     assert!(figures.iter().any(|f| f.name == "telemetry"));
@@ -298,10 +302,14 @@ fn rules_changed_after_the_study_began_are_not_called_preregistered() {
             Deviation {
                 text: format!("{because}exclusion rules: none → constant-rater"),
                 affects: &[PreregisteredRule::Exclusions],
+                track: None,
+                registered: true,
             },
             Deviation {
                 text: format!("{because}realistic_from: 5 → 4"),
                 affects: &[PreregisteredRule::RealisticFrom],
+                track: None,
+                registered: true,
             },
         ],
         ..Rules::default()

@@ -219,6 +219,7 @@ impl Study {
             intervals: &self.derived.intervals,
             participants: &self.derived.participants,
             sessions: &sessions,
+            pools: true,
         };
         parts(&data, include)
     }

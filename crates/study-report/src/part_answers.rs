@@ -139,17 +139,27 @@ fn retest(part: &PartAnalysis) -> Option<String> {
     ))
 }
 
-/// The thresholds of each condition.
+/// The thresholds of each condition; those that are learned together stand beside the means.
 fn thresholds(part: &PartAnalysis) -> Vec<String> {
-    let all = part.results.over.psy_group.iter();
+    let over = &part.results.over;
+    let pooled = |condition: &str| {
+        let found = over.psy_population.as_ref()?.threshold.get(condition)?;
+        Some(format!(
+            "; learned from all participants together, that of the population was {}{}",
+            apa::plain(found.median.number()?),
+            ci(found.ci95.ends(), apa::plain)
+        ))
+    };
+    let all = over.psy_group.iter();
     all.filter_map(|(condition, found)| {
         let found = &found.posterior_threshold;
         Some(format!(
-            "{}: the geometric mean of the thresholds was {}{} (n = {}).",
+            "{}: the geometric mean of the thresholds was {}{} (n = {}{}).",
             condition.as_str(),
             apa::plain(found.geometric_mean.number()?),
             ci(found.ci95.ends(), apa::plain),
-            found.n.number()?
+            found.n.number()?,
+            pooled(condition.as_str()).unwrap_or_default(),
         ))
     })
     .collect()
@@ -267,6 +277,15 @@ pub(super) fn methods(part: &PartAnalysis) -> String {
              (Schütt et al., 2016), at half the height between guesses and lapses.",
             shapes(part)
         ));
+    }
+    if let Some(model) = &over.psy_population {
+        text.push(match model.has_converged() {
+            true => "Beside them stand posterior medians of a hierarchical model: participants' thresholds and widths as \
+                     draws, lapses shared, their functions integrated out by quadrature and the population's parameters \
+                     drawn by importance sampling. No test rests on it."
+                .to_owned(),
+            false => "A hierarchical model of all participants did not converge, and was not used.".to_owned(),
+        });
     }
     if let Some((_, how)) = questionnaire(part) {
         text.push(how.to_owned());

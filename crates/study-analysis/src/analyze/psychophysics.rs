@@ -13,6 +13,7 @@ mod fits;
 mod of_scales;
 mod over_participants;
 mod part_data;
+mod population;
 mod preferences;
 mod questionnaires;
 pub mod results;

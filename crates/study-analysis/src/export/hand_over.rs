@@ -163,6 +163,7 @@ fn parts_of(job: &Job<'_>, analysis: Option<&Analysis>) -> Vec<PartAnalysis> {
         participants: &job.selected.participants,
         // Only the course of tracks follows from them.
         sessions: &[],
+        pools: false,
     };
     let include = Include {
         pilot: true,

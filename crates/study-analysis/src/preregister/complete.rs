@@ -125,6 +125,7 @@ pub fn complete_parts(protocol: &Protocol, participants: u32) -> Vec<PartAnalysi
         intervals: &made.intervals,
         participants: &[],
         sessions: &[],
+        pools: false,
     };
     let mut found = parts(&study, Include::default());
     found.retain(|own| protocol.part(&own.part).is_some());

@@ -1,14 +1,16 @@
 //! The tables of thresholds, sensitivities and preferences: the same on the terminal, in
 //! the report and as CSV.
 
+mod population;
 mod scales;
 
 use crate::apa::{self, bare_p, interval_or_dash, listing, name, or_dash, plain, two};
-use crate::table::{Builder, Head, Table, page};
+use crate::table::{Builder, Head, Table, file, page};
 use scales::{items, magnitudes, ratings, scores};
 use std::collections::BTreeMap;
 use study_analysis::analyze::psychophysics::results::{
-    Ability, CellName, ConditionModel, Contrast, Function, PartResults, Sensitivity,
+    Ability, CellName, ConditionModel, Contrast, Function, PartResults, PopulationModel,
+    Sensitivity,
 };
 use study_analysis::analyze::results::{Number as _, PairName, RealizationName};
 use study_base::text::Untrusted;
@@ -17,8 +19,10 @@ use study_base::text::Untrusted;
 type Kind = (&'static str, fn(&PartResults) -> Table);
 
 /// All tables, in the order of a page; those without rows and notes are left out of it.
-pub(crate) const KINDS: [Kind; 14] = [
+pub(crate) const KINDS: [Kind; 16] = [
     ("part_thresholds.csv", thresholds),
+    ("part_population.csv", population::population),
+    ("part_population_contrasts.csv", population::contrasts),
     ("part_conditions.csv", conditions),
     ("part_contrasts.csv", contrasts),
     ("part_comparisons.csv", comparisons),
@@ -69,7 +73,11 @@ fn thresholds(results: &PartResults) -> Table {
         let staircase = results.track.get(cell)?.staircase.as_ref()?;
         staircase.estimate.number()
     };
+    let model = results.over.psy_population.as_ref();
+    let pooled = |cell: &CellName| model?.participant.get(cell);
+    let is_pooled = model.is_some_and(PopulationModel::has_converged);
     let interval = |head: &str| page("95 %").file(head);
+    let adaptive = results.track.values().any(|t| t.quest_plus.is_some());
     // Of tracks that count their levels from a standard.
     let above = results.psy.values().any(|f| f.above_standard.is_some());
     let table = of_cells::<Function>("Thresholds", results.psy.iter())
@@ -83,24 +91,42 @@ fn thresholds(results: &PartResults) -> Table {
         .ends(interval("threshold_ci95"), plain, &|c| {
             c.1.posterior.threshold.ci95.as_ref()?.ends()
         })
-        .number(column("ΔI", "increment").when(above), plain, &|c| {
+        .number(file("increment").when(above), plain, &|c| {
             c.1.above_standard.as_ref()?.increment.number()
         })
-        .ends(interval("increment_ci95").when(above), plain, &|c| {
+        .ends(file("increment_ci95").when(above), plain, &|c| {
             c.1.above_standard.as_ref()?.increment_ci95.ends()
         })
         .number(
-            column("Weber fraction", "weber_fraction").when(above),
+            column("ΔI/I", "weber_fraction").droppable(3).when(above),
             plain,
             &|c| c.1.above_standard.as_ref()?.weber_fraction.number(),
         )
-        .ends(interval("weber_fraction_ci95").when(above), plain, &|c| {
-            c.1.above_standard
-                .as_ref()?
-                .weber_fraction_ci95
-                .as_ref()?
-                .ends()
-        })
+        .ends(
+            interval("weber_fraction_ci95").droppable(3).when(above),
+            plain,
+            &|c| {
+                c.1.above_standard
+                    .as_ref()?
+                    .weber_fraction_ci95
+                    .as_ref()?
+                    .ends()
+            },
+        )
+        .number(
+            column("pooled", "pooled_threshold")
+                .droppable(2)
+                .when(is_pooled),
+            plain,
+            &|c| pooled(c.0)?.median.number(),
+        )
+        .ends(
+            interval("pooled_threshold_ci95")
+                .droppable(2)
+                .when(is_pooled),
+            plain,
+            &|c| pooled(c.0)?.ci95.ends(),
+        )
         .field(column("width", "width"), plain, |c| {
             &c.1.posterior.width.mean
         })
@@ -108,6 +134,13 @@ fn thresholds(results: &PartResults) -> Table {
             c.1.posterior.width.ci95.as_ref()?.ends()
         })
         .field(column("ML", "ml_threshold"), plain, |c| &c.1.ml.threshold)
+        .field(file("map_threshold"), plain, |c| &c.1.map.threshold)
+        .number(file("quest_plus_threshold").when(adaptive), plain, &|c| {
+            let posterior = &results.track.get(c.0)?.quest_plus.as_ref()?.posterior;
+            // The name of the parameter follows from the function.
+            let location = posterior.get("threshold").or(posterior.get("mean"))?;
+            location.mean.number()
+        })
         .number(
             column("reversals", "reversal_mean").when(staircases),
             plain,
@@ -121,7 +154,14 @@ fn thresholds(results: &PartResults) -> Table {
     let mut notes = vec![threshold_note(logarithms, staircases)];
     if above {
         notes.push(
-            "ΔI: the distance of the threshold from the standard; Weber fraction: ΔI divided by the standard."
+            "ΔI/I: the Weber fraction, the distance of the threshold from the standard divided by it."
+                .to_owned(),
+        );
+    }
+    if is_pooled {
+        notes.push(
+            "Pooled: the median in the model of all participants, which draws thresholds of few trials towards \
+             those of the others."
                 .to_owned(),
         );
     }

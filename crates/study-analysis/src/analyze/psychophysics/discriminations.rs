@@ -4,6 +4,7 @@ use super::again::again;
 use super::detection::Sensitivity;
 use super::over_participants::{Measured, Threshold, Told, mixed, sensitivities};
 use super::part_data::{Found, LevelData, PartData, StudyData, chosen, groups, sessions_of};
+use super::population::{ConditionFit, PopulationCell, population};
 use super::results::PartResults;
 use super::standards::{AboveStandard, webers_law};
 use super::tracks::of_session;
@@ -35,6 +36,7 @@ pub(super) fn of_tracks(
     let (mut told, mut thresholds, mut measured) = (Vec::new(), Vec::new(), Vec::new());
     let (mut warnings, mut data) = (Vec::new(), PartData::default());
     let mut names = Vec::new();
+    let (mut together, mut settings_of) = (Vec::new(), BTreeMap::new());
     let groups = groups(rows);
     let sessions = sessions_of(protocol, part);
     let apart = have_different_standards(tracks);
@@ -99,12 +101,27 @@ pub(super) fn of_tracks(
                     above_chance,
                 });
             }
-            data.levels.extend(levels(
+            let own = levels(
                 asked,
                 (participant, condition),
                 &counts,
                 protocol.fit(rules),
-            ));
+            );
+            if let (Some(own), Some((experiment, _))) = (&own, asked.experiment()) {
+                together.push(PopulationCell {
+                    name: cell,
+                    levels: own.levels.clone(),
+                });
+                let settings = settings(protocol, rules);
+                let fit = ConditionFit {
+                    core: settings.core,
+                    spacing: settings.spacing,
+                    experiment,
+                    priors: settings.priors,
+                };
+                settings_of.insert(condition.clone(), fit);
+            }
+            data.levels.extend(own);
         }
         results.psy.extend(found.psy);
         results.pooled.extend(found.pooled);
@@ -131,9 +148,9 @@ pub(super) fn of_tracks(
         }
     }
     results.over.sdt_group = sensitivities(&told);
-    let of_increment =
-        |(who, standard, increment): &(String, f64, f64)| (who.as_str(), *standard, *increment);
-    let increments: Vec<_> = increments.iter().map(of_increment).collect();
+    let increments: Vec<(&str, f64, f64)> = (increments.iter())
+        .map(|(who, standard, increment)| (who.as_str(), *standard, *increment))
+        .collect();
     results.over.webers_law = webers_law(&increments);
     if apart && !thresholds.is_empty() {
         warnings.push(Warning {
@@ -149,6 +166,20 @@ pub(super) fn of_tracks(
     let ratios = !thresholds.is_empty() && have_ratios(protocol, tracks);
     if !thresholds.is_empty() {
         results.over.psy_mixed = mixed(&over_sessions(&measured, ratios), ratios);
+    }
+    // Participants of different groups are no draws from one population.
+    if study.pools && protocol.groups.is_none() {
+        let seed = protocol.study.seed;
+        results.over.psy_population = population(&together, &settings_of, seed, part.id.as_str());
+        if let Some(model) = &results.over.psy_population
+            && !model.has_converged()
+        {
+            let why = model.sd_participant.median.reason().unwrap_or_default();
+            warnings.push(Warning {
+                code: "not-pooled",
+                text: format!("thresholds were not learned together: {why}"),
+            });
+        }
     }
     let ids: Vec<&str> = sessions.iter().flatten().map(|s| s.as_str()).collect();
     results.over.again = again(&measured, &ids, ratios);
@@ -417,6 +448,66 @@ tracks = ["low", "middle", "high"]
         assert!(part.results.over.webers_law.is_none());
     }
 
+    /// A study of one track over a ladder with this scale, from `low` to 2, above this standard.
+    fn study(scale: &str, low: f64, standard: f64) -> Protocol {
+        let text = format!(
+            r#"
+format = "study-protocol/2"
+study = {{ id = "example", title = "An example", seed = 1 }}
+design = {{ participants = 10 }}
+device = {{ kind = "simulated", limits = {{ force_n = 12.0, velocity_mm_s = 1000.0 }} }}
+analysis = {{ primary = "more" }}
+
+[[families]]
+id = "friction"
+from = "static.toml"
+vary = "friction"
+range = [{low}, 2.0]
+steps = 20
+scale = "{scale}"
+
+[[parts]]
+id = "more"
+kind = "discrimination"
+text = "Two switches."
+prompt = "Which one had more friction?"
+tracks = ["only"]
+
+[[tracks]]
+id = "only"
+method = "2ifc"
+family = "friction"
+standard = {standard:?}
+procedure = {{ rule = "staircase", up = 1, down = 3, start = 1.0, scale = "lin", steps = [0.1], stop = {{ reversals = 8, max_trials = 60 }}, estimate_last = 6 }}
+"#
+        );
+        let parsed = study_plan::protocol::file::parse("protocol.toml", &text);
+        let shown = parsed.findings.render(false);
+        parsed.protocol.unwrap_or_else(|| panic!("{shown}"))
+    }
+
+    /// The prior of a width follows from the scale of the ladder and from the standard.
+    #[test]
+    fn a_track_has_the_prior_of_its_ladder() {
+        let of = |scale: &str, low: f64, standard: f64| {
+            let protocol = study(scale, low, standard);
+            let track = protocol
+                .track(&PartId::new("only").unwrap())
+                .unwrap()
+                .clone();
+            settings(&protocol, &track).priors
+        };
+        assert_eq!(of("log", 0.1, 0.0).width, WidthPrior::OfRatios);
+        assert_eq!(of("lin", 0.1, 0.0).width, WidthPrior::FromOrigin(0.0));
+        assert_eq!(of("lin", 0.3, 0.3).width, WidthPrior::FromOrigin(0.3));
+        // A standard within the ladder is no origin: there are thresholds on both sides.
+        assert_eq!(of("lin", 0.1, 0.5).width, WidthPrior::Even);
+        let support = of("log", 0.1, 0.0).support.unwrap();
+        assert!((support.low - 0.1f64.ln()).abs() < 1e-12);
+        assert!((support.high - 2f64.ln()).abs() < 1e-12);
+        assert_eq!(of("lin", 0.1, 0.0).lapse, 30.0);
+    }
+
     /// Tracks are compared, not tracks in a session.
     #[test]
     fn a_threshold_of_several_sessions_is_one_for_each_track() {
@@ -465,6 +556,28 @@ tracks = ["low", "middle", "high"]
                 (found - above).abs() < 1e-12 && d == 0.7,
                 "{method:?}: {found}"
             );
+        }
+    }
+
+    /// Where d′ is never below 0, answers below chance are: nobody tells the two apart who is
+    /// wrong more often than somebody who guesses.
+    #[test]
+    fn answers_below_chance_are_below_0() {
+        let below = |share: f64| Sensitivity {
+            d: Some(Stat::of(0.7)),
+            d_differencing: Some(Stat::of(0.7)),
+            share_correct: Some(Stat::of(share)),
+            share_unbiased: Some(Stat::of(share)),
+            ..Sensitivity::undefined("")
+        };
+        for (asked, method) in [
+            (Asked::ThreeIntervals, Method::ThreeIntervals),
+            (Asked::OddOneOut, Method::OddOneOut),
+            (Asked::Abx, Method::Abx),
+            (Asked::SameDifferent, Method::SameDifferent),
+        ] {
+            let (_, found) = sensitivity(asked, method, Some(&below(0.2))).unwrap();
+            assert!(found < -0.1, "{method:?}: {found}");
         }
     }
 

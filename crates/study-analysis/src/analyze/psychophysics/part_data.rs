@@ -30,6 +30,9 @@ pub struct StudyData<'a> {
     pub participants: &'a [ParticipantRow],
     /// Its sessions, of which the tracks are replayed.
     pub sessions: &'a [&'a History],
+    /// Whether thresholds of participants are also learned together, which takes seconds and
+    /// decides nothing.
+    pub pools: bool,
 }
 
 /// The analysis of one part of a study.

@@ -9,6 +9,7 @@ pub use super::fits::{
 pub use super::over_participants::{
     AboveChance, Center, ConditionModel, Contrast, FTest, GroupSensitivity, Sample,
 };
+pub use super::population::{Convergence, Pooled, PooledContrast, PopulationModel};
 pub use super::preferences::{Ability, AbilityDifference, OrderEffect, Preferences, Ties, Triads};
 pub use super::scales::{
     GeometricMean, Magnitudes, MeanExponent, Mushra, OwnExponent, PowerLaw, Rated, Screened,
@@ -61,6 +62,8 @@ statistics! {
         psy_mixed: Option<ConditionModel>,
         /// Weber's law, of tracks that count levels from several standards
         webers_law: Option<WebersLaw>,
+        /// thresholds learned together, of tracks of several participants
+        psy_population: Option<PopulationModel>,
         /// sensitivities of a condition
         sdt_group: BTreeMap<ConditionName, GroupSensitivity>,
         /// estimated magnitudes
