@@ -56,7 +56,7 @@ pub(super) fn of_tracks(
         let own = rows.iter().filter(|row| {
             let in_session = session.is_none() || row.session_id.as_ref() == session;
             let in_track = |track: &&TrackRules| row.track.as_ref() == Some(&track.id);
-            in_session && own_tracks.iter().any(|t| in_track(&t))
+            in_session && own_tracks.iter().any(in_track)
         });
         let counts: Vec<TrialCount> = own
             .filter_map(|row| trial(part, asked, row, condition))

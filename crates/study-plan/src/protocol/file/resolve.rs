@@ -488,6 +488,10 @@ impl Looked<'_> {
         family: &FamilyRules,
         path: &str,
     ) -> Option<Ladder> {
+        // that it has to be above 0 is said where it is read
+        if relative == Relative::Fraction && standard <= 0.0 {
+            return None;
+        }
         let found = relative_ladder(relative, standard, &family.ladder);
         if found.is_none() {
             let (id, last) = (&family.id, family.ladder.last());
