@@ -10,6 +10,7 @@ mod discriminations;
 mod excluded;
 mod findings;
 mod fits;
+mod marginal;
 mod of_scales;
 mod over_participants;
 mod part_data;

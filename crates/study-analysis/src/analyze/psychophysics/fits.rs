@@ -1,5 +1,6 @@
 //! Psychometric functions of participants and conditions: `psy/…`, `psy_group/…`.
 
+use super::marginal::Marginal;
 use super::over_participants::NOT_POSITIVE;
 use super::standards::AboveStandard;
 use crate::analyze::draws::Draws;
@@ -94,16 +95,6 @@ statistics! {
         eta: Stat,
         /// logarithm of the density, without binomial coefficients and constants of the priors
         log_posterior_kernel: Stat,
-    }
-
-    /// A parameter in the posterior.
-    pub struct Marginal {
-        /// its mean
-        mean: Stat,
-        /// its median, the same over levels and logarithms
-        median: Option<Stat>,
-        /// equal-tailed
-        ci95: Option<Interval>,
     }
 
     /// The posterior.
@@ -435,16 +426,9 @@ fn mode(levels: &[Level], settings: &FitSettings) -> Mode {
 fn bayesian(levels: &[Level], settings: &FitSettings) -> Posterior {
     let posterior = posterior(settings.core, levels, settings.experiment, &settings.priors);
     let found = posterior.as_ref().ok();
-    let mean = |mean: Option<f64>| Marginal {
-        mean: Stat::or(mean, reason(&posterior)),
-        median: None,
-        ci95: None,
-    };
-    let with_interval = |of: Option<study_stats::psychometric::Interval>| Marginal {
-        median: Some(Stat::or(of.map(|i| i.median), reason(&posterior))),
-        ci95: Some(Interval::or(of.map(|i| i.ci95), reason(&posterior))),
-        ..mean(of.map(|i| i.mean))
-    };
+    let why = reason(&posterior).into();
+    let mean = |mean: Option<f64>| Marginal::of_mean(mean, &why);
+    let with_interval = |of: Option<study_stats::psychometric::Interval>| Marginal::of(of, &why);
     let is_yes_no = settings.experiment == Experiment::YesNo;
     Posterior {
         threshold: with_interval(found.map(|p| p.threshold_level(settings.spacing))),

@@ -3,9 +3,10 @@
 pub use super::again::{Again, Groups, Profiles, Retest};
 pub use super::detection::Sensitivity;
 pub use super::fits::{
-    Fitted, FreeLapse, Function, Functions, GroupThresholds, Marginal, MaximumLikelihood, Mode,
+    Fitted, FreeLapse, Function, Functions, GroupThresholds, MaximumLikelihood, Mode,
     PooledFunction, Posterior, ThresholdSummary, WithStandard,
 };
+pub use super::marginal::Marginal;
 pub use super::over_participants::{
     AboveChance, Center, ConditionModel, Contrast, FTest, GroupSensitivity, Sample,
 };

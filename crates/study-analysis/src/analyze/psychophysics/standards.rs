@@ -1,6 +1,6 @@
 //! Thresholds above a standard: increments, Weber fractions, Weber's law.
 
-use super::fits::Marginal;
+use super::marginal::Marginal;
 use crate::analyze::record::{Interval, Number as _, Stat, statistics};
 use study_plan::protocol::TrackRules;
 use study_stats::describe::mean;
