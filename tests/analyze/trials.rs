@@ -153,6 +153,25 @@ fn tables_of_psychopy_and_jspsych_are_read() {
     let answered = table.replace("response", "answer");
     let found = [table, &answered].map(|t| values(&mut analyze(folder.path(), t, &args)));
     assert_eq!(found[0], found[1]);
+    // Whoever is right in a catch trial has said no: the target tells what was answered.
+    let mut by_answer = "participant,level,target,answer\n".to_owned();
+    let mut by_correct = "participant,level,target,correct,response\n".to_owned();
+    for (level, target, yes) in [
+        ("1", "yes", 3),
+        ("2", "yes", 7),
+        ("4", "yes", 9),
+        ("", "no", 2),
+    ] {
+        for trial in 0..10 {
+            let said = if trial < yes { "yes" } else { "no" };
+            let right = said == target;
+            writeln!(by_answer, "P1,{level},{target},{said}").unwrap();
+            writeln!(by_correct, "P1,{level},{target},{right},f").unwrap();
+        }
+    }
+    let args = ["--task", "yes-no", "--json"];
+    let found = [by_answer, by_correct].map(|t| values(&mut analyze(folder.path(), &t, &args)));
+    assert_eq!(found[0], found[1]);
 }
 
 #[test]
@@ -446,6 +465,16 @@ fn a_bad_table_is_refused_with_line_and_column() {
             "participant,level,correct\nP1,1,yes\n",
             "2ifc",
             "t.csv:2: correct is `yes`, expected true, false, 1 or 0",
+        ),
+        (
+            "participant,level,correct\nP1,1,1\n",
+            "yes-no",
+            "there is no column `target`",
+        ),
+        (
+            "participant,level,correct\nP1,1,1\n",
+            "comparison",
+            "there is no column `target`",
         ),
         (
             "participant,level\nP1,1\n",

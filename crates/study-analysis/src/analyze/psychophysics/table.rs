@@ -282,16 +282,26 @@ impl<'a> Rows<'a> {
         let answer = self.column("answer");
         let positive = self.column("positive");
         let trials = self.column("trials");
-        // jsPsych calls the answer its response.
-        let answer = answer.or_else(|| self.column("response").filter(|_| target.is_some()));
+        // jsPsych calls the answer its response; beside `correct` it is a key.
+        let says = target.is_some() && self.correct().is_none();
+        let answer = answer.or_else(|| self.column("response").filter(|_| says));
         let correct = self
             .correct()
             .filter(|_| answer.is_none() && positive.is_none());
+        // Whoever is right has said "no" in a catch trial, and "smaller" below the standard.
+        let by_target = matches!(
+            asked,
+            Asked::YesNo | Asked::Comparison | Asked::SameDifferent
+        );
         match (positive, correct) {
             (None, None) if answer.is_none() => {
                 self.required("answer")?;
             }
             (None, None) => {}
+            (None, Some(_)) if by_target => {
+                self.required("level")?;
+                self.required("target")?;
+            }
             _ => {
                 self.required("level")?;
             }
