@@ -67,6 +67,8 @@ pub(crate) struct Head {
     pub(crate) left: bool,
     /// The rank of the column among those that a narrow terminal leaves out.
     pub(crate) rank: Option<u8>,
+    /// What the column is, as a sentence below the table; it goes where the column goes.
+    note: Option<String>,
 }
 
 /// A column of terminal and report.
@@ -123,7 +125,14 @@ impl Head {
         self
     }
 
-    /// Left out where the terminal is narrow; of several columns, the lowest rank first.
+    /// With a sentence below the table that says what the column is.
+    pub(crate) fn explained(mut self, note: String) -> Self {
+        self.note = Some(note);
+        self
+    }
+
+    /// Left out where the terminal is narrow; of several columns, the lowest rank first, and all
+    /// of a rank together.
     pub(crate) fn droppable(mut self, rank: u8) -> Self {
         self.rank = Some(rank);
         self
@@ -159,8 +168,8 @@ pub(crate) struct Table {
     columns: Vec<Column>,
     /// Whether each row is apart from the others: in italics below them on a page.
     apart: Vec<bool>,
-    /// Sentences below it.
-    pub(crate) notes: Vec<String>,
+    /// Sentences below it, after those of its columns.
+    notes: Vec<String>,
 }
 
 impl Table {
@@ -172,6 +181,23 @@ impl Table {
     pub(crate) fn with_notes(mut self, notes: impl IntoIterator<Item = String>) -> Self {
         self.notes.extend(notes);
         self
+    }
+
+    /// The sentences below it, where only these columns are shown.
+    pub(crate) fn notes_with<'a>(&'a self, shown: &[&'a Column]) -> Vec<&'a str> {
+        let of_columns = shown.iter().filter_map(|c| c.head.note.as_deref());
+        let own = self.notes.iter().map(String::as_str);
+        of_columns.filter(|_| !self.is_empty()).chain(own).collect()
+    }
+
+    /// The sentences below it in a medium.
+    pub(crate) fn notes(&self, medium: Medium) -> Vec<&str> {
+        self.notes_with(&self.columns(medium))
+    }
+
+    /// Whether there is nothing to show.
+    pub(crate) fn is_blank(&self) -> bool {
+        self.is_empty() && self.notes.is_empty()
     }
 
     /// Number of rows.

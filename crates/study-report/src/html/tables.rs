@@ -14,7 +14,7 @@ const MAX_WHOLE: usize = 10;
 pub(super) fn table(t: &Table) -> Markup {
     html! {
         @if !t.is_empty() { (grid(t, true)) }
-        @for note in &t.notes { p.note { (typeset(note)) } }
+        @for note in t.notes(Medium::Report) { p.note { (typeset(note)) } }
     }
 }
 

@@ -41,9 +41,7 @@ pub(crate) const KINDS: [Kind; 16] = [
 /// All tables of these statistics; those without rows are left out.
 pub(crate) fn tables(results: &PartResults) -> Vec<Table> {
     let tables = KINDS.iter().map(|(_, table)| table(results));
-    tables
-        .filter(|t| !t.is_empty() || !t.notes.is_empty())
-        .collect()
+    tables.filter(|t| !t.is_blank()).collect()
 }
 
 /// A column of pages, with its name in the file.
@@ -65,14 +63,19 @@ fn of_cells<'a, R>(
         })
 }
 
+const WEBER_FRACTION: &str =
+    "ΔI/I: the Weber fraction, the distance of the threshold from the standard divided by it.";
+const POOLED: &str = "Pooled: the median in the model of all participants, which draws thresholds of few trials towards those of \
+                      the others.";
+
 /// Each participant and condition.
 fn thresholds(results: &PartResults) -> Table {
-    // Only staircases have reversals.
-    let staircases = results.track.values().any(|t| t.staircase.is_some());
     let reversals = |cell: &CellName| {
         let staircase = results.track.get(cell)?.staircase.as_ref()?;
         staircase.estimate.number()
     };
+    // Only staircases have them; those of several tracks of a condition are in their figures.
+    let staircases = results.psy.keys().any(|cell| reversals(cell).is_some());
     let model = results.over.psy_population.as_ref();
     let pooled = |cell: &CellName| model?.participant.get(cell);
     let is_pooled = model.is_some_and(PopulationModel::has_converged);
@@ -80,14 +83,19 @@ fn thresholds(results: &PartResults) -> Table {
     let adaptive = results.track.values().any(|t| t.quest_plus.is_some());
     // Of tracks that count their levels from a standard.
     let above = results.psy.values().any(|f| f.above_standard.is_some());
+    let logarithms = results.psy.values().any(|f| f.trials.log_scale.is_some());
     let table = of_cells::<Function>("Thresholds", results.psy.iter())
         .field(column("trials", "n_trials"), count, |c| {
             &c.1.trials.n_trials
         })
-        .field(column("threshold", "threshold"), plain, |c| {
-            let threshold = &c.1.posterior.threshold;
-            threshold.median.as_ref().unwrap_or(&threshold.mean)
-        })
+        .field(
+            column("threshold", "threshold").explained(threshold_note(logarithms, staircases)),
+            plain,
+            |c| {
+                let threshold = &c.1.posterior.threshold;
+                threshold.median.as_ref().unwrap_or(&threshold.mean)
+            },
+        )
         .ends(interval("threshold_ci95"), plain, &|c| {
             c.1.posterior.threshold.ci95.as_ref()?.ends()
         })
@@ -98,7 +106,10 @@ fn thresholds(results: &PartResults) -> Table {
             c.1.above_standard.as_ref()?.increment_ci95.ends()
         })
         .number(
-            column("ΔI/I", "weber_fraction").droppable(3).when(above),
+            column("ΔI/I", "weber_fraction")
+                .explained(WEBER_FRACTION.to_owned())
+                .droppable(3)
+                .when(above),
             plain,
             &|c| c.1.above_standard.as_ref()?.weber_fraction.number(),
         )
@@ -115,6 +126,7 @@ fn thresholds(results: &PartResults) -> Table {
         )
         .number(
             column("pooled", "pooled_threshold")
+                .explained(POOLED.to_owned())
                 .droppable(2)
                 .when(is_pooled),
             plain,
@@ -150,21 +162,7 @@ fn thresholds(results: &PartResults) -> Table {
     if table.is_empty() {
         return table;
     }
-    let logarithms = results.psy.values().any(|f| f.trials.log_scale.is_some());
-    let mut notes = vec![threshold_note(logarithms, staircases)];
-    if above {
-        notes.push(
-            "ΔI/I: the Weber fraction, the distance of the threshold from the standard divided by it."
-                .to_owned(),
-        );
-    }
-    if is_pooled {
-        notes.push(
-            "Pooled: the median in the model of all participants, which draws thresholds of few trials towards \
-             those of the others."
-                .to_owned(),
-        );
-    }
+    let mut notes = Vec::new();
     let mut reasons: BTreeMap<&str, Vec<String>> = BTreeMap::new();
     for (cell, function) in &results.psy {
         if let Some(why) = function.ml.threshold.reason() {

@@ -1,7 +1,7 @@
 //! Columns, wrapping and color of the terminal page, by display width.
 
 use crate::table::{Medium, Table};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use study_base::text::{cut_end, cut_middle};
 use unicode_segmentation::UnicodeSegmentation as _;
 use unicode_width::UnicodeWidthStr as _;
@@ -104,8 +104,8 @@ pub(super) struct Grid {
     rows: Vec<Vec<String>>,
     /// A left-aligned column besides the first and the last.
     left: Option<usize>,
-    /// Columns to drop, in this order.
-    dropped: Vec<usize>,
+    /// Columns to drop, in this order; those of a group together.
+    dropped: Vec<Vec<usize>>,
 }
 
 /// Smallest width of the first column.
@@ -116,10 +116,13 @@ impl Grid {
     pub(super) fn of(table: &Table, left: Option<usize>) -> Self {
         let columns = table.columns(Medium::Terminal);
         let aligned = columns.iter().position(|c| c.head.left);
-        let mut dropped: Vec<usize> = (0..columns.len())
-            .filter(|i| columns[*i].head.rank.is_some())
-            .collect();
-        dropped.sort_by_key(|i| columns[*i].head.rank);
+        let mut dropped: BTreeMap<u8, Vec<usize>> = BTreeMap::new();
+        for (i, column) in columns.iter().enumerate() {
+            if let Some(rank) = column.head.rank {
+                dropped.entry(rank).or_default().push(i);
+            }
+        }
+        let dropped: Vec<Vec<usize>> = dropped.into_values().collect();
         let heads = table.heads(Medium::Terminal);
         let mut grid = Self::new(&heads, aligned.or(left), &dropped);
         let rows = table.rows(Medium::Terminal);
@@ -127,7 +130,7 @@ impl Grid {
         grid
     }
 
-    fn new(head: &[&str], left: Option<usize>, dropped: &[usize]) -> Self {
+    fn new(head: &[&str], left: Option<usize>, dropped: &[Vec<usize>]) -> Self {
         Self {
             rows: vec![head.iter().map(|h| (*h).to_owned()).collect()],
             left,
@@ -147,8 +150,8 @@ impl Grid {
             .unwrap_or(widest)
     }
 
-    /// The table, with a blank line after the first `tests` rows if others follow.
-    pub(super) fn render(&self, width: usize, tests: usize, paint: Paint) -> String {
+    /// The widths of all columns.
+    fn widths(&self) -> Vec<usize> {
         let columns = self.rows[0].len();
         // The last heading may be cut, the numbers below it may not.
         let column = |j: usize| {
@@ -156,15 +159,28 @@ impl Grid {
             let cells = self.rows[skip..].iter();
             cells.map(|r| r[j].width()).max().unwrap_or(0)
         };
-        let mut widths: Vec<usize> = (0..columns).map(column).collect();
-        let mut shown: Vec<usize> = (0..columns).collect();
+        (0..columns).map(column).collect()
+    }
+
+    /// The columns that are shown on a page of this width.
+    pub(super) fn shown(&self, width: usize) -> Vec<usize> {
+        let widths = self.widths();
+        let mut shown: Vec<usize> = (0..widths.len()).collect();
         let narrowest = self.narrowest(widths[0]);
-        for &drop in &self.dropped {
+        for drop in &self.dropped {
             let least: usize = shown[1..].iter().map(|&j| widths[j] + 2).sum();
             if narrowest + least > width {
-                shown.retain(|&j| j != drop);
+                shown.retain(|j| !drop.contains(j));
             }
         }
+        shown
+    }
+
+    /// The table, with a blank line after the first `tests` rows if others follow.
+    pub(super) fn render(&self, width: usize, tests: usize, paint: Paint) -> String {
+        let columns = self.rows[0].len();
+        let mut widths = self.widths();
+        let shown = self.shown(width);
         let others: usize = shown[1..].iter().map(|&j| widths[j] + 2).sum();
         widths[0] = widths[0].min(width.saturating_sub(others).max(MIN_NAME));
         let room = width.saturating_sub(widths[0] + others);
@@ -204,6 +220,8 @@ impl Grid {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::apa::two;
+    use crate::table::{Builder, page};
 
     #[test]
     fn words_wrap_and_long_ones_break() {
@@ -214,7 +232,7 @@ mod tests {
 
     #[test]
     fn names_that_begin_alike_stay_distinct() {
-        let mut grid = Grid::new(&["realization", "n", "VAF"], None, &[1]);
+        let mut grid = Grid::new(&["realization", "n", "VAF"], None, &[vec![1]]);
         for name in ["lambda-0.9995-dx-1", "lambda-0.99995-dx-1"] {
             grid.rows
                 .push(vec![name.to_owned(), "30".to_owned(), "0.9".to_owned()]);
@@ -228,6 +246,37 @@ mod tests {
             .collect();
         assert_eq!(names.len(), 2, "{page}");
         assert!(page.lines().all(|l| l.width() <= 20), "{page}");
+    }
+
+    /// What explains a column goes with it, and an interval with its estimate.
+    #[test]
+    fn columns_of_a_rank_are_left_out_together_and_so_is_their_note() {
+        let rows = ["a", "b"];
+        let half = |head: &str| page(head).droppable(1);
+        let table = Builder::new("", rows)
+            .name("", "name", &|row| row.to_owned())
+            .number(
+                half("estimate").explained("Estimate: a guess.".to_owned()),
+                two,
+                &|_| Some(0.5),
+            )
+            .ends(half("95 %"), two, &|_| Some((0.25, 0.75)))
+            .number(page("n").explained("n: all.".to_owned()), two, &|_| {
+                Some(3.0)
+            })
+            .notes(["Own.".to_owned()]);
+        let grid = Grid::of(&table, None);
+        let columns = table.columns(Medium::Terminal);
+        let notes = |width| {
+            let shown: Vec<_> = grid.shown(width).iter().map(|i| columns[*i]).collect();
+            table.notes_with(&shown).join(" ")
+        };
+        assert_eq!(grid.shown(80), [0, 1, 2, 3]);
+        assert_eq!(notes(80), "Estimate: a guess. n: all. Own.");
+        // There would be room for the estimate without its interval.
+        assert_eq!(grid.shown(20), [0, 3]);
+        assert_eq!(notes(20), "n: all. Own.");
+        assert_eq!(table.notes(Medium::Report), table.notes_with(&columns));
     }
 
     #[test]

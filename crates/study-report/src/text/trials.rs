@@ -4,7 +4,7 @@ use super::Page;
 use super::layout::{Grid, Paint, wrap};
 use crate::apa::name;
 use crate::part_answers::{answered, answers, banner, caveats};
-use crate::table::Table;
+use crate::table::{Column, Medium, Table};
 use crate::tables::parts::tables;
 use study_analysis::analyze::psychophysics::PartAnalysis;
 use study_analysis::analyze::psychophysics::results::PartResults;
@@ -58,13 +58,17 @@ fn all_tables(results: &PartResults, page: Page) -> String {
 
 fn one(table: &Table, width: usize, paint: Paint) -> String {
     let mut out = String::new();
+    let grid = Grid::of(table, Some(1));
     if !table.is_empty() {
-        out = Grid::of(table, Some(1)).render(width, table.len(), paint);
+        out = grid.render(width, table.len(), paint);
     }
-    for (i, note) in table.notes.iter().enumerate() {
+    let columns = table.columns(Medium::Terminal);
+    let shown: Vec<&Column> = grid.shown(width).iter().map(|i| columns[*i]).collect();
+    let notes = table.notes_with(&shown);
+    for (i, note) in notes.iter().enumerate() {
         out += &wrap(note, width, "", if i == 0 { "" } else { "  " });
     }
-    if !table.notes.is_empty() {
+    if !notes.is_empty() {
         out.push('\n');
     }
     out
