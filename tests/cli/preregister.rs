@@ -260,6 +260,10 @@ fn tracks_and_estimates_are_declared() {
         let folder = tempfile::tempdir().unwrap();
         let at = folder.path();
         of_parts(kind, at, 4);
+        // Two conditions, so that thresholds can differ.
+        let protocol = read(at, "p/protocol.toml");
+        let apart = protocol.replace("condition = \"friction\"", "");
+        fs::write(at.join("p/protocol.toml"), apart).unwrap();
         let arguments = [
             "preregister",
             "p",

@@ -125,7 +125,13 @@ fn the_headline_of_pairs_and_tracks_is_that_of_the_analysis() {
         ("staircase", "more-friction", "psy_mixed/F", 3),
     ] {
         let home = tempfile::tempdir().unwrap();
-        let folder = rehearsed(&new(kind, home.path()), n.max(3), home.path(), &[]);
+        let protocol = new(kind, home.path());
+        // Each track measures a condition of its own, so that thresholds can differ.
+        let path = protocol.join("protocol.toml");
+        let text = fs::read_to_string(&path).unwrap();
+        let renamed = text.replacen("condition = \"friction\"", "condition = \"from-above\"", 1);
+        fs::write(&path, renamed).unwrap();
+        let folder = rehearsed(&protocol, n.max(3), home.path(), &[]);
         let (out, _) = export(&folder, "r", home.path(), "r", &SIMULATED);
         let arguments = ["analyze", folder.to_str().unwrap(), "--json"];
         let more = [&arguments[..], &SIMULATED].concat();

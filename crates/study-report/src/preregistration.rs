@@ -15,7 +15,7 @@ use study_analysis::preregister::{
 use study_analysis::study::{describe_realizations, is_rated};
 use study_base::text::{Untrusted, capital, counted, escaped_json};
 use study_plan::protocol::pairs::IntervalOrder;
-use study_plan::protocol::parts::{Part, Presentations, Task};
+use study_plan::protocol::parts::{Part, Presentations, Task, TrackRules};
 use study_plan::protocol::{
     Assign, Order, Protocol, Question, Role, Scale, SessionPlan, Unfinished,
 };
@@ -362,8 +362,18 @@ fn trials(p: &Protocol, part: &Part) -> String {
         ),
         Task::Discrimination { tracks } => {
             let ids: Vec<String> = tracks.iter().map(|id| format!("`{id}`")).collect();
+            let joined = |own: &Vec<&TrackRules>| {
+                let ids: Vec<String> = own.iter().map(|t| format!("`{}`", t.id)).collect();
+                let together = (ids.len() > 1).then(|| ids.join(" and "))?;
+                let condition = own[0].condition();
+                Some(format!(
+                    "; {together} measure the condition `{condition}` and are fitted as one"
+                ))
+            };
+            let conditions = p.conditions(part);
+            let joined: String = conditions.iter().filter_map(joined).collect();
             format!(
-                "{} {}",
+                "{} {}{joined}",
                 if ids.len() == 1 { "track" } else { "tracks" },
                 ids.join(", ")
             )
@@ -411,4 +421,48 @@ fn power_sentences(report: &Report) -> Vec<String> {
     lines.extend(finds.map(|line| format!("This design {line}.")));
     lines.extend(report.warnings().iter().map(|w| format!("{}.", capital(w))));
     lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tracks_of_a_condition_are_declared_as_one() {
+        let track = |id: &str, condition: &str| {
+            format!(
+                "[[tracks]]\nid = \"{id}\"\nmethod = \"2ifc\"\nfamily = \"friction\"\nstandard = 0.0\n\
+                 procedure = {{ rule = \"quest+\", trials = 40 }}\n{condition}\n"
+            )
+        };
+        let protocol = |condition: &str| {
+            let text = format!(
+                r#"
+format = "study-protocol/3"
+study = {{ id = "example", title = "An example", seed = 1 }}
+design = {{ participants = 10 }}
+device = {{ kind = "simulated", limits = {{ force_n = 12.0, velocity_mm_s = 1000.0 }} }}
+analysis = {{ primary = "more" }}
+families = [{{ id = "friction", from = "static.toml", vary = "friction", range = [0.02, 0.6], steps = 30 }}]
+parts = [{{ id = "more", kind = "discrimination", prompt = "Which?", tracks = ["up", "down"] }}]
+
+{}{}"#,
+                track("up", condition),
+                track("down", condition)
+            );
+            let parsed = study_plan::protocol::file::parse("protocol.toml", &text);
+            let shown = parsed.findings.render(false);
+            parsed.protocol.unwrap_or_else(|| panic!("{shown}"))
+        };
+        for (condition, says) in [
+            ("", "tracks `up`, `down`"),
+            (
+                "condition = \"all\"",
+                "tracks `up`, `down`; `up` and `down` measure the condition `all` and are fitted as one",
+            ),
+        ] {
+            let p = protocol(condition);
+            assert_eq!(trials(&p, &p.parts[0]), says);
+        }
+    }
 }

@@ -57,7 +57,8 @@ impl Format for R {
             (
                 "thresholds.csv",
                 "threshold",
-                "the threshold of each participant on each track, a posterior median of `study analyze`",
+                "the threshold of each participant on each track, or on the tracks of a condition, a posterior median of `study analyze`; \
+                 its distance from the standard where tracks with different standards are compared",
             ),
             (
                 "sensitivities.csv",
@@ -329,13 +330,14 @@ fn tracks<'p>(protocol: &'p Protocol, part: &PartId) -> Vec<&'p TrackRules> {
     }
 }
 
-/// The thresholds or the sensitivities of tracks: part, participant, track, estimate, session.
+/// The thresholds or the sensitivities of tracks: part, participant, track or the condition of
+/// several, estimate, session.
 fn estimates(protocol: &Protocol, parts: &[PartAnalysis], thresholds: bool) -> Vec<[String; 5]> {
     let of_part = |part: &PartAnalysis| -> Vec<[String; 5]> {
         let has_levels = |track: &&&TrackRules| track.family().is_some() == thresholds;
         let tracks = tracks(protocol, &part.part);
         let tracks: BTreeSet<&str> = (tracks.iter().filter(has_levels))
-            .map(|track| track.id.as_str())
+            .map(|track| track.condition().as_str())
             .collect();
         let own = part.data.measured.iter();
         own.filter(|m| tracks.contains(m.condition.as_str()))
