@@ -26,10 +26,15 @@ impl TrackRules {
 }
 
 impl Protocol {
-    /// The scale and the shape of the functions of a track.
+    /// The scale and the shape of the functions of a track. Levels that are counted from the
+    /// standard are all above 0, and at 0 there is nothing to feel: a function of their logarithm
+    /// is chance there, one of the level itself need not be.
     pub fn fit(&self, track: &TrackRules) -> (Spacing, Core) {
         let family = track.family().and_then(|id| self.family(id));
-        let own = || family.map(|family| family.spacing);
+        let own = || match track.relative {
+            Some(_) => Some(Spacing::Log),
+            None => family.map(|family| family.spacing),
+        };
         let spacing = track.fit.scale.or_else(own).unwrap_or_default();
         let core = track.fit.core.unwrap_or_else(|| spacing.usual_core());
         (spacing, core)

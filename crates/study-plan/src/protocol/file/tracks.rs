@@ -51,7 +51,7 @@ pub(super) const TRACKS: &[Key] = keys! {
 const FIT: &[Key] = keys! {
     /// The scale of the levels over which a function is fitted. Over logarithms the threshold is
     /// a level all the same, and the width is the logarithm of a ratio.
-    "scale": Kind::Word(Spacing::WORDS), r#""log""#, derived("the `scale` of the family");
+    "scale": Kind::Word(Spacing::WORDS), r#""log""#, derived("`log` with `relative`, else the `scale` of the family");
     /// The shape of the function.
     "core": Kind::Word(Core::WORDS), r#""logistic""#, derived("`norm`; over logarithms `gumbel`");
     /// The lapse rate of the fit by maximum likelihood. The posterior estimates it.

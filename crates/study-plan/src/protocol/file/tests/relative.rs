@@ -4,6 +4,7 @@ use super::parts::{PARTS, good};
 use crate::procedure::{Answer, Rule};
 use crate::protocol::file::parse;
 use crate::protocol::{Protocol, Relative, Seat};
+use study_stats::psychometric::{Core, Spacing};
 
 /// A family from 0.1 to 0.5 with two tracks on the standards 0.2 and 0.3.
 fn text(of_first: &str, of_second: &str) -> String {
@@ -50,6 +51,12 @@ fn only_levels_above_the_standard_are_presented() {
     assert_eq!(p.ladder(&p.tracks[0]).levels(), [0.25, 0.5, 0.75, 1.5]);
     assert_eq!(p.tracks[0].counted_standard(), Some(0.0));
     assert_eq!(p.tracks[0].relative, Some(Relative::Fraction));
+    // At no distance from the standard there is nothing to feel.
+    assert_eq!(p.families[0].spacing, Spacing::Lin);
+    assert_eq!(p.fit(&p.tracks[0]), (Spacing::Log, Core::Gumbel));
+    let lin = "relative = \"increment\"\nfit = { scale = \"lin\" }";
+    let p = both(lin);
+    assert_eq!(p.fit(&p.tracks[0]), (Spacing::Lin, Core::Norm));
 }
 
 /// However often the answer is right, the level stays above the standard.
