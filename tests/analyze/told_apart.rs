@@ -125,13 +125,13 @@ fn a_relation_that_hangs_on_one_realization_says_so() {
     assert!(
         caveats
             .iter()
-            .any(|c| c.code == "one-realization" && c.text.contains("over the others r = ")),
+            .any(|c| c.code == "far-realization" && c.text.contains("over the others r = ")),
         "{caveats:?}"
     );
     let even = analysis_of(&rating_table(&rows, |m| Some(0.5 + 0.1 * m as f64)));
     let caveats = &finding(&even, Question::Vaf).caveats;
     assert!(
-        caveats.iter().all(|c| c.code != "one-realization"),
+        caveats.iter().all(|c| c.code != "far-realization"),
         "{caveats:?}"
     );
 }

@@ -116,6 +116,8 @@ pub struct Abilities {
     model: Model,
     covariance: Covariance,
     clustered: Option<SymmetricMatrix>,
+    /// The information of each participant.
+    information: Vec<SymmetricMatrix>,
 }
 
 #[derive(Debug, Clone)]
@@ -130,6 +132,9 @@ pub struct Difference {
     /// The same with the sandwich over participants, V·(Σ s sᵀ)·V, without a factor for
     /// small samples. `None` with one participant.
     pub clustered: Option<Effect>,
+    /// On how many participants the difference rests: (Σ h)²/Σ h² of their shares h of the information about
+    /// it. Their number if all answered equally often.
+    pub participants: f64,
     /// Probability that a is preferred to b, without order effect and without a tie.
     pub preferred: f64,
 }
@@ -146,6 +151,7 @@ impl Abilities {
             effect: Effect::new(estimate, quadratic(&self.covariance.0, &contrast)),
             clustered: (self.clustered.as_ref())
                 .map(|v| Effect::new(estimate, quadratic(v, &contrast))),
+            participants: self.participants(&contrast),
             preferred: match self.model.link {
                 Link::Thurstone => normal_cdf(estimate),
                 Link::BradleyTerry | Link::Davidson => 1.0 / (1.0 + (-estimate).exp()),
@@ -159,6 +165,33 @@ impl Abilities {
         let sandwich = self.clustered.as_ref()?;
         let unit = ability(item, self.abilities.len(), sandwich.size());
         Some(quadratic(sandwich, &unit).max(0.0).sqrt())
+    }
+
+    /// On how many participants an ability rests, as [`Difference::participants`].
+    pub fn participants_of(&self, item: usize) -> f64 {
+        self.participants(&ability(
+            item,
+            self.abilities.len(),
+            self.covariance.0.size(),
+        ))
+    }
+
+    fn participants(&self, contrast: &[f64]) -> f64 {
+        let v = &self.covariance.0;
+        let along: Vec<f64> = (0..contrast.len())
+            .map(|i| (0..contrast.len()).map(|j| v.get(i, j) * contrast[j]).sum())
+            .collect();
+        let shares = self
+            .information
+            .iter()
+            .map(|own| quadratic(own, &along).max(0.0));
+        let (sum, squares) =
+            shares.fold((0.0, 0.0), |(sum, squares), h| (sum + h, squares + h * h));
+        if squares > 0.0 {
+            sum * sum / squares
+        } else {
+            0.0
+        }
     }
 
     /// The rank of each item; 1 is the most preferred.
@@ -327,6 +360,7 @@ pub fn abilities(
         df: (cells * (1 + usize::from(with_ties))).saturating_sub(size),
         model,
         clustered: sandwich(&rows, model.link, &found.at, &factor),
+        information: information(&rows, model.link, &found.at),
         covariance: Covariance(covariance),
     })
 }
@@ -356,6 +390,16 @@ fn sandwich(rows: &[Row], link: Link, at: &[f64], factor: &Cholesky) -> Option<S
         sandwich.add_outer(1.0, &factor.solve(&score.gradient));
     }
     (clusters > 1).then_some(sandwich)
+}
+
+/// The information of each cluster.
+fn information(rows: &[Row], link: Link, at: &[f64]) -> Vec<SymmetricMatrix> {
+    let clusters = rows.iter().map(|r| r.cluster + 1).max().unwrap_or(0);
+    let mut all = vec![Evaluation::zero(at.len()); clusters];
+    for row in rows {
+        row.add(link, at, &mut all[row.cluster]);
+    }
+    all.into_iter().map(|own| own.hessian.negated()).collect()
 }
 
 /// The deviance of the pairs in each order, added up, and their number.

@@ -54,6 +54,9 @@ pub struct Within {
     pub effect: Option<ContrastF>,
     /// Variance of a cell mean about the model, and its degrees of freedom.
     pub error: Option<(f64, f64)>,
+    /// How unlike the design makes the precision of the differences between linked realizations: the largest
+    /// variance over the smallest, if a cell of n ratings has the variance 1 + 1/n. 1 in a balanced design.
+    pub precision_ratio: f64,
     /// Effects, 0 for the reference of each set.
     effects: Vec<f64>,
     /// Their covariance over the variance of a cell mean.
@@ -157,11 +160,14 @@ impl Within {
             means,
             effect,
             error,
+            precision_ratio: 1.0,
             effects,
             unit,
             covariance: None,
         };
         found.covariance = found.by_cell(cells, &subjects);
+        let of_design = found.sandwich(&subjects, |n| 1.0 + 1.0 / n as f64);
+        found.precision_ratio = found.ratio(&of_design);
         Ok(found)
     }
 
@@ -203,11 +209,32 @@ impl Within {
         let within = cells.iter().map(|c| c.within).sum::<f64>() / df;
         let inverse = cells.iter().map(|c| 1.0 / c.n as f64).sum::<f64>() / cells.len() as f64;
         let between = (variance - within * inverse).max(0.0);
+        let full = self.sandwich(subjects, |n| between + within / n as f64);
+        (full.elements().iter())
+            .all(|x| x.is_finite())
+            .then_some(full)
+    }
+
+    /// The largest variance of the difference of two linked realizations over the smallest.
+    fn ratio(&self, covariance: &Matrix) -> f64 {
+        let k = self.realizations.len();
+        let pairs = (0..k).flat_map(|i| (i + 1..k).map(move |j| (i, j)));
+        let linked = pairs.filter(|(i, j)| self.sets[*i] == self.sets[*j]);
+        let (low, high) = linked.fold((f64::INFINITY, 0.0f64), |(low, high), (i, j)| {
+            let variance = spread(covariance, i, j);
+            (low.min(variance), high.max(variance))
+        });
+        if high > 0.0 { high / low } else { 1.0 }
+    }
+
+    /// The covariance of the effects, if a cell of n ratings has this variance.
+    fn sandwich(&self, subjects: &[Own], variance: impl Fn(usize) -> f64) -> Matrix {
+        let k = self.realizations.len();
         // Σ over subjects of M diag(v) M, with M = I − 11ᵀ/n.
         let mut inner = SymmetricMatrix::zero(k);
         for own in subjects {
             let n = own.len() as f64;
-            let v: Vec<f64> = own.iter().map(|c| between + within / c.2 as f64).collect();
+            let v: Vec<f64> = own.iter().map(|c| variance(c.2)).collect();
             let sum = v.iter().sum::<f64>() / (n * n);
             for i in 0..own.len() {
                 for j in 0..=i {
@@ -219,13 +246,9 @@ impl Within {
         let half = Matrix::from_fn(k, k, |i, j| {
             (0..k).map(|l| self.unit[(i, l)] * inner.get(l, j)).sum()
         });
-        let full = Matrix::from_fn(k, k, |i, j| {
+        Matrix::from_fn(k, k, |i, j| {
             (0..k).map(|l| half[(i, l)] * self.unit[(l, j)]).sum()
-        });
-        full.elements()
-            .iter()
-            .all(|x| x.is_finite())
-            .then_some(full)
+        })
     }
 }
 

@@ -33,7 +33,18 @@ pub(super) struct Adjusted {
     pub(super) fit: Result<AdjustedMeans, LmmError>,
 }
 
+/// Differences of realizations whose variances differ by this factor at most are taken as equally precise.
+const MOST_UNLIKE: f64 = 1.2;
+
 impl Adjusted {
+    /// Whether the design makes all means about equally precise.
+    pub(super) fn is_balanced(&self) -> bool {
+        match &self.within {
+            Ok(within) => within.precision_ratio <= MOST_UNLIKE,
+            Err(_) => self.design.is_complete(),
+        }
+    }
+
     pub(super) fn of(cells: &Cells<'_>) -> Self {
         let models = cells.tested();
         let design = Design::of(cells);

@@ -96,7 +96,7 @@ statistics! {
         var_model_crossed: Option<Stat>,
     }
 
-    /// The slope of the means on VAF where the design is not balanced: a cell is missing, or not all cells hold equally many ratings. Generalized least squares over the realizations, with the covariance of their differences in `within_cells` (cells with fewer ratings count as less precise) plus a variance of the realizations about the line, by restricted maximum likelihood; the standard error is scaled by the weighted residuals (Knapp & Hartung 2003). With equally precise means it is Pearson's t.
+    /// The slope of the means on VAF where the design makes some differences less precise than others: by a factor of more than 1.2 in their variances, if a cell of n ratings has the variance 1 + 1/n. Generalized least squares over the realizations, with the covariance of their differences in `within_cells` (cells with fewer ratings count as less precise) plus a variance of the realizations about the line, by restricted maximum likelihood; the standard error is scaled by the weighted residuals (Knapp & Hartung 2003). With equally precise means it is Pearson's t.
     pub struct Trend {
         /// change of the rating per unit of VAF
         slope: Stat,

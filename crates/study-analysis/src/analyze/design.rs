@@ -21,8 +21,6 @@ pub struct Design {
     pub cells: usize,
     /// Whether a cell holds two ratings.
     pub repeated: bool,
-    /// Whether all cells hold equally many ratings.
-    pub even: bool,
 }
 
 impl Design {
@@ -37,23 +35,12 @@ impl Design {
             realizations: models.len(),
             cells: own().count(),
             repeated: own().any(|c| c.rows.len() > 1),
-            even: own().all(|c| {
-                own()
-                    .next()
-                    .is_some_and(|first| first.rows.len() == c.rows.len())
-            }),
         }
     }
 
     /// Whether every participant rated every realization.
     pub fn is_complete(self) -> bool {
         self.cells == self.participants * self.realizations
-    }
-
-    /// Whether the means of all realizations are equally precise, whatever the ratings are: every
-    /// participant rated every realization equally often.
-    pub fn is_balanced(self) -> bool {
-        self.is_complete() && self.even
     }
 
     /// Whether tests use the participants who rated everything: those who did not are at

@@ -8,7 +8,7 @@
 //! preregistered margin each pair is also tested for equivalence.
 
 use super::adjusted::{Adjusted, MAX_COMPARED};
-use super::cells::Cells;
+use super::cells::{Cell, Cells};
 use super::effects::MAX_PAIRED;
 use super::record::{Interval, PairName, Stat, Why, statistics};
 use super::{Better, Rules};
@@ -84,12 +84,20 @@ pub(super) fn pairs(cells: &Cells<'_>, adjusted: &Adjusted, rules: &Rules) -> Op
     } else {
         match &adjusted.within {
             Ok(within) => {
+                let set = |c: &Cell| {
+                    let at = adjusted.models.binary_search(&c.model).ok();
+                    at.map(|at| within.sets[at])
+                };
+                let by_participant = cells.cells.chunk_by(|a, b| a.subject == b.subject);
+                let of: Vec<Option<usize>> =
+                    by_participant.map(|own| own.iter().find_map(set)).collect();
+                let people = |set: usize| of.iter().filter(|of| **of == Some(set)).count();
                 let places = (0..k).flat_map(|a| (a + 1..k).map(move |b| (a, b)));
                 let found = places.filter_map(|(first, second)| {
                     Some(Difference {
                         first,
                         second,
-                        n: adjusted.design.participants,
+                        n: people(within.sets[first]),
                         t: within.difference(first, second)?,
                         dz: None,
                     })

@@ -192,7 +192,7 @@ fn weighted(
     adjusted: &Adjusted,
     vaf: impl Fn(usize) -> Option<f64>,
 ) -> Correlation {
-    if adjusted.design.is_balanced() {
+    if adjusted.is_balanced() {
         return found;
     }
     let vaf: Vec<Option<f64>> = adjusted.models.iter().map(|&m| vaf(m)).collect();

@@ -177,7 +177,8 @@ fn headline(
             ),
         );
     }
-    if n > MAX_EXACT {
+    let permuted = correlation.trend.is_none();
+    if n > MAX_EXACT && permuted {
         warn(
             "monte-carlo",
             format!(
@@ -221,14 +222,23 @@ fn headline(
                 .to_owned(),
         );
     }
-    let text = if evidence.covariates.log10_memory.is_some() {
-        "the permutation test assumes exchangeable realizations, and realizations with adjacent \
-         lambda are not; the effect of VAF is confounded with lambda and activeness"
+    let test = if permuted {
+        "the permutation test"
     } else {
-        "the permutation test assumes exchangeable realizations; the effect of VAF is confounded \
-         with everything that correlates with it"
+        "the test of VAF"
     };
-    warn("assumptions", text.to_owned());
+    let text = if evidence.covariates.log10_memory.is_some() {
+        format!(
+            "{test} assumes exchangeable realizations, and realizations with adjacent \
+             lambda are not; the effect of VAF is confounded with lambda and activeness"
+        )
+    } else {
+        format!(
+            "{test} assumes exchangeable realizations; the effect of VAF is confounded \
+             with everything that correlates with it"
+        )
+    };
+    warn("assumptions", text);
 }
 
 fn design(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, results: &Results) {

@@ -58,9 +58,7 @@ impl Bars {
     fn explained(self) -> &'static str {
         match self {
             Self::Within => "95 % within-participant intervals (Cousineau–Morey)",
-            Self::Adjusted => {
-                "95 % intervals of the mixed model that adjusts the means for missing cells"
-            }
+            Self::Adjusted => "95 % intervals of a mixed model about the adjusted means",
             Self::Deviation => "± 1 standard deviation over all ratings of a realization (n − 1)",
         }
     }

@@ -128,7 +128,7 @@ pub(super) fn against_vaf(scene: &Scene<'_>) -> Option<Drawn> {
     let found = r.map_or_else(String::new, |r| {
         let p = decided.map_or_else(String::new, |t| {
             let how = match t.kind {
-                TestKind::WeightedTrend => "weighted by their precision, p",
+                TestKind::WeightedTrend => "unweighted; weighted by their precision p",
                 _ => "permutation p",
             };
             format!(", {how} {}", apa::p(t.p))
@@ -147,7 +147,7 @@ pub(super) fn against_vaf(scene: &Scene<'_>) -> Option<Drawn> {
         }
     };
     let line = if fit.is_some() {
-        " Line: least squares over the tested realizations, with its 95 % band."
+        " Line: least squares over the tested realizations, unweighted, with its 95 % band."
     } else {
         ""
     };

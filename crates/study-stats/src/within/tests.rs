@@ -99,6 +99,50 @@ fn a_trend_weighs_means_by_their_precision() {
     close(other.p.unwrap(), 0.574_539_011_405_584_9);
 }
 
+/// Rounding is no scatter: Pearson's t is not defined either.
+#[test]
+fn means_on_a_line_have_no_test() {
+    let rows: Vec<Row> = (0..9)
+        .map(|i| {
+            (
+                i / 3,
+                i % 3,
+                (i % 3) as f64 + [0.0, 1.0 / 3.0, 0.1][i / 3],
+                1 + usize::from(i == 4),
+                0.0,
+            )
+        })
+        .collect();
+    let mut rows = rows;
+    rows[0].2 += 0.5;
+    rows[3].2 -= 0.5;
+    let found = Within::of(&cells(&rows)).unwrap();
+    let line = found.trend(&[0.1, 0.2, 0.3].map(Some)).unwrap();
+    assert!((line.slope - 10.0).abs() < 1e-9);
+    assert_eq!((line.t, line.p), (None, None));
+}
+
+/// By hand: of differences with variances 1/9 + 1/10 and 2/10 about the same unit, and with cells of 1 and 2 ratings.
+#[test]
+fn the_design_says_how_unlike_the_precision_is() {
+    let all: Vec<Row> = (0..30)
+        .map(|i| (i / 3, i % 3, (i * i % 7) as f64, 1, 0.0))
+        .collect();
+    near(Within::of(&cells(&all)).unwrap().precision_ratio, 1.0);
+    let mut lost = all.clone();
+    lost.pop();
+    let ratio = Within::of(&cells(&lost)).unwrap().precision_ratio;
+    assert!((1.05..1.15).contains(&ratio), "{ratio}");
+    let twice: Vec<Row> = (all.iter())
+        .map(|r| (r.0, r.1, r.2, 1 + usize::from(r.1 == 0), 1.0))
+        .collect();
+    // (2 + 2) / (1.5 + 2)
+    near(
+        Within::of(&cells(&twice)).unwrap().precision_ratio,
+        4.0 / 3.5,
+    );
+}
+
 /// Of equally precise means it is the t test of Pearson's correlation.
 #[test]
 fn in_a_complete_table_the_trend_is_that_of_the_correlation() {

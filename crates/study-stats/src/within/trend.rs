@@ -71,7 +71,9 @@ impl Within {
         let line = contrasts.line(variance)?;
         let df = others.len() as f64 - 1.0;
         let se = finite((line.squares / df / line.information).sqrt())?;
-        let t = finite(line.slope / se);
+        // Means on a line leave rounding only.
+        let scatters = line.squares > 1e-20 * line.total;
+        let t = finite(line.slope / se).filter(|_| scatters);
         let half = t_quantile(0.975, df).map(|t| t * se);
         Some(Trend {
             slope: line.slope,
@@ -101,6 +103,8 @@ struct Line {
     information: f64,
     /// Weighted sum of squares of the residuals.
     squares: f64,
+    /// The same of the differences themselves.
+    total: f64,
     /// −2 restricted log likelihood.
     criterion: f64,
 }
@@ -127,6 +131,7 @@ impl Contrasts {
             slope,
             information,
             squares,
+            total: product(&y, &y),
             criterion: factor.log_determinant() + information.ln() + squares,
         })
     }
@@ -140,20 +145,24 @@ impl Contrasts {
             0 => 0.0,
             _ => top * 10f64.powf(-DECADES * (1.0 - step as f64 / STEPS as f64)),
         };
-        let best = (0..=STEPS).min_by(|a, b| criterion(at(*a)).total_cmp(&criterion(at(*b))))?;
+        let all: Vec<f64> = (0..=STEPS).map(|step| criterion(at(step))).collect();
+        let best = (0..=STEPS).min_by(|a, b| all[*a].total_cmp(&all[*b]))?;
         let (mut low, mut high) = (at(best.saturating_sub(1)), at((best + 1).min(STEPS)));
         let golden = 0.5 * (5f64.sqrt() - 1.0);
+        let inner = golden * (high - low);
+        let (mut left, mut right) = (criterion(high - inner), criterion(low + inner));
         for _ in 0..GOLDEN_STEPS {
-            let inner = golden * (high - low);
-            if criterion(high - inner) <= criterion(low + inner) {
-                high = low + inner;
+            if left <= right {
+                (high, right) = (low + golden * (high - low), left);
+                left = criterion(high - golden * (high - low));
             } else {
-                low = high - inner;
+                (low, left) = (high - golden * (high - low), right);
+                right = criterion(low + golden * (high - low));
             }
         }
-        let found = 0.5 * (low + high);
-        let better = criterion(found) < criterion(0.0);
-        finite(criterion(found).min(criterion(0.0)))?;
-        Some(if better { found } else { 0.0 })
+        let (found, at_zero) = (0.5 * (low + high), all[0]);
+        let of_found = criterion(found);
+        finite(of_found.min(at_zero))?;
+        Some(if of_found < at_zero { found } else { 0.0 })
     }
 }

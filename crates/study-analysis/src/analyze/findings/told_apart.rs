@@ -4,7 +4,7 @@
 use super::{Finding, Pair, Question, Verdict};
 use crate::analyze::cells::Cells;
 use crate::analyze::results::{Evidence, Number as _};
-use crate::analyze::same_order;
+use crate::analyze::same_order::Orders;
 use study_base::apa;
 use study_base::text::counted;
 
@@ -16,15 +16,16 @@ pub(super) fn withdraw(
     findings: &mut [Finding],
     pairs: &mut [Pair],
 ) {
-    let not_linked = not_linked(evidence);
+    let sets = sets(cells, evidence);
+    let not_linked = |of_vaf: bool| not_linked(cells, &sets, of_vaf);
+    let (vaf, all) = (not_linked(true), not_linked(false));
     let one_order = one_order(cells);
     for found in findings {
         let why = match found.question {
-            Question::Vaf
-            | Question::Delivered
-            | Question::Memory
-            | Question::Best
-            | Question::Differ => not_linked.as_ref().or(one_order.as_ref()),
+            Question::Vaf | Question::Delivered | Question::Memory => {
+                vaf.as_ref().or(one_order.as_ref())
+            }
+            Question::Best | Question::Differ => all.as_ref().or(one_order.as_ref()),
             Question::Pairs | Question::Reference(_) | Question::Equivalence(_) => {
                 one_order.as_ref()
             }
@@ -53,27 +54,77 @@ pub(super) fn withdraw(
     }
 }
 
-/// Says so if no participants link all realizations.
-fn not_linked(evidence: &Evidence) -> Option<String> {
-    let sets = evidence
+/// Sets of realizations that participants link, by their indices: those that at least two participants rated.
+/// What one person alone rated is no part of a comparison.
+fn sets(cells: &Cells<'_>, evidence: &Evidence) -> Vec<Vec<usize>> {
+    if evidence
         .cells
         .within
         .sets
         .number()
-        .filter(|sets| *sets > 1.0)? as usize;
-    Some(format!(
-        "the realizations fall into {} that no participant links, so that a difference between them may \
-         be one between participants; let some participants rate realizations of several sets",
-        counted(sets, "set", "sets")
-    ))
+        .is_none_or(|sets| sets <= 1.0)
+    {
+        return Vec::new();
+    }
+    let models = cells.tested();
+    let mut set_of: Vec<usize> = (0..cells.ratings.models.len()).collect();
+    let tested = |m: usize| models.binary_search(&m).is_ok();
+    let people: Vec<Vec<usize>> = (cells.cells.chunk_by(|a, b| a.subject == b.subject))
+        .map(|own| own.iter().map(|c| c.model).filter(|m| tested(*m)).collect())
+        .collect();
+    loop {
+        let before = set_of.clone();
+        for own in &people {
+            let least = own.iter().map(|m| set_of[*m]).min().unwrap_or(0);
+            own.iter().for_each(|m| set_of[*m] = least);
+        }
+        if set_of == before {
+            break;
+        }
+    }
+    let mut sets: Vec<Vec<usize>> = Vec::new();
+    for &first in models.iter().filter(|m| set_of[**m] == **m) {
+        let of_set = |own: &&Vec<usize>| own.first().is_some_and(|m| set_of[*m] == first);
+        if people.iter().filter(of_set).count() > 1 {
+            sets.push(
+                models
+                    .iter()
+                    .copied()
+                    .filter(|m| set_of[*m] == first)
+                    .collect(),
+            );
+        }
+    }
+    sets
+}
+
+/// Says so if no participants link all realizations, or all with a VAF.
+fn not_linked(cells: &Cells<'_>, sets: &[Vec<usize>], of_vaf: bool) -> Option<String> {
+    let counts = |set: &&Vec<usize>| !of_vaf || set.iter().any(|m| cells.vaf[*m].is_some());
+    let n = sets.iter().filter(counts).count();
+    (n > 1).then(|| {
+        format!(
+            "the realizations fall into {} that no participant links, so that a difference between them may \
+             be one between participants; let some participants rate realizations of several sets",
+            counted(n, "set", "sets")
+        )
+    })
 }
 
 /// Says so if everybody felt the realizations in the same order.
 fn one_order(cells: &Cells<'_>) -> Option<String> {
-    let chance = same_order::chance(cells).filter(|chance| *chance <= same_order::LEAST_CHANCE)?;
+    let orders = Orders::of(cells).filter(|orders| orders.are_one())?;
+    let alike = match orders.share >= 1.0 - 1e-9 {
+        true => "everybody felt the realizations in the same order".to_owned(),
+        false => format!(
+            "the realizations were felt in much the same order, which explains {} of the positions",
+            apa::percent(orders.share)
+        ),
+    };
     Some(format!(
-        "everybody felt the realizations in the same order (p {} with random orders), so that a difference \
-         between them may be one of time, such as practice or fatigue; present them in several orders",
-        apa::p(chance)
+        "{alike} (p {} with random orders), so that a difference between them may be one of time, such as \
+         practice or fatigue; present them in several orders (if the column of the trials numbers the rows of a \
+         table, leave it out)",
+        apa::p(orders.chance)
     ))
 }

@@ -48,7 +48,15 @@ pub(in crate::analyze) fn vaf(
     interval_and_p(rules.alpha, &mut found);
     if let Some(influence) = about.influence {
         one_realization(influence, about.adjusted, &mut found);
-        one_participant(influence, rules.alpha, &mut found);
+        let least = pearson
+            .permuted
+            .as_ref()
+            .and_then(|p| p.smallest_p_two_sided.number());
+        let possible =
+            about.adjusted.trend.is_some() || least.is_some_and(|p| rejects(p, rules.alpha));
+        if possible {
+            one_participant(influence, rules.alpha, &mut found);
+        }
     }
     if let Some((raw, _)) = about.beside.filter(|_| !design.is_complete()) {
         raw_and_adjusted(&raw.pearson, pearson, rules.alpha, &mut found);
@@ -84,9 +92,10 @@ fn correlation(
     };
     // Fisher's z takes the means as equally precise.
     let equal = correlation.trend.is_none();
+    let weighted_r = correlation.trend.as_ref().and_then(|t| t.r.number());
     Finding {
         realizations: n,
-        estimate: r.map(|value| Estimate {
+        estimate: (weighted_r.or(r)).map(|value| Estimate {
             name: "r",
             value,
             ci95: (pearson.ci95.as_ref().filter(|_| equal)).and_then(Interval::ends),
@@ -209,9 +218,9 @@ fn one_realization(influence: &Influence, correlation: &Correlation, found: &mut
         format!("; over the others r = {}", apa::r(r))
     });
     found.caveat(
-        "one-realization",
+        "far-realization",
         format!(
-            "the VAF of {} is far from all others, so that the relation rests on this realization (leverage {}){without}",
+            "the VAF of {} is far from all others, so that a relation would rest on this realization (leverage {}){without}",
             name.as_str(),
             apa::share(leverage, 2)
         ),
@@ -256,10 +265,9 @@ fn one_participant(influence: &Influence, alpha: f64, found: &mut Finding) {
 
 /// Says so if the means as they are lead to another conclusion.
 fn raw_and_adjusted(raw: &Pearson, adjusted: &Pearson, alpha: f64, found: &mut Finding) {
-    let raw_p = raw.permuted.as_ref().and_then(|p| Some(p.two_sided()?.0));
-    if let (Some(raw), Some(raw_p), Some(r), Some(test)) =
-        (raw.r.number(), raw_p, adjusted.r.number(), &found.test)
-        && (raw * r < 0.0 || rejects(raw_p, alpha) != test.is_significant())
+    let p = [raw, adjusted].map(|pearson| Some((pearson.r.number()?, pearson.p_t.number()?)));
+    if let [Some((raw, raw_p)), Some((r, p))] = p
+        && (raw * r < 0.0 || rejects(raw_p, alpha) != rejects(p, alpha))
     {
         found.caveat(
             "raw-and-adjusted",

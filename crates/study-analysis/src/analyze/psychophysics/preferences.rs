@@ -54,9 +54,9 @@ statistics! {
         preferred: Stat,
         /// standard error by the sandwich over participants, without a factor for small samples
         se_clustered: Option<Stat>,
-        /// t over participants: `difference` over √(S/(S−1)) · `se_clustered` with S participants, which is at least half of `se`; z = `difference`/`se` with one participant
+        /// t over participants: `difference` over √(n/(n−1)) · `se_clustered`, which is at least half of `se`, with n = (Σ h)²/Σ h² participants, h the information of each about the difference; z = `difference`/`se` with one participant
         statistic: Stat as "t",
-        /// participants less one; none with one participant
+        /// n less 1, at least 1; none with one participant
         statistic_df: Option<Stat> as "t_df",
         /// of `t`
         p: Stat,
@@ -138,45 +138,48 @@ const LEAST_SHARE: f64 = 0.25;
 /// How an estimate is judged: by participants, of whom each counts once.
 #[derive(Debug, Clone, Copy)]
 struct Judge {
-    participants: usize,
-    /// 97.5 % of t or of the normal distribution.
-    quantile: f64,
+    /// On how many participants it rests; `None` with one.
+    participants: Option<f64>,
 }
 
 impl Judge {
-    fn of(participants: usize) -> Self {
-        let quantile = match participants {
-            0 | 1 => normal_quantile(0.975),
-            n => t_quantile(0.975, n as f64 - 1.0),
-        };
+    /// An estimate that rests on this many of some participants.
+    fn of(all: usize, participants: f64) -> Self {
         Self {
-            participants,
-            quantile: quantile.unwrap_or(f64::NAN),
+            participants: (all > 1).then_some(participants),
         }
     }
 
-    /// The standard error: with S participants √(S/(S − 1)) times the sandwich, at least a share of that
-    /// of independent answers; with one that of independent answers.
-    fn se(&self, independent: f64, clustered: Option<f64>) -> f64 {
-        let n = self.participants as f64;
-        let corrected = clustered
-            .filter(|_| n > 1.0)
-            .map(|se| se * (n / (n - 1.0)).sqrt());
+    /// Degrees of freedom of t, at least 1.
+    fn df(self) -> Option<f64> {
+        self.participants.map(|n| (n - 1.0).max(1.0))
+    }
+
+    /// The standard error: with n participants √(n/(n − 1)) times the sandwich, but at most √2 times, and at
+    /// least a share of that of independent answers; with one that of independent answers.
+    fn se(self, independent: f64, clustered: Option<f64>) -> f64 {
+        let corrected = self.participants.zip(clustered);
+        let corrected = corrected.map(|(n, se)| se * (n / (n - 1.0).max(0.5 * n)).sqrt());
         corrected.map_or(independent, |se| se.max(LEAST_SHARE.sqrt() * independent))
     }
 
     /// Two-sided p of an estimate: t over participants, z with one.
-    fn p(&self, estimate: f64, se: f64) -> Option<f64> {
+    fn p(self, estimate: f64, se: f64) -> Option<f64> {
         let t = estimate / se;
-        match self.participants {
-            0 | 1 => Some(2.0 * normal_upper(t.abs())),
-            n => t_two_sided(t, n as f64 - 1.0),
+        match self.df() {
+            None => Some(2.0 * normal_upper(t.abs())),
+            Some(df) => t_two_sided(t, df),
         }
     }
 
-    fn interval(&self, estimate: f64, se: f64) -> (f64, f64) {
-        let half = self.quantile * se;
-        (estimate - half, estimate + half)
+    /// Its 95 % interval.
+    fn interval(self, estimate: f64, se: f64) -> Option<(f64, f64)> {
+        let quantile = match self.df() {
+            None => normal_quantile(0.975),
+            Some(df) => t_quantile(0.975, df),
+        };
+        let half = quantile? * se;
+        Some((estimate - half, estimate + half))
     }
 }
 
@@ -253,11 +256,13 @@ pub fn preferences(rows: &[Preference], ties: bool, order: bool) -> Preferences 
         .err()
         .map_or_else(String::new, |e| reason(e, &items));
     let found = fit.as_ref().ok();
-    let judge = Judge::of(people.len());
+    let judge = |participants: f64| Judge::of(people.len(), participants);
     let stat = |x: Option<f64>| Stat::or(x, why.clone());
     let ability = |(i, item): (usize, &&str)| {
-        let interval =
-            found.map(|f| judge.interval(f.abilities[i], judge.se(f.ses[i], f.clustered_se(i))));
+        let interval = found.and_then(|f| {
+            let judge = judge(f.participants_of(i));
+            judge.interval(f.abilities[i], judge.se(f.ses[i], f.clustered_se(i)))
+        });
         let ability = Ability {
             ability: stat(found.map(|f| f.abilities[i])),
             ability_se: stat(found.map(|f| f.ses[i])),
@@ -292,21 +297,24 @@ pub fn preferences(rows: &[Preference], ties: bool, order: bool) -> Preferences 
     let differences: Vec<_> = (pairs.iter())
         .map(|(a, b)| found.map(|f| f.difference(*a, *b)))
         .collect();
-    let se = |d: &Difference| judge.se(d.effect.se, d.clustered.map(|e| e.se));
+    let se = |d: &Difference| judge(d.participants).se(d.effect.se, d.clustered.map(|e| e.se));
     let p: Vec<Option<f64>> = (differences.iter())
-        .map(|d| (d.as_ref()).and_then(|d| judge.p(d.effect.estimate, se(d))))
+        .map(|d| (d.as_ref()).and_then(|d| judge(d.participants).p(d.effect.estimate, se(d))))
         .collect();
     let p_holm = holm(&p);
     let of_pair = |(k, (a, b)): (usize, &(usize, usize))| {
         let difference = differences[k].as_ref();
         let deciding = difference.map(|d| (d.effect.estimate, se(d)));
+        let interval =
+            difference.and_then(|d| judge(d.participants).interval(d.effect.estimate, se(d)));
         let clustered = difference.and_then(|d| d.clustered);
         let found = AbilityDifference {
             difference: stat(difference.map(|d| d.effect.estimate)),
             se: stat(difference.map(|d| d.effect.se)),
-            ci95: Interval::or(deciding.map(|(d, se)| judge.interval(d, se)), why.clone()),
+            ci95: Interval::or(interval, why.clone()),
             statistic: stat(deciding.map(|(d, se)| d / se)),
-            statistic_df: (people.len() > 1).then(|| Stat::of(people.len() as f64 - 1.0)),
+            statistic_df: (people.len() > 1)
+                .then(|| stat(difference.and_then(|d| judge(d.participants).df()))),
             preferred: stat(difference.map(|d| d.preferred)),
             se_clustered: (people.len() > 1).then(|| stat(clustered.map(|e| e.se))),
             p: stat(p[k]),
@@ -466,6 +474,30 @@ mod tests {
             "{:?}",
             pair.p
         );
+    }
+
+    /// One of eight participants answered ten times as often as the others: the difference rests on
+    /// (10 + 7)²/(100 + 7) of them.
+    #[test]
+    fn who_answers_most_counts_as_one() {
+        let mut rows = Vec::new();
+        for s in 0..8 {
+            for i in 0..if s == 0 { 100 } else { 10 } {
+                rows.push(Preference {
+                    participant: format!("P{s}"),
+                    first: "a".to_owned(),
+                    second: "b".to_owned(),
+                    choice: match (i + s) % 5 {
+                        0 | 1 => Choice::Second(1.0),
+                        _ => Choice::First(1.0),
+                    },
+                });
+            }
+        }
+        let found = preferences(&rows, false, false);
+        let pair = &found.pairs[&PairName::of("a", "b")];
+        let df = pair.statistic_df.as_ref().unwrap().number().unwrap();
+        assert!((df - (289.0 / 107.0 - 1.0)).abs() < 1e-6, "{df}");
     }
 
     /// Nine participants with tastes of their own and no common preference: any pair was "told apart" in
