@@ -68,6 +68,37 @@ fn what_no_participant_links_cannot_be_told() {
     ]);
 }
 
+/// The only trial of somebody who left, and realizations without a VAF that another group rated.
+#[test]
+fn strays_and_realizations_without_a_vaf_take_no_verdict_away() {
+    let mut random = Numbers::new(3);
+    let mut rows = Vec::new();
+    for s in 0..8 {
+        for m in 0..5 {
+            rows.push((s, m, 1, 2.0 + 0.8 * m as f64 + 0.3 * random.normal()));
+        }
+    }
+    let vaf = |m: usize| (m < 5).then(|| 0.7 + 0.05 * m as f64);
+    rows.push((20, 7, 1, 4.0));
+    let stray = analysis_of(&rating_table(&rows, vaf));
+    for question in [Question::Vaf, Question::Differ, Question::Best] {
+        assert_eq!(
+            finding(&stray, question.clone()).reason(),
+            None,
+            "{question:?}"
+        );
+    }
+    for s in 21..24 {
+        for m in 7..9 {
+            rows.push((s, m, 1, 4.0 + random.normal()));
+        }
+    }
+    let others = analysis_of(&rating_table(&rows, vaf));
+    assert!(finding(&others, Question::Vaf).is_yes());
+    let why = finding(&others, Question::Differ).reason().unwrap();
+    assert!(why.contains("2 sets"), "{why}");
+}
+
 /// Ratings fall by the trial, and everybody has the same order.
 #[test]
 fn an_order_that_all_share_cannot_be_told_from_the_realizations() {
