@@ -7,7 +7,7 @@ use study_analysis::load::Loaded;
 use study_base::apa;
 use study_base::diagnostic::Severity;
 use study_base::text::{Untrusted, counted};
-use study_plan::protocol::{DeviceKind, ModelEntry};
+use study_plan::protocol::{DeviceKind, ModelEntry, Protocol};
 
 /// Arguments of `study check`.
 #[derive(Debug, clap::Args)]
@@ -77,6 +77,31 @@ fn in_words(sensitivity: &Sensitivity) -> String {
     )
 }
 
+/// What the protocol asks of a device before a session.
+fn asked_of_devices(protocol: &Protocol) -> String {
+    let device = &protocol.device;
+    let mut out = String::new();
+    let has_force = matches!(device.kind, DeviceKind::Serial | DeviceKind::Process);
+    if let Some(days) = device.commissioned_within_days {
+        out += &match has_force {
+            true => format!(
+                "note: a session needs a device that passed `study device commission` within {days} days; \
+                 `study device info` says when it did\n"
+            ),
+            false => format!(
+                "note: `commissioned_within_days` asks nothing of a {} device\n",
+                device.kind.as_str()
+            ),
+        };
+    }
+    if let Some(hours) = device.check_within_h.filter(|_| has_force) {
+        out += &format!(
+            "note: a session needs a device that passed `study device check --save` within {hours} h\n"
+        );
+    }
+    out
+}
+
 /// A line for each table that is played, with its certificate and, if `verbose`, its
 /// margins; notes about tables that fail theirs and about samples mounted by hand.
 fn certificates(loaded: &Loaded, report: &Report<'_>, verbose: bool) -> String {
@@ -116,6 +141,7 @@ fn certificates(loaded: &Loaded, report: &Report<'_>, verbose: bool) -> String {
         );
     }
     let protocol = &loaded.protocol;
+    out += &asked_of_devices(protocol);
     let by_hand = |m: &&ModelEntry| protocol.device_of(m) == DeviceKind::Manual;
     let samples = protocol.models.iter().filter(by_hand).count();
     if samples > 0 {

@@ -174,9 +174,8 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     for notice in said {
         console.say(format!("warning: {}", Untrusted(&notice)));
     }
-    let within_h = loaded.protocol.device.check_within_h;
-    let asked = (kind, within_h, args.unchecked);
-    let device_check = record::checked(&*device, &args.results, asked, at.wall, console)?;
+    let asked = record::Asked::of(&loaded.protocol.device, kind, args.unchecked);
+    let device_check = record::examined(&*device, &args.results, asked, at.wall, console)?;
     let device_check = match times {
         1 => device_check,
         _ => Some(hurry::mark(times)),

@@ -24,8 +24,8 @@ each with its line and, where there is one, a suggestion. Paths are relative to 
 folder, so that a study can be copied as a whole. Texts can be in any language and have at most 64 KiB.
 
 \"If absent\" says what a key means that is left out: *required* is an error, a value is the default, and — means
-that the study has no such thing. `[[parts]]`, `[[families]]` and `[[tracks]]` need the format `study-protocol/2`;
-every other key belongs to both formats.
+that the study has no such thing. `[[parts]]`, `[[families]]` and `[[tracks]]` need the format `study-protocol/2`,
+and keys that say so `study-protocol/3`; every other key belongs to all formats.
 
 Changes of the design, of models, limits and rating scales make a new study. Changes of texts, of `[analysis]`, of
 the planned participants, VAFs and covariates can be made while a study runs, with `study amend`.

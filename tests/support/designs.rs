@@ -49,6 +49,7 @@ pub(crate) fn design(models: usize, repetitions: u32, order: Order) -> Protocol 
             uncertified: None,
             rendering: Default::default(),
             check_within_h: None,
+            commissioned_within_days: None,
         },
         trial: TrialRules {
             reference: None,

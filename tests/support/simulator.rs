@@ -65,8 +65,13 @@ impl Simulator {
 
     /// Sends a control command and waits until it is done.
     pub fn control(&mut self, what: &str) {
+        self.ask(what);
+    }
+
+    /// Sends a control command; returns the line with which it answers.
+    pub fn ask(&mut self, what: &str) -> String {
         writeln!(self.stdin, "{what}").unwrap();
-        self.line();
+        self.line()
     }
 }
 

@@ -11,11 +11,13 @@
 
 mod body;
 mod flaw;
+mod free;
 mod wrong;
 
 use body::Body;
 pub use flaw::Flaw;
 use flaw::FlawInjector;
+pub use free::Place;
 use std::time::Duration;
 use study_base::limits::Limits;
 use study_haptics::plant::{HandParameters, Parameters, Probe};
@@ -30,6 +32,8 @@ pub use wrong::{Wrong, WrongLoads};
 pub const MAX_NODES: usize = 1024;
 /// Largest number of points of a path: more than two minutes at 1 kHz.
 pub const MAX_POINTS: usize = 1 << 17;
+/// From stop to stop, mm.
+const STROKE_MM: [f64; 2] = [-20.0, 60.0];
 /// A processor that hangs for this time is reset by its hardware watchdog.
 const HARDWARE_WATCHDOG: Duration = Duration::from_millis(10);
 /// Only this much of a longer idle time is simulated.
@@ -50,6 +54,8 @@ pub struct Options {
     pub watchdog_ms: u16,
     /// Hand and slider.
     pub hand: HandParameters,
+    /// Coulomb friction of a handle that nobody holds, N.
+    pub friction_n: f64,
     /// Resolution of the position, mm.
     pub encoder_mm: f64,
     /// Target that the probe moves in a recording.
@@ -79,6 +85,7 @@ impl Default for Options {
             limits: Limits::new(15.0, 1000.0).expect("positive constants"),
             watchdog_ms: 30,
             hand,
+            friction_n: 0.05,
             encoder_mm: Probe::default().encoder_mm,
             target: Parameters::a(),
             least_mass_kg: -hand.slider_kg,
@@ -257,10 +264,26 @@ impl Firmware {
         self.reboot(at);
     }
 
-    /// In playbacks somebody holds the handle at this place instead of moving it to and
-    /// fro, mm, as at a ruler.
+    /// Somebody brings the handle to this place and holds it there instead of moving it to and
+    /// fro in playbacks, mm, as at a ruler.
     pub fn hold_at(&mut self, x_mm: f64) {
         self.body.hold_at(x_mm);
+    }
+
+    /// From now on nobody holds the handle: it moves as the motor pushes it, between its stops,
+    /// until [`hold_at`](Self::hold_at).
+    pub fn let_go(&mut self) {
+        self.body.let_go();
+    }
+
+    /// A weight or a scale pulls at the free handle, N, positive towards +x.
+    pub fn pull(&mut self, force_n: f64) {
+        self.body.pull(force_n);
+    }
+
+    /// Where the handle is, and where a free one has been.
+    pub fn place(&self) -> Place {
+        self.body.place()
     }
 
     /// Trips, as by a guard, a button or a fault of the drive.
@@ -329,7 +352,7 @@ impl Firmware {
         let drive = self.with_handler(at, |handler, now_ms, out| {
             handler.servo(measured, now_ms, out)
         });
-        self.body.drive(match &self.saboteur {
+        self.body.drive(match &mut self.saboteur {
             Some(saboteur) => saboteur.drive(drive),
             None => drive,
         });
@@ -386,7 +409,7 @@ fn profile(options: &Options) -> Profile {
             velocity_mm_s: options.limits.velocity_mm_s.get(),
             stiffness_n_per_mm: 100.0,
             damping_n_s_per_mm: 0.2,
-            stroke_mm: [-20.0, 60.0],
+            stroke_mm: STROKE_MM,
         },
         servo: match options.wrong {
             Some(how) => how.wrong.servo(told(options)),

@@ -10,10 +10,12 @@
 //!   device side, and [`faults`] the faults that can be injected.
 //! - [`process`] is a controller program of the lab, [`manual`] an experimenter who
 //!   mounts samples.
-//! - [`table`] checks tables before they are sent, [`check`] tests a device against
+//! - [`table`] checks tables before they are sent, [`commission`] has what a person checks of a
+//!   device, [`check`] tests a device against
 //!   `docs/wire.md`, and [`probe`] records with a probe.
 
 pub mod check;
+pub mod commission;
 pub mod faults;
 pub mod firmware;
 pub mod host;

@@ -3,7 +3,9 @@
 //! A device with an invalid table could apply any force. These checks say nothing
 //! about how the table feels or whether it is passive.
 
-use study_haptics::model::{Branch, Realization};
+use std::collections::BTreeMap;
+use study_haptics::model::{Branch, Provenance, Realization, Trained, Units};
+use study_wire::predict::{Direction, Lookup};
 
 /// Why a table cannot be played.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -37,6 +39,37 @@ pub enum TableError {
     Length(&'static str, &'static str, usize, usize),
     #[error("{0} {1} is not a finite number at node {2}")]
     ParameterNotFinite(&'static str, &'static str, usize),
+}
+
+/// A table of forces at some positions and one damping, the same in both directions of motion, as
+/// tests of a device play it.
+pub fn both_ways(
+    id: &str,
+    (x_mm, force_n): (Vec<f64>, Vec<f64>),
+    damping_n_s_per_mm: f64,
+    trained: Trained,
+) -> Realization {
+    let nodes = x_mm.len();
+    let branch = Branch {
+        m_kg: vec![0.0; nodes],
+        b_n_s_per_mm: vec![damping_n_s_per_mm; nodes],
+        k_n_per_mm: vec![0.0; nodes],
+        f0_n: force_n,
+    };
+    Realization {
+        units: Units::Linear,
+        id: id.to_owned(),
+        provenance: Provenance::default(),
+        vaf: BTreeMap::new(),
+        lookup: Lookup::Linear,
+        direction: Direction::Sign,
+        trained,
+        x_mm,
+        positive: branch.clone(),
+        negative: branch,
+        mechanism: None,
+        elements: None,
+    }
 }
 
 /// Checks that the force of a table is defined everywhere.

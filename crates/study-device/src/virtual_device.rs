@@ -119,6 +119,16 @@ impl VirtualDevice {
         self.firmware.held_n()
     }
 
+    /// The device side, whose handle somebody can hold, let go or pull.
+    pub fn firmware(&mut self) -> &mut Firmware {
+        &mut self.firmware
+    }
+
+    /// Trips the device now, as by its emergency switch.
+    pub fn trip(&mut self, fault: Fault) {
+        self.firmware.trip(fault, self.now);
+    }
+
     /// Quality of the link.
     pub fn health(&self) -> &Health {
         self.host.health()

@@ -17,6 +17,7 @@
 //! * [`identify`]: filters, estimators and validation;
 //! * [`model`]: the realization and its model file;
 //! * [`safe_play`]: what an adversary makes of it on a device;
+//! * [`swing`]: what the swing of a free handle tells of its motor;
 //! * [`archive`]: a realization with everything that it rests on, in one file.
 //!
 //! # Units
@@ -43,4 +44,5 @@ pub mod model;
 pub mod plant;
 pub mod recording;
 pub mod safe_play;
+pub mod swing;
 pub mod trajectory;

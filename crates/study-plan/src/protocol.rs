@@ -314,6 +314,9 @@ pub struct DeviceRules {
     /// concerns the laboratory.
     #[serde(skip)]
     pub check_within_h: Option<f64>,
+    /// Days within which the device must have been commissioned. In no fingerprint.
+    #[serde(skip)]
+    pub commissioned_within_days: Option<f64>,
 }
 
 /// `[device.rendering]`: when a playback is right.

@@ -1,7 +1,7 @@
 //! `study device info` and `study device check`.
 
 use super::port::PortConnection;
-use super::record::{Record, RecordKind};
+use super::record::{Record, RecordKind, commissioned_line};
 use super::rendering;
 use super::single_playback::Pace;
 use crate::cli::device_selection::{
@@ -21,6 +21,9 @@ use study_wire::message::{Fault, Identity};
 pub(in crate::cli) struct InfoArgs {
     #[command(flatten)]
     pub(super) address: DeviceAddress,
+    /// Folder of all results, which has the records of its commissionings
+    #[arg(long, value_name = "DIR", default_value = "results")]
+    results: PathBuf,
     /// Print one JSON document
     #[arg(long)]
     pub(super) json: bool,
@@ -66,11 +69,18 @@ pub(in crate::cli) fn info(args: &InfoArgs, console: &mut Console) -> Result<(),
         Failure::device(format!("{address}: {}", Untrusted(&error)))
             .hint("check its power, the baud rate, and that it implements docs/wire.md")
     })?;
+    let tested = Tested {
+        serial: display_name(&device.serial),
+        firmware: Some(display_name(&device.firmware)),
+        simulated: device.flags.simulated,
+    };
+    let commissioned = commissioned(args, &tested);
     if args.json {
         let document = serde_json::json!({
             "format": "study-device-info/1",
             "port": address,
             "device": described(&device),
+            "commissioned": commissioned,
         });
         return console.json(&document);
     }
@@ -101,6 +111,7 @@ pub(in crate::cli) fn info(args: &InfoArgs, console: &mut Console) -> Result<(),
             at_most(f64::from(device.longest_ms) / 1e3, "s"),
         ),
         ("state", device.state.to_string()),
+        ("commissioned", Untrusted(&commissioned).to_string()),
     ];
     if device.fault != Fault::None {
         lines.push(("fault", device.fault.to_string()));
@@ -110,6 +121,12 @@ pub(in crate::cli) fn info(args: &InfoArgs, console: &mut Console) -> Result<(),
 
 pub(super) fn at_most(value: f64, unit: &str) -> String {
     format!("at most {value} {unit}")
+}
+
+/// What is known of its commissionings.
+pub(super) fn commissioned(args: &InfoArgs, tested: &Tested) -> String {
+    let now = chrono::Local::now().fixed_offset();
+    commissioned_line(&args.results, tested, now)
 }
 
 /// The features that a device has.

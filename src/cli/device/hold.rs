@@ -15,9 +15,10 @@ use study_base::limits::Limits;
 use study_device::host::HostSettings;
 use study_device::link::LinkedDevice;
 use study_device::process::ProcessDevice;
+use study_device::table::both_ways;
 use study_device::{Device, Stimulus};
-use study_haptics::model::{Branch, Realization, Trained};
-use study_wire::predict::{Direction, Lookup};
+use study_haptics::model::{Realization, Trained};
+use study_wire::predict::Direction;
 
 /// A line of standard input with this text stalls the loop for a second.
 pub(super) const STALL: &str = "stall";
@@ -99,16 +100,31 @@ pub(super) fn input_lines() -> Receiver<String> {
 }
 
 /// The device, of either kind.
-enum ActiveDevice {
+pub(super) enum ActiveDevice {
     Linked(Box<LinkedDevice>),
     Program(Box<ProcessDevice>),
 }
 
 impl ActiveDevice {
-    fn any(&mut self) -> &mut dyn Device {
+    pub(super) fn any(&mut self) -> &mut dyn Device {
         match self {
             Self::Linked(device) => device.as_mut(),
             Self::Program(device) => device.as_mut(),
+        }
+    }
+
+    pub(super) fn into_any(self) -> Box<dyn Device> {
+        match self {
+            Self::Linked(device) => device,
+            Self::Program(device) => device,
+        }
+    }
+
+    /// Where its stops are, mm, if it tells.
+    pub(super) fn stroke_mm(&self) -> Option<[f64; 2]> {
+        match self {
+            Self::Linked(device) => device.status().device.map(|told| told.stroke_mm),
+            Self::Program(_) => None,
         }
     }
 
@@ -135,27 +151,13 @@ impl ActiveDevice {
 /// A table of 1 N and some damping everywhere.
 fn constant_force() -> Realization {
     let x_mm: Vec<f64> = (0..=7).map(|i| 5.0 * f64::from(i)).collect();
-    let branch = Branch {
-        m_kg: vec![0.0; x_mm.len()],
-        b_n_s_per_mm: vec![0.005; x_mm.len()],
-        k_n_per_mm: vec![0.0; x_mm.len()],
-        f0_n: vec![1.0; x_mm.len()],
+    let trained = Trained {
+        x_mm: [1.5, 33.5],
+        v_mm_s: 138.0,
     };
+    let force_n = vec![1.0; x_mm.len()];
     Realization {
-        id: "push".to_owned(),
-        provenance: Default::default(),
-        vaf: Default::default(),
-        lookup: Lookup::Linear,
         direction: Direction::Play { delta_mm: 0.5 },
-        trained: Trained {
-            x_mm: [1.5, 33.5],
-            v_mm_s: 138.0,
-        },
-        x_mm,
-        positive: branch.clone(),
-        negative: branch,
-        mechanism: None,
-        elements: None,
-        units: study_haptics::model::Units::Linear,
+        ..both_ways("push", (x_mm, force_n), 0.005, trained)
     }
 }

@@ -1,6 +1,8 @@
 //! `study device info --command` and `study device check --command`: controller programs.
 
-use super::check::{CheckArgs, InfoArgs, aligned, at_most, judge_rendering, line, list};
+use super::check::{
+    CheckArgs, InfoArgs, aligned, at_most, commissioned, judge_rendering, line, list,
+};
 use super::record::{Record, RecordKind};
 use super::rendering::{self, Rendered};
 use crate::cli::device_selection::{Tested, WaitDisplay};
@@ -17,6 +19,7 @@ pub(super) fn info(args: &InfoArgs, console: &mut Console) -> Result<(), Failure
     let Some(program) = args.address.open_program(&mut display)? else {
         return Ok(());
     };
+    let commissioned = commissioned(args, &Tested::of(&program));
     let (command, told) = (program.command().join(" "), program.told().clone());
     let device = &told.identity;
     let force_n = device.limits.force_n.get();
@@ -39,6 +42,7 @@ pub(super) fn info(args: &InfoArgs, console: &mut Console) -> Result<(), Failure
                 "loop_hz": device.servo.map(|servo| servo.servo_hz),
                 "watchdog_ms": watchdog_ms,
             },
+            "commissioned": commissioned,
         });
         return console.json(&document);
     }
@@ -73,6 +77,7 @@ pub(super) fn info(args: &InfoArgs, console: &mut Console) -> Result<(), Failure
         ),
     });
     lines.push(("watchdog", format!("{watchdog_ms} ms")));
+    lines.push(("commissioned", Untrusted(&commissioned).to_string()));
     console.out(aligned(&lines))
 }
 

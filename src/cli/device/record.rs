@@ -1,6 +1,7 @@
 //! Records of the tests of a device: `devices/SERIAL/` in the results folder.
 //!
-//! One file for each test, named by its time. A session looks at the last check.
+//! One file for each test, named by its time. A session looks at the last check and at the
+//! commissionings.
 
 use crate::cli::device_selection::{Tested, commissioned};
 use crate::cli::{Console, Failure, Kind};
@@ -8,12 +9,19 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use study_base::text::Untrusted;
 use study_device::Device;
-use study_plan::protocol::DeviceKind;
+use study_device::commission::{Numbers, Side};
+use study_plan::protocol::{DeviceKind, DeviceRules};
 
 /// `study-device-record/1`.
 const FORMAT: &str = "study-device-record/1";
 /// Folder of the records in a results folder.
 const FOLDER: &str = "devices";
+/// A record may be this much ahead of the clock, days.
+const CLOCK_DAYS: f64 = 1.0 / 24.0;
+/// Least share of the force limit of a study that was weighed.
+const WEIGHED: f64 = 0.5;
+/// Longest text about a device in the record of a session, characters.
+const MOST_SAID: usize = 1000;
 
 /// Which test it is of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -74,6 +82,27 @@ impl Record {
         }
     }
 
+    /// Whether a part of the test was failed, and not only left out.
+    fn has_failure(&self) -> bool {
+        let steps = self.parts.get("steps").unwrap_or(&self.parts).as_array();
+        let failed = |step: &serde_json::Value| step.get("outcome").is_some_and(|o| o == "failed");
+        // what cannot be read was not passed
+        !self.pass && steps.is_none_or(|steps| steps.iter().any(failed))
+    }
+
+    /// The largest force that was weighed in both directions, N; those of earlier releases weighed
+    /// one.
+    fn weighed_n(&self) -> Option<f64> {
+        let numbers = self.parts.get("numbers")?.clone();
+        let numbers: Numbers = serde_json::from_value(numbers).ok()?;
+        let largest_n = |side| {
+            let own = numbers.directions.iter().filter(|fit| fit.pushes == side);
+            own.map(|fit| fit.largest_n).reduce(f64::max)
+        };
+        let [one_n, other_n] = Side::BOTH.map(largest_n);
+        Some(one_n?.min(other_n?))
+    }
+
     /// Whether the rendering was judged, and not only the clauses of the wire format.
     fn judged_rendering(&self) -> bool {
         let lines = self
@@ -94,6 +123,12 @@ impl Record {
     }
 }
 
+/// Makes the folder in which a record will be saved, before somebody works for it.
+pub(in crate::cli) fn prepare(results: &Path, serial: &str) -> Result<(), Failure> {
+    let folder = folder(results, serial);
+    std::fs::create_dir_all(&folder).map_err(|e| Failure::file(&folder, &e))
+}
+
 /// The folder of a device; its serial number is text of the device.
 fn folder(results: &Path, serial: &str) -> PathBuf {
     let plain = |c: char| match c {
@@ -104,15 +139,31 @@ fn folder(results: &Path, serial: &str) -> PathBuf {
     results.join(FOLDER).join(name)
 }
 
-/// The last record of a kind; files that are no such records are skipped.
+/// The last record of a kind.
 pub(in crate::cli) fn last(results: &Path, serial: &str, kind: RecordKind) -> Option<Record> {
-    let items = std::fs::read_dir(folder(results, serial)).ok()?;
+    all(results, serial, kind).pop()
+}
+
+/// The records of a kind, by their time; files that are no such records are skipped.
+fn all(results: &Path, serial: &str, kind: RecordKind) -> Vec<Record> {
+    let Ok(items) = std::fs::read_dir(folder(results, serial)) else {
+        return Vec::new();
+    };
     let records = items.flatten().filter_map(|item| {
         let record: Record = serde_json::from_slice(&std::fs::read(item.path()).ok()?).ok()?;
         let own = record.format == FORMAT && record.kind == kind && record.tested.serial == serial;
         own.then_some(record)
     });
-    records.max_by_key(|record| record.at)
+    let mut records: Vec<Record> = records.collect();
+    records.sort_by_key(|record| record.at);
+    records
+}
+
+/// The commissionings of a device, by their time; nothing was measured in those of a simulated one.
+fn commissionings(results: &Path, tested: &Tested) -> Vec<Record> {
+    let mut all = all(results, &tested.serial, RecordKind::Commission);
+    all.retain(|record| record.tested.simulated == tested.simulated);
+    all
 }
 
 /// Why the last check does not count: it failed, is of another firmware or,
@@ -149,11 +200,187 @@ pub(in crate::cli) fn doubt(
     ))
 }
 
+/// Why the commissionings of a device do not speak for it, and whether this holds whatever the
+/// protocol asks. All are by their time.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(in crate::cli) struct CommissionDoubt {
+    /// In words, after the name of the device.
+    pub(in crate::cli) why: String,
+    /// Whether something was found wrong, and not only missing or old.
+    pub(in crate::cli) failed: bool,
+}
+
+/// What a protocol asks of a commissioning.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::cli) struct Within {
+    /// Days within which it was passed.
+    pub(in crate::cli) days: f64,
+    /// Force limit of the study, N.
+    pub(in crate::cli) force_n: f64,
+}
+
+/// What speaks against a device that was commissioned like this; `None` if the last commissioning
+/// was passed with its present firmware, as the protocol asks, and none failed after it.
+pub(in crate::cli) fn commission_doubt(
+    all: &[Record],
+    firmware: Option<&str>,
+    within: Option<Within>,
+    now: chrono::DateTime<chrono::FixedOffset>,
+) -> Option<CommissionDoubt> {
+    let doubt = |failed: bool, why: String| Some(CommissionDoubt { why, failed });
+    let day = |record: &Record| record.at.format("%Y-%m-%d %H:%M").to_string();
+    let passed = all.iter().rposition(|record| record.pass);
+    let since = passed.map_or(0, |at| at + 1);
+    if let Some(failed) = all[since..].iter().rev().find(|r| r.has_failure()) {
+        let why = format!(
+            "its commissioning of {} FAILED: {}",
+            day(failed),
+            failed.summary
+        );
+        return doubt(true, why);
+    }
+    let Some(last) = passed.map(|at| &all[at]) else {
+        let why = match all.last() {
+            None => "it was never commissioned".to_owned(),
+            Some(open) => format!(
+                "in its commissioning of {} steps were left out: {}",
+                day(open),
+                open.summary
+            ),
+        };
+        return doubt(false, why);
+    };
+    let its_last = format!("its last commissioning, of {},", day(last));
+    let said = |why: String| doubt(false, format!("{its_last} {why}"));
+    if last.tested.firmware.as_deref() != firmware {
+        return said("was of another firmware version".to_owned());
+    }
+    let Some(weighed_n) = last.weighed_n() else {
+        return said("was of an earlier release, which weighed one direction only".to_owned());
+    };
+    let Within { days, force_n } = within?;
+    let age_days = (now - last.at).num_seconds() as f64 / 86_400.0;
+    if age_days > days {
+        return said(format!(
+            "is older than the {days} days that the protocol allows"
+        ));
+    }
+    if age_days < -CLOCK_DAYS {
+        return said("is of a time to come: a clock is wrong".to_owned());
+    }
+    if weighed_n < WEIGHED * force_n {
+        return said(format!(
+            "weighed no more than {weighed_n:.1} N, and the protocol allows {force_n:.1} N: at least half is needed"
+        ));
+    }
+    None
+}
+
+/// What is known of the commissionings of a device, in a line for people.
+pub(in crate::cli) fn commissioned_line(
+    results: &Path,
+    tested: &Tested,
+    now: chrono::DateTime<chrono::FixedOffset>,
+) -> String {
+    let all = commissionings(results, tested);
+    match commission_doubt(&all, tested.firmware.as_deref(), None, now) {
+        Some(doubt) => doubt.why,
+        None => all
+            .iter()
+            .rev()
+            .find(|r| r.pass)
+            .map_or_else(String::new, |last| {
+                format!("passed on {}", last.at.format("%Y-%m-%d %H:%M"))
+            }),
+    }
+}
+
+/// What is asked of a device before a session.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::cli) struct Asked {
+    /// Its kind.
+    pub(in crate::cli) kind: DeviceKind,
+    /// `[device] check_within_h`.
+    pub(in crate::cli) check_within_h: Option<f64>,
+    /// `[device] commissioned_within_days`, with the force limit.
+    pub(in crate::cli) commissioned: Option<Within>,
+    /// Whether the session goes on although the device does not satisfy this.
+    pub(in crate::cli) unchecked: bool,
+}
+
+impl Asked {
+    /// What a protocol asks of a device of this kind.
+    pub(in crate::cli) fn of(rules: &DeviceRules, kind: DeviceKind, unchecked: bool) -> Self {
+        Self {
+            kind,
+            check_within_h: rules.check_within_h,
+            commissioned: (rules.commissioned_within_days).map(|days| Within {
+                days,
+                force_n: rules.limits.force_n.get(),
+            }),
+            unchecked,
+        }
+    }
+}
+
+/// What the session records of check and commissioning of a device; a failed commissioning is
+/// said in any case.
+///
+/// # Errors
+/// [`Failure`] if either does not count, and the user did not give `--unchecked`.
+pub(in crate::cli) fn examined(
+    device: &dyn Device,
+    results: &Path,
+    asked: Asked,
+    now: chrono::DateTime<chrono::FixedOffset>,
+    console: &mut Console,
+) -> Result<Option<String>, Failure> {
+    let within_h = asked.check_within_h;
+    let of_check = (asked.kind, within_h, asked.unchecked);
+    let mut said = checked(device, results, of_check, now, console)?;
+    if matches!(asked.kind, DeviceKind::Simulated | DeviceKind::Manual) {
+        return Ok(said);
+    }
+    let tested = Tested::of(device);
+    let all = commissionings(results, &tested);
+    let within = asked.commissioned;
+    let doubt = commission_doubt(&all, tested.firmware.as_deref(), within, now);
+    let serial = Untrusted(&tested.serial);
+    let mut more = |text: String| {
+        said = Some(match said.take() {
+            Some(said) => format!("{said}; {text}"),
+            None => text,
+        });
+    };
+    match doubt {
+        None => {
+            let passed = all.iter().rev().find(|record| record.pass);
+            more(passed.map_or_else(String::new, |last| format!("{}: passed", last.id)));
+        }
+        Some(doubt) if within.is_some() && !asked.unchecked => {
+            return Err(Failure::device(format!("{serial}: {}", doubt.why)).hint(
+                "`study device commission --port PORT` commissions it, with a scale and a ruler, in some minutes; \
+                 with --unchecked the session goes on, and its records say so",
+            ));
+        }
+        Some(doubt) if within.is_some() || doubt.failed => {
+            console.say(format!("warning: {serial}: {}", Untrusted(&doubt.why)));
+            more(match within {
+                Some(_) => format!("not commissioned, by choice: {}", doubt.why),
+                None => doubt.why,
+            });
+        }
+        Some(_) => {}
+    }
+    // It is recorded in every session, so its length is limited.
+    Ok(said.map(|said| said.chars().take(MOST_SAID).collect()))
+}
+
 /// What the session records of the last check of a device of this kind.
 ///
 /// # Errors
 /// [`Failure`] if the check does not count, and the user did not give `--unchecked`.
-pub(in crate::cli) fn checked(
+fn checked(
     device: &dyn Device,
     results: &Path,
     (kind, within_h, unchecked): (DeviceKind, Option<f64>, bool),
@@ -220,6 +447,98 @@ mod tests {
         assert_eq!(last(home.path(), "A/1", RecordKind::Commission), None);
         // The same folder, but another device.
         assert_eq!(last(home.path(), "A.1", RecordKind::Check), None);
+    }
+
+    /// A commissioning some days ago.
+    fn commissioning(days: i64, pass: bool, outcome: &str) -> Record {
+        let side = serde_json::json!({ "pushes": "+x", "forces": 3, "gain": 1.0, "gain_tolerance": 0.01,
+            "offset_n": 0.0, "saturation_n": null, "largest_n": 12.0 });
+        let mut other = side.clone();
+        other["pushes"] = "-x".into();
+        let numbers = Numbers::default();
+        let mut numbers = serde_json::to_value(numbers).unwrap();
+        numbers["directions"] = serde_json::json!([side, other]);
+        let mut made = record(pass);
+        made.kind = RecordKind::Commission;
+        made.at -= chrono::Duration::days(days);
+        made.parts = serde_json::json!({
+            "steps": [{ "what": "ruler", "outcome": outcome }], "numbers": numbers,
+        });
+        made
+    }
+
+    #[test]
+    fn a_commissioning_speaks_for_a_device_only_if_it_passed_lately_and_none_failed_since() {
+        let passed = |days| commissioning(days, true, "passed");
+        let failed = |days| commissioning(days, false, "failed");
+        let open = |days| commissioning(days, false, "not-done");
+        let now = record(true).at;
+        let of = |all: &[Record], firmware: &str, days: Option<f64>| {
+            let within = days.map(|days| Within {
+                days,
+                force_n: 15.0,
+            });
+            commission_doubt(all, Some(firmware), within, now)
+        };
+        assert_eq!(of(&[passed(5)], "f1", Some(30.0)), None);
+        assert_eq!(of(&[failed(9), passed(5)], "f1", Some(30.0)), None);
+        // steps that were left out later take nothing back
+        assert_eq!(of(&[passed(5), open(2)], "f1", Some(30.0)), None);
+        for (all, firmware, within, is_failed, why) in [
+            (vec![], "f1", Some(30.0), false, "was never commissioned"),
+            (
+                vec![open(1)],
+                "f1",
+                Some(30.0),
+                false,
+                "steps were left out",
+            ),
+            (
+                vec![passed(31)],
+                "f1",
+                Some(30.0),
+                false,
+                "older than the 30 days",
+            ),
+            (vec![passed(5)], "f2", Some(30.0), false, "another firmware"),
+            (vec![passed(5), failed(2)], "f1", None, true, "FAILED"),
+            (
+                vec![passed(5), failed(2), open(1)],
+                "f1",
+                Some(30.0),
+                true,
+                "FAILED",
+            ),
+        ] {
+            let doubt = of(&all, firmware, within).unwrap();
+            assert!(doubt.why.contains(why), "{why}: {doubt:?}");
+            assert_eq!(doubt.failed, is_failed, "{doubt:?}");
+        }
+        // what weighed one side or too little, or is of a time to come
+        let mut one_side = passed(1);
+        one_side.parts["numbers"]["directions"][1]["pushes"] = "+x".into();
+        let mut too_little = passed(1);
+        too_little.parts["numbers"]["directions"][1]["largest_n"] = 7.4.into();
+        for (made, why) in [
+            (one_side, "one direction only"),
+            (too_little.clone(), "weighed no more than 7.4 N"),
+            (passed(-1), "a time to come"),
+        ] {
+            let doubt = of(&[made], "f1", Some(30.0)).unwrap();
+            assert!(doubt.why.contains(why), "{why}: {doubt:?}");
+        }
+        // which counts where the protocol asks for nothing
+        assert_eq!(of(&[too_little], "f1", None), None);
+        // That of an earlier release has sentences and weighed one direction.
+        let mut old = passed(1);
+        old.parts =
+            serde_json::json!([{ "what": "weight", "seen": "gain 1.00", "outcome": "passed" }]);
+        let doubt = of(std::slice::from_ref(&old), "f1", Some(30.0)).unwrap();
+        assert!(doubt.why.contains("earlier release"), "{doubt:?}");
+        old.pass = false;
+        old.parts =
+            serde_json::json!([{ "what": "weight", "seen": "gain 0.50", "outcome": "failed" }]);
+        assert!(of(&[old], "f1", None).unwrap().failed);
     }
 
     #[test]

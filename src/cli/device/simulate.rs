@@ -92,7 +92,7 @@ fn wrong(given: &str) -> Result<WrongLoads, ArgumentError> {
 }
 
 /// Commands on standard input, one per line.
-const CONTROLS: &str = "unplug, plug, reset, trip, stall MS, hold MM, quit";
+const CONTROLS: &str = "unplug, plug, reset, trip, stall MS, hold MM, free, pull N, where, quit";
 /// Additional delay of a frame with the fault `delay`.
 const EXTRA_DELAY: Duration = Duration::from_millis(20);
 
@@ -134,6 +134,8 @@ fn noise(faults: &[FaultArg]) -> Noise {
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Command {
     Control(Control),
+    /// Prints where the handle is, where it has been, how often at a stop, and the force.
+    Where,
     Quit,
 }
 
@@ -152,6 +154,12 @@ fn command(line: &str) -> Option<Command> {
             let x_mm = words.next()?.parse().ok().filter(|x: &f64| x.is_finite())?;
             Command::Control(Control::Hold(x_mm))
         }
+        "free" => Command::Control(Control::LetGo),
+        "pull" => {
+            let force_n = words.next()?.parse().ok().filter(|n: &f64| n.is_finite())?;
+            Command::Control(Control::Pull(force_n))
+        }
+        "where" => Command::Where,
         "quit" => Command::Quit,
         _ => return None,
     };
@@ -196,6 +204,14 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
         while let Ok(line) = lines.try_recv() {
             match command(&line) {
                 Some(Command::Quit) => ended = true,
+                Some(Command::Where) => {
+                    let at = simulator.firmware().place();
+                    let [low, high] = at.range_mm;
+                    console.out(format!(
+                        "{:.3} mm, {low:.3} to {high:.3} mm, {} stops, {:.3} N\n",
+                        at.x_mm, at.stops, at.force_n
+                    ))?;
+                }
                 Some(Command::Control(what)) => {
                     simulator.control(what).map_err(failed)?;
                     // Confirms that the command was executed.

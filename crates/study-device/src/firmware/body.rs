@@ -1,6 +1,7 @@
 //! The simulated mechanics: a handle with its sensors, and a hand or a probe.
 
-use super::{Drive, Measured, Options};
+use super::free::{Bearing, Free, Place};
+use super::{Drive, Measured, Options, STROKE_MM};
 use study_base::rng::Stream;
 use study_haptics::plant::{DT_S, Hand, HandParameters, Parameters, Probe, Target};
 use study_wire::estimate::Estimator;
@@ -30,8 +31,7 @@ pub(super) struct Body {
     /// Force of the motor, N.
     force_n: f64,
     holder: Holder,
-    /// Where somebody holds the handle in a playback.
-    held_at: Option<f64>,
+    bearing: Bearing,
 }
 
 /// What moves the handle.
@@ -44,6 +44,8 @@ enum Holder {
     Hand { hand: Box<Hand>, left: Option<u32> },
     /// Somebody who brings the handle to a place and holds it there.
     Guided { motion: Motion, to_mm: f64 },
+    /// Nobody, and the handle moves as it is pushed, also without a playback.
+    Free(Box<Free>),
     /// A probe on its path.
     Probe(Box<ProbeContact>),
 }
@@ -79,16 +81,49 @@ impl Body {
             probe,
             force_n: 0.0,
             holder: Holder::Nobody { x_mm: MIDDLE_MM },
-            held_at: None,
+            bearing: Bearing {
+                mass_kg: options.hand.slider_kg,
+                damping_n_s_per_mm: options.hand.bearing_n_s_per_mm,
+                friction_n: options.friction_n,
+                stops_mm: STROKE_MM,
+            },
+        }
+    }
+
+    /// See [`Firmware::let_go`](super::Firmware::let_go).
+    pub(super) fn let_go(&mut self) {
+        let x_mm = self.motion().x_mm;
+        self.holder = Holder::Free(Box::new(Free::new(self.bearing, x_mm)));
+    }
+
+    /// See [`Firmware::pull`](super::Firmware::pull).
+    pub(super) fn pull(&mut self, force_n: f64) {
+        if !matches!(self.holder, Holder::Free(_)) {
+            self.let_go();
+        }
+        if let Holder::Free(free) = &mut self.holder {
+            free.pull(force_n);
+        }
+    }
+
+    /// Where the handle is.
+    pub(super) fn place(&self) -> Place {
+        match &self.holder {
+            Holder::Free(free) => free.place(self.force_n),
+            _ => Free::new(self.bearing, self.motion().x_mm).place(self.force_n),
         }
     }
 
     /// See [`Firmware::hold_at`](super::Firmware::hold_at).
     pub(super) fn hold_at(&mut self, x_mm: f64) {
-        self.held_at = Some(x_mm);
-        if let Holder::Guided { to_mm, .. } = &mut self.holder {
-            *to_mm = x_mm;
-        }
+        let motion = match &self.holder {
+            Holder::Guided { motion, .. } => *motion,
+            _ => Motion::at_rest(self.motion().x_mm),
+        };
+        self.holder = Holder::Guided {
+            motion,
+            to_mm: x_mm,
+        };
     }
 
     pub(super) fn force_n(&self) -> f64 {
@@ -97,7 +132,12 @@ impl Body {
 
     /// Whether a hand or a probe moves the handle.
     pub(super) fn moving(&self) -> bool {
-        !matches!(self.holder, Holder::Nobody { .. })
+        match &self.holder {
+            Holder::Nobody { .. } => false,
+            Holder::Free(free) => free.moving(),
+            Holder::Guided { motion, to_mm } => motion.x_mm != *to_mm,
+            _ => true,
+        }
     }
 
     /// Whether a hand or a probe holds the handle for the current playback.
@@ -105,7 +145,7 @@ impl Body {
         match &self.holder {
             Holder::Nobody { .. } => false,
             Holder::Hand { left, .. } => left.is_none(),
-            Holder::Guided { .. } | Holder::Probe(_) => true,
+            Holder::Guided { .. } | Holder::Free(_) | Holder::Probe(_) => true,
         }
     }
 
@@ -114,20 +154,15 @@ impl Body {
     pub(super) fn take(&mut self, range_mm: Option<[f64; 2]>, upload: u32) {
         let upload = upload.to_string();
         let stream = |name| Stream::new(self.seed, &["device", name, &upload]);
-        let here = Motion::at_rest(self.motion().x_mm);
-        self.holder = match (range_mm, self.held_at) {
-            (Some(_), Some(to_mm)) => Holder::Guided {
-                motion: here,
-                to_mm,
-            },
-            (Some([low, high]), None) => {
+        self.holder = match range_mm {
+            Some([low, high]) => {
                 let hand = Hand::new(self.hand, ends(low, high), stream("hand"));
                 Holder::Hand {
                     hand: Box::new(hand),
                     left: None,
                 }
             }
-            (None, _) => {
+            None => {
                 let x_mm = self.motion().x_mm;
                 Holder::Probe(Box::new(ProbeContact {
                     target: Target::new(self.target.clone(), x_mm).ok(),
@@ -147,13 +182,9 @@ impl Body {
     pub(super) fn release(&mut self) {
         self.force_n = 0.0;
         match &mut self.holder {
-            Holder::Nobody { .. } => {}
+            Holder::Nobody { .. } | Holder::Free(_) | Holder::Guided { .. } => {}
             Holder::Hand { left, .. } => {
                 left.get_or_insert((RELEASE_S * self.servo_hz) as u32);
-            }
-            Holder::Guided { motion, .. } => {
-                let x_mm = motion.x_mm;
-                self.rest(x_mm);
             }
             Holder::Probe(contact) => {
                 let x_mm = contact.motion.x_mm;
@@ -172,6 +203,7 @@ impl Body {
             Holder::Nobody { x_mm } => Motion::at_rest(*x_mm),
             Holder::Hand { hand, .. } => hand.motion(),
             Holder::Guided { motion, .. } => *motion,
+            Holder::Free(free) => free.motion,
             Holder::Probe(contact) => contact.motion,
         }
     }
@@ -235,6 +267,7 @@ impl Body {
                     a_m_s2: 0.0,
                 };
             }
+            Holder::Free(free) => free.step(self.force_n, period_s),
             Holder::Probe(contact) => contact.pass(period_s),
         }
     }

@@ -139,6 +139,9 @@ wrongs! {
     ShiftedPosition "shifted-position" "the position is 3 mm off, everywhere: only a ruler shows it";
     Mirrored "mirrored" "position and motor are the wrong way round: only a ruler shows it";
     WeakMotor "weak-motor" "the motor gives half of the force that is reported: only a weight shows it";
+    WeakMotorBackwards "weak-motor-backwards" "the motor gives half of a force towards +x: only a weight shows it";
+    SaturatedMotor "saturated-motor" "the motor gives at most 9 N, 0.6 of its limit: only a weight shows it";
+    LateMotor "late-motor" "the motor gives each force 20 ms late: only a swing shows it";
 }
 
 impl Wrong {
@@ -158,7 +161,13 @@ impl Wrong {
     pub fn is_physical(self) -> bool {
         matches!(
             self,
-            Self::HalfPosition | Self::ShiftedPosition | Self::Mirrored | Self::WeakMotor
+            Self::HalfPosition
+                | Self::ShiftedPosition
+                | Self::Mirrored
+                | Self::WeakMotor
+                | Self::WeakMotorBackwards
+                | Self::SaturatedMotor
+                | Self::LateMotor
         )
     }
 

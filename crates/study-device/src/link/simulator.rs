@@ -58,8 +58,12 @@ pub enum Control {
     Trip,
     /// Stops the device's processor for a time.
     Stall(Duration),
-    /// From the next playback on somebody holds the handle at this place, mm.
+    /// Somebody brings the handle to this place and holds it there, mm.
     Hold(f64),
+    /// Nobody holds the handle: it moves as the motor pushes it.
+    LetGo,
+    /// A weight or a scale pulls at the free handle, N, positive towards +x.
+    Pull(f64),
 }
 
 /// Timing of the simulator.
@@ -166,6 +170,8 @@ impl Simulator {
             Control::Trip => self.firmware.trip(Fault::External, self.now),
             Control::Stall(lasting) => self.firmware.stall(self.now, lasting),
             Control::Hold(x_mm) => self.firmware.hold_at(x_mm),
+            Control::LetGo => self.firmware.let_go(),
+            Control::Pull(force_n) => self.firmware.pull(force_n),
         }
         Ok(())
     }

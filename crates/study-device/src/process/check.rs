@@ -9,10 +9,10 @@ mod talk;
 use super::hello::Told;
 use crate::DeviceError;
 use crate::check::Verdict;
+use crate::table::both_ways;
 use std::time::Duration;
-use study_haptics::model::{Branch, Provenance, Realization, Trained, Units};
+use study_haptics::model::{Realization, Trained};
 use study_session::outcome::Sample;
-use study_wire::predict::{Direction, Lookup};
 use talk::{Failed, Talk};
 
 /// Largest force of the test, N.
@@ -160,30 +160,12 @@ pub fn clauses(
 /// A constant force over the middle of the stroke.
 fn push(talk: &Talk, force_n: f64) -> Realization {
     let middle_mm = middle_mm(&talk.told);
-    let x_mm = vec![middle_mm - REACH_MM, middle_mm + REACH_MM];
-    let branch = Branch {
-        m_kg: vec![0.0; 2],
-        b_n_s_per_mm: vec![0.0; 2],
-        k_n_per_mm: vec![0.0; 2],
-        f0_n: vec![force_n; 2],
+    let ends_mm = [middle_mm - REACH_MM, middle_mm + REACH_MM];
+    let trained = Trained {
+        x_mm: ends_mm,
+        v_mm_s: 300.0,
     };
-    Realization {
-        units: Units::Linear,
-        id: "check".to_owned(),
-        provenance: Provenance::default(),
-        vaf: std::collections::BTreeMap::new(),
-        lookup: Lookup::Linear,
-        direction: Direction::Sign,
-        trained: Trained {
-            x_mm: [x_mm[0], x_mm[1]],
-            v_mm_s: 300.0,
-        },
-        x_mm,
-        positive: branch.clone(),
-        negative: branch,
-        mechanism: None,
-        elements: None,
-    }
+    both_ways("check", (ends_mm.to_vec(), vec![force_n; 2]), 0.0, trained)
 }
 
 fn greatest_n(samples: &[Sample]) -> f64 {

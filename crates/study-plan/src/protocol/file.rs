@@ -109,8 +109,9 @@ const FORMATS: &[Word] = &[
 const OF_FORMAT_2: [&str; 5] = ["parts", "families", "tracks", "groups", "sessions"];
 
 /// Keys that need [`FORMAT_3`], without the places in lists.
-pub const OF_FORMAT_3: [&str; 3] = [
+pub const OF_FORMAT_3: [&str; 4] = [
     "design.order_version",
+    "device.commissioned_within_days",
     "tracks.relative",
     "tracks.condition",
 ];

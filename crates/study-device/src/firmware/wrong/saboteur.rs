@@ -35,6 +35,8 @@ pub(in crate::firmware) struct Saboteur {
     /// Commanded forces of the last samples, µN, with their periods.
     forces: VecDeque<(u32, i32)>,
     held: Option<TelemetrySample>,
+    /// Forces that the motor has not given yet, N.
+    late_n: VecDeque<f64>,
     /// What its sensor measures.
     felt: Felt,
     /// Since when the handle rests, s.
@@ -44,6 +46,9 @@ pub(in crate::firmware) struct Saboteur {
     turned_mm: Option<f64>,
 }
 
+/// Largest force of a motor that saturates, N, and the delay of a late one, s.
+const SATURATED_N: f64 = 9.0;
+const LATE_MOTOR_S: f64 = 0.02;
 /// Servo periods of the late position and speed: 30 ms at 4 kHz.
 const LATE_PERIODS: usize = 120;
 /// Sum of a position and its mirror image, mm: the handle rests in the middle.
@@ -68,6 +73,7 @@ impl Saboteur {
             periods: 0,
             forces: VecDeque::new(),
             held: None,
+            late_n: VecDeque::new(),
             felt: Felt::default(),
             rests_s: None,
             side: 1.0,
@@ -339,8 +345,22 @@ impl Saboteur {
     }
 
     /// What the motor does.
-    pub(in crate::firmware) fn drive(&self, drive: Drive) -> Drive {
+    pub(in crate::firmware) fn drive(&mut self, drive: Drive) -> Drive {
         match (self.wrong(), drive) {
+            // F > 0 pushes towards −x
+            (Some(Wrong::WeakMotorBackwards), Drive::Force(force_n)) if force_n < 0.0 => {
+                Drive::Force(0.5 * force_n)
+            }
+            (Some(Wrong::SaturatedMotor), Drive::Force(force_n)) => {
+                Drive::Force(force_n.clamp(-SATURATED_N, SATURATED_N))
+            }
+            (Some(Wrong::LateMotor), Drive::Force(force_n)) => {
+                self.late_n.push_back(force_n);
+                let periods = (LATE_MOTOR_S * self.told.servo_hz) as usize;
+                let due = self.late_n.len() > periods;
+                let now_n = if due { self.late_n.pop_front() } else { None };
+                Drive::Force(now_n.unwrap_or(0.0))
+            }
             (Some(Wrong::WeakMotor), Drive::Force(force_n)) => Drive::Force(0.5 * force_n),
             (Some(Wrong::Mirrored), Drive::Force(force_n)) => Drive::Force(-force_n),
             _ => drive,

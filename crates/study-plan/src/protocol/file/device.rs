@@ -25,6 +25,10 @@ pub(super) const DEVICE: &[Key] = keys! {
     /// Hours within which `study device check --save` must have passed on the device. A session
     /// on another device is refused unless `study run --unchecked` says that it is meant.
     "check_within_h": Kind::positive("h"), "24.0";
+    /// Days within which `study device commission` must have passed on the device, with its present
+    /// firmware. A session on another device is refused, and also if a later commissioning failed,
+    /// unless `study run --unchecked` says that it is meant. Needs the format `study-protocol/3`.
+    "commissioned_within_days": Kind::positive("days"), "30.0";
 };
 
 const RENDERING: &[Key] = keys! {
@@ -99,6 +103,7 @@ pub(super) fn read(mut section: Section<'_, '_>) -> Option<DeviceRules> {
         );
     }
     let check_within_h = section.number("check_within_h");
+    let commissioned_within_days = section.number("commissioned_within_days");
     Some(DeviceRules {
         kind: kind?,
         limits: match limits {
@@ -111,6 +116,7 @@ pub(super) fn read(mut section: Section<'_, '_>) -> Option<DeviceRules> {
         lever_mm,
         rendering: rendering?,
         check_within_h,
+        commissioned_within_days,
     })
 }
 
