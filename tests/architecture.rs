@@ -61,10 +61,11 @@ model: wire
 archive: identify model recording
 family: model wire
 safe_play: model wire
+swing:
 trajectory: wire
 plant: trajectory wire
 identify: model recording wire
-device: outcome model plant wire
+device: outcome model plant swing wire
 rater: protocol model plant wire
 rehearsal: analyze device load protocol rater runner store
 runner: session device store identify outcome protocol rendering model rater safe_play wire

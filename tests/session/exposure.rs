@@ -89,6 +89,7 @@ fn a_fixed_exposure_is_exact_to_twenty_milliseconds() {
         device_kind: DeviceKind::Simulated,
         device: Box::new(VirtualDevice::new(options)),
         device_check: None,
+        self_weighed: None,
         clock: Box::new(clock.clone()),
         threaded: false,
     };

@@ -109,9 +109,10 @@ const FORMATS: &[Word] = &[
 const OF_FORMAT_2: [&str; 5] = ["parts", "families", "tracks", "groups", "sessions"];
 
 /// Keys that need [`FORMAT_3`], without the places in lists.
-pub const OF_FORMAT_3: [&str; 4] = [
+pub const OF_FORMAT_3: [&str; 5] = [
     "design.order_version",
     "device.commissioned_within_days",
+    "device.self_weigh",
     "tracks.relative",
     "tracks.condition",
 ];

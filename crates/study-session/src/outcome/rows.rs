@@ -182,6 +182,7 @@ study_base::named! {
         Resume = "resume",
         State = "state",
         Reveal = "reveal",
+        SelfWeighed = "self-weighed",
     }
 }
 
@@ -198,6 +199,7 @@ impl AttemptEvent {
             Event::Reopened { .. } => Self::Resume,
             Event::StateSet { .. } => Self::State,
             Event::Revealed { .. } => Self::Reveal,
+            Event::SelfWeighed(_) => Self::SelfWeighed,
             _ => return None,
         })
     }
