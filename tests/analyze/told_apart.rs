@@ -78,7 +78,7 @@ fn strays_and_realizations_without_a_vaf_take_no_verdict_away() {
             rows.push((s, m, 1, 2.0 + 0.8 * m as f64 + 0.3 * random.normal()));
         }
     }
-    let vaf = |m: usize| (m < 5).then(|| 0.7 + 0.05 * m as f64);
+    let vaf = |m: usize| (m < 5).then_some(0.7 + 0.05 * m as f64);
     rows.push((20, 7, 1, 4.0));
     let stray = analysis_of(&rating_table(&rows, vaf));
     for question in [Question::Vaf, Question::Differ, Question::Best] {
