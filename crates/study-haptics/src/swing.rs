@@ -19,17 +19,18 @@
 //! ```
 //! use study_haptics::swing::{Point, estimate};
 //!
-//! // 0.5 kg on 100 N/m, without losses: x = 10 cos ωt from its rest.
-//! let omega = (100.0_f64 / 0.5).sqrt();
-//! let points: Vec<Point> = (0..1500)
-//!     .map(|i| {
+//! // 0.5 kg on 100 and on 300 N/m, without losses: x = 10 cos ωt from its rest.
+//! let swing = |n_per_mm: f64| -> Vec<Point> {
+//!     let omega = (1e3 * n_per_mm / 0.5).sqrt();
+//!     let sample = |i| {
 //!         let t_s = 1e-3 * f64::from(i);
 //!         let x_mm = 10.0 * (omega * t_s).cos();
-//!         Point { t_s, x_mm, command_n: 0.1 * x_mm }
-//!     })
-//!     .collect();
-//! let swing = estimate(&[&points])?;
-//! assert!((swing.apparent_kg - 0.5).abs() < 1e-3);
+//!         Point { t_s, x_mm, command_n: n_per_mm * x_mm }
+//!     };
+//!     (0..1500).map(sample).collect()
+//! };
+//! let found = estimate(&[&swing(0.1), &swing(0.3)])?;
+//! assert!((found.apparent_kg - 0.5).abs() < 1e-3, "{found:?}");
 //! # Ok::<(), study_haptics::swing::NoSwing>(())
 //! ```
 
