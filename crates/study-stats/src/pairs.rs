@@ -349,6 +349,7 @@ pub fn abilities(
     let vectors: Vec<Vec<f64>> = (0..items).map(|i| ability(i, items, size)).collect();
     let effect = |place: usize| Effect::new(found.at[place], covariance.get(place, place));
     let (deviance, cells) = deviance(&rows, comparisons, model.link, &found.at);
+    let clusters = by_cluster(&rows, model.link, &found.at);
     Ok(Abilities {
         abilities: vectors.iter().map(|v| dot(v, &found.at)).collect(),
         ses: (vectors.iter())
@@ -359,8 +360,8 @@ pub fn abilities(
         deviance,
         df: (cells * (1 + usize::from(with_ties))).saturating_sub(size),
         model,
-        clustered: sandwich(&rows, model.link, &found.at, &factor),
-        information: information(&rows, model.link, &found.at),
+        clustered: sandwich(&clusters, &factor),
+        information: (clusters.iter()).map(|own| own.hessian.negated()).collect(),
         covariance: Covariance(covariance),
     })
 }
@@ -378,28 +379,23 @@ fn inverse(factor: &Cholesky, size: usize) -> SymmetricMatrix {
     inverse
 }
 
-/// V·(Σ s sᵀ)·V over the clusters.
-fn sandwich(rows: &[Row], link: Link, at: &[f64], factor: &Cholesky) -> Option<SymmetricMatrix> {
-    let clusters = rows.iter().map(|r| r.cluster + 1).max()?;
-    let mut scores = vec![Evaluation::zero(at.len()); clusters];
-    for row in rows {
-        row.add(link, at, &mut scores[row.cluster]);
-    }
-    let mut sandwich = SymmetricMatrix::zero(at.len());
-    for score in &scores {
-        sandwich.add_outer(1.0, &factor.solve(&score.gradient));
-    }
-    (clusters > 1).then_some(sandwich)
-}
-
-/// The information of each cluster.
-fn information(rows: &[Row], link: Link, at: &[f64]) -> Vec<SymmetricMatrix> {
+/// The derivatives of the likelihood of each cluster.
+fn by_cluster(rows: &[Row], link: Link, at: &[f64]) -> Vec<Evaluation> {
     let clusters = rows.iter().map(|r| r.cluster + 1).max().unwrap_or(0);
     let mut all = vec![Evaluation::zero(at.len()); clusters];
     for row in rows {
         row.add(link, at, &mut all[row.cluster]);
     }
-    all.into_iter().map(|own| own.hessian.negated()).collect()
+    all
+}
+
+/// V·(Σ s sᵀ)·V over the clusters; `None` with one.
+fn sandwich(clusters: &[Evaluation], factor: &Cholesky) -> Option<SymmetricMatrix> {
+    let mut sandwich = SymmetricMatrix::zero(clusters.first()?.gradient.len());
+    for own in clusters {
+        sandwich.add_outer(1.0, &factor.solve(&own.gradient));
+    }
+    (clusters.len() > 1).then_some(sandwich)
 }
 
 /// The deviance of the pairs in each order, added up, and their number.

@@ -54,15 +54,14 @@ pub struct Within {
     pub effect: Option<ContrastF>,
     /// Variance of a cell mean about the model, and its degrees of freedom.
     pub error: Option<(f64, f64)>,
-    /// How unlike the design makes the precision of the differences between linked realizations: the largest
-    /// variance over the smallest, if a cell of n ratings has the variance 1 + 1/n. 1 in a balanced design.
-    pub precision_ratio: f64,
     /// Effects, 0 for the reference of each set.
     effects: Vec<f64>,
     /// Their covariance over the variance of a cell mean.
     unit: Matrix,
     /// Their covariance, by the variance of each cell, which depends on how often it was rated.
     covariance: Option<Matrix>,
+    /// The same if a cell of n ratings has the variance 1 + 1/n: what the design says, whatever the ratings are.
+    of_design: Matrix,
 }
 
 /// The cells of one subject: realization as a position, mean, ratings.
@@ -89,7 +88,10 @@ impl Within {
         let subjects: Vec<Own> = (cells.chunk_by(|a, b| a.subject == b.subject))
             .map(|own| own.iter().map(|c| (place(c), c.mean, c.n)).collect())
             .collect();
-        let sets = linked(&subjects, k);
+        let rated: Vec<Vec<usize>> = (subjects.iter())
+            .map(|own| own.iter().map(|c| c.0).collect())
+            .collect();
+        let sets = linked_sets(&rated, k);
 
         // The normal equations without the levels of the subjects.
         let (mut normal, mut right, mut total) = (SymmetricMatrix::zero(k), vec![0.0; k], 0.0);
@@ -160,14 +162,13 @@ impl Within {
             means,
             effect,
             error,
-            precision_ratio: 1.0,
             effects,
             unit,
             covariance: None,
+            of_design: Matrix::zeros(k, k),
         };
         found.covariance = found.by_cell(cells, &subjects);
-        let of_design = found.sandwich(&subjects, |n| 1.0 + 1.0 / n as f64);
-        found.precision_ratio = found.ratio(&of_design);
+        found.of_design = found.sandwich(&subjects, |n| 1.0 + 1.0 / n as f64);
         Ok(found)
     }
 
@@ -196,6 +197,23 @@ impl Within {
         })
     }
 
+    /// How unlike the design makes the precision of the differences between linked realizations, of those at
+    /// some positions: the largest variance over the smallest, if a cell of n ratings has the variance 1 + 1/n. 1 in a
+    /// balanced design.
+    pub fn precision_ratio(&self, positions: impl Fn(usize) -> bool) -> f64 {
+        let of: Vec<usize> = (0..self.realizations.len())
+            .filter(|i| positions(*i))
+            .collect();
+        let pairs =
+            (of.iter().enumerate()).flat_map(|(at, i)| of[at + 1..].iter().map(move |j| (*i, *j)));
+        let linked = pairs.filter(|(i, j)| self.sets[*i] == self.sets[*j]);
+        let (low, high) = linked.fold((f64::INFINITY, 0.0f64), |(low, high), (i, j)| {
+            let variance = spread(&self.of_design, i, j);
+            (low.min(variance), high.max(variance))
+        });
+        if high > 0.0 { high / low } else { 1.0 }
+    }
+
     /// The covariance of the effects. A cell mean of n ratings has the variance a + b/n: b is the
     /// variance of the ratings within cells, a the rest of the variance of a cell mean about the model.
     fn by_cell(&self, cells: &[CellSummary], subjects: &[Own]) -> Option<Matrix> {
@@ -213,18 +231,6 @@ impl Within {
         (full.elements().iter())
             .all(|x| x.is_finite())
             .then_some(full)
-    }
-
-    /// The largest variance of the difference of two linked realizations over the smallest.
-    fn ratio(&self, covariance: &Matrix) -> f64 {
-        let k = self.realizations.len();
-        let pairs = (0..k).flat_map(|i| (i + 1..k).map(move |j| (i, j)));
-        let linked = pairs.filter(|(i, j)| self.sets[*i] == self.sets[*j]);
-        let (low, high) = linked.fold((f64::INFINITY, 0.0f64), |(low, high), (i, j)| {
-            let variance = spread(covariance, i, j);
-            (low.min(variance), high.max(variance))
-        });
-        if high > 0.0 { high / low } else { 1.0 }
     }
 
     /// The covariance of the effects, if a cell of n ratings has this variance.
@@ -257,20 +263,21 @@ fn spread(covariance: &Matrix, i: usize, j: usize) -> f64 {
     covariance[(i, i)] + covariance[(j, j)] - 2.0 * covariance[(i, j)]
 }
 
-/// For each realization the number of its set, by the first member.
-fn linked(subjects: &[Own], k: usize) -> Vec<usize> {
-    let mut sets: Vec<usize> = (0..k).collect();
+/// For each of `n` things the number of its set, by the first member: the things of a group are linked, and so are
+/// those of groups that share one. Things are positions below `n`.
+pub fn linked_sets(groups: &[Vec<usize>], n: usize) -> Vec<usize> {
+    let mut sets: Vec<usize> = (0..n).collect();
     loop {
         let before = sets.clone();
-        for own in subjects {
-            let least = own.iter().map(|c| sets[c.0]).min().unwrap_or(0);
-            own.iter().for_each(|c| sets[c.0] = least);
+        for group in groups {
+            let least = group.iter().map(|thing| sets[*thing]).min().unwrap_or(0);
+            group.iter().for_each(|thing| sets[*thing] = least);
         }
         if sets == before {
             break;
         }
     }
-    let mut first: Vec<usize> = sets.clone();
+    let mut first = sets.clone();
     first.sort_unstable();
     first.dedup();
     (sets.iter())

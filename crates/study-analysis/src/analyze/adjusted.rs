@@ -37,10 +37,10 @@ pub(super) struct Adjusted {
 const MOST_UNLIKE: f64 = 1.2;
 
 impl Adjusted {
-    /// Whether the design makes all means about equally precise.
-    pub(super) fn is_balanced(&self) -> bool {
+    /// Whether the design makes the means of all realizations with a covariate about equally precise.
+    pub(super) fn is_balanced(&self, covariate: &[Option<f64>]) -> bool {
         match &self.within {
-            Ok(within) => within.precision_ratio <= MOST_UNLIKE,
+            Ok(within) => within.precision_ratio(|at| covariate[at].is_some()) <= MOST_UNLIKE,
             Err(_) => self.design.is_complete(),
         }
     }

@@ -78,7 +78,7 @@ fn p_of_vaf(
     let models = &adjusted.models;
     let kept = |c: &&Cell| Some(c.subject) != without && models.binary_search(&c.model).is_ok();
     let kept = cells.cells.iter().filter(kept);
-    if adjusted.is_balanced() && adjusted.design.is_complete() {
+    if adjusted.is_balanced(vaf) && adjusted.design.is_complete() {
         let mut sums = vec![(0.0, 0.0); models.len()];
         for cell in kept {
             let (sum, n) = &mut sums[models.binary_search(&cell.model).ok()?];

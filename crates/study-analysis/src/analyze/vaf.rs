@@ -192,10 +192,10 @@ fn weighted(
     adjusted: &Adjusted,
     vaf: impl Fn(usize) -> Option<f64>,
 ) -> Correlation {
-    if adjusted.is_balanced() {
+    let vaf: Vec<Option<f64>> = adjusted.models.iter().map(|&m| vaf(m)).collect();
+    if adjusted.is_balanced(&vaf) {
         return found;
     }
-    let vaf: Vec<Option<f64>> = adjusted.models.iter().map(|&m| vaf(m)).collect();
     let within = adjusted.within.as_ref().ok();
     found.with_trend(within.and_then(|within| within.trend(&vaf)))
 }

@@ -16,6 +16,7 @@ use std::ops::Range;
 use study_base::diagnostic::Fault;
 use study_base::text::{ModelId, Untrusted, counted};
 use study_stats::distribution::t_quantile;
+use study_stats::within::linked_sets;
 
 /// Number of test realizations from which a correlation over them is informative.
 const ENOUGH_REALIZATIONS: usize = 8;
@@ -67,15 +68,13 @@ fn apart(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
     let Some(own) = own.filter(|own| own.iter().all(|models| !models.is_empty())) else {
         return;
     };
-    let mut linked = vec![false; own.len()];
-    linked[0] = true;
-    for _ in 0..own.len() {
-        for i in 0..own.len() {
-            let shares = |j: usize| linked[j] && own[j].iter().any(|id| own[i].contains(id));
-            linked[i] = linked[i] || (0..own.len()).any(shares);
-        }
-    }
-    if let Some(i) = linked.iter().position(|linked| !linked) {
+    let place = |id: &&ModelId| protocol.models.iter().position(|model| model.id == **id);
+    let places: Vec<Vec<usize>> = (own.iter())
+        .map(|models| models.iter().filter_map(place).collect())
+        .collect();
+    let sets = linked_sets(&places, protocol.models.len());
+    let set = |group: &Vec<usize>| group.first().map(|at| sets[*at]);
+    if let Some(i) = (places.iter()).position(|group| set(group) != set(&places[0])) {
         faults.push(
             Fault::warning(format!(
                 "the groups `{}` and `{}` share no realization: whether realizations of different groups differ cannot be told from whether their participants do",

@@ -2,11 +2,12 @@
 //! link, and realizations that everybody felt in the same order.
 
 use super::{Finding, Pair, Question, Verdict};
-use crate::analyze::cells::Cells;
+use crate::analyze::cells::{Cell, Cells};
 use crate::analyze::results::{Evidence, Number as _};
 use crate::analyze::same_order::Orders;
 use study_base::apa;
 use study_base::text::counted;
+use study_stats::within::linked_sets;
 
 /// Takes back the verdicts of questions that the design cannot answer. Means, differences and
 /// correlations stay.
@@ -57,45 +58,30 @@ pub(super) fn withdraw(
 /// Sets of realizations that participants link, by their indices: those that at least two participants rated.
 /// What one person alone rated is no part of a comparison.
 fn sets(cells: &Cells<'_>, evidence: &Evidence) -> Vec<Vec<usize>> {
-    if evidence
-        .cells
-        .within
-        .sets
-        .number()
-        .is_none_or(|sets| sets <= 1.0)
-    {
+    let sets = &evidence.cells.within.sets;
+    if sets.number().is_none_or(|sets| sets <= 1.0) {
         return Vec::new();
     }
     let models = cells.tested();
-    let mut set_of: Vec<usize> = (0..cells.ratings.models.len()).collect();
-    let tested = |m: usize| models.binary_search(&m).is_ok();
     let people: Vec<Vec<usize>> = (cells.cells.chunk_by(|a, b| a.subject == b.subject))
-        .map(|own| own.iter().map(|c| c.model).filter(|m| tested(*m)).collect())
+        .map(|own| {
+            let place = |c: &Cell| models.binary_search(&c.model).ok();
+            own.iter().filter_map(place).collect()
+        })
         .collect();
-    loop {
-        let before = set_of.clone();
-        for own in &people {
-            let least = own.iter().map(|m| set_of[*m]).min().unwrap_or(0);
-            own.iter().for_each(|m| set_of[*m] = least);
-        }
-        if set_of == before {
-            break;
-        }
-    }
-    let mut sets: Vec<Vec<usize>> = Vec::new();
-    for &first in models.iter().filter(|m| set_of[**m] == **m) {
-        let of_set = |own: &&Vec<usize>| own.first().is_some_and(|m| set_of[*m] == first);
-        if people.iter().filter(of_set).count() > 1 {
-            sets.push(
-                models
-                    .iter()
-                    .copied()
-                    .filter(|m| set_of[*m] == first)
-                    .collect(),
-            );
-        }
-    }
-    sets
+    let set_of = linked_sets(&people, models.len());
+    let raters = |set: usize| {
+        let of_set = |own: &&Vec<usize>| own.first().is_some_and(|at| set_of[*at] == set);
+        people.iter().filter(of_set).count()
+    };
+    let members = |set: usize| {
+        let all = models.iter().zip(&set_of).filter(|(_, of)| **of == set);
+        all.map(|(model, _)| *model).collect()
+    };
+    (0..models.len())
+        .filter(|set| raters(*set) > 1)
+        .map(members)
+        .collect()
 }
 
 /// Says so if no participants link all realizations, or all with a VAF.
