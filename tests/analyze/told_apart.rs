@@ -102,6 +102,27 @@ fn strays_and_realizations_without_a_vaf_take_no_verdict_away() {
     assert!(why.contains("2 sets"), "{why}");
 }
 
+/// One participant alone rated the highest VAF, and above all others: the r that is printed is that of the slope
+/// that decides, and not of the means as if they were equally precise.
+#[test]
+fn r_is_that_of_the_slope_that_decides() {
+    let mut random = Numbers::new(7);
+    let mut rows = Vec::new();
+    for s in 0..30 {
+        for m in 0..5 {
+            rows.push((s, m, 1, 6.0 - 0.8 * m as f64 + 1.5 * random.normal()));
+        }
+    }
+    rows.push((0, 5, 1, 7.0));
+    let vaf = [0.60, 0.62, 0.64, 0.66, 0.68, 0.80];
+    let a = analysis_of(&rating_table(&rows, |m| Some(vaf[m])));
+    let r = |id: &str| a.values.number(&format!("corr_adjusted/{id}")).unwrap();
+    assert!((r("pearson/r") - r("trend/r")).abs() > 0.1);
+    assert!(r("trend/r") * r("trend/slope") > 0.0);
+    let found = finding(&a, Question::Vaf);
+    assert_eq!(found.estimate.unwrap().value, r("trend/r"));
+}
+
 /// Ratings fall by the trial, and everybody has the same order.
 #[test]
 fn an_order_that_all_share_cannot_be_told_from_the_realizations() {
