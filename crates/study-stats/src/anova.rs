@@ -125,7 +125,7 @@ pub fn two_way<R: AsRef<[f64]>>(rows: &[R], repetitions: usize) -> Option<TwoWay
     })
 }
 
-fn ratio(a: f64, b: f64) -> Option<f64> {
+pub(super) fn ratio(a: f64, b: f64) -> Option<f64> {
     if b > 0.0 { finite(a / b) } else { None }
 }
 
@@ -147,7 +147,8 @@ pub(super) fn unit(k: usize) -> Vec<f64> {
     vec![1.0 / (k as f64).sqrt(); k]
 }
 
-fn kronecker(a: &[Vec<f64>], b: &[Vec<f64>]) -> Vec<Vec<f64>> {
+/// The products of each row of `a` with each of `b`; the elements of `b` change fastest.
+pub(super) fn kronecker(a: &[Vec<f64>], b: &[Vec<f64>]) -> Vec<Vec<f64>> {
     a.iter()
         .flat_map(|x| {
             b.iter().map(move |y| {
@@ -179,47 +180,82 @@ fn effect_sums(rows: &[&[f64]], contrasts: &[Vec<f64>]) -> (f64, f64, Vec<Vec<f6
 }
 
 fn effect(rows: &[&[f64]], contrasts: &[Vec<f64>], with_mauchly: bool) -> Effect {
-    let n = rows.len() as f64;
+    let df = rows.len() as f64 - 1.0;
     let q = contrasts.len() as f64;
-    let (ss, ss_error, y) = effect_sums(rows, contrasts);
-    let (df1, df2) = (q, q * (n - 1.0));
+    let (ss, _, y) = effect_sums(rows, contrasts);
     let size: f64 = rows.iter().map(|r| dot(r, r)).sum();
     // A smaller error is due to rounding.
-    let defined = ss_error > 1e-24 * size && ss_error.is_finite();
+    let test = f_test(ss, q, &y, df, 1e-24 * size);
+    Effect {
+        ss,
+        ss_error: test.ss_error,
+        df1: q,
+        df2: q * df,
+        f: test.f,
+        p: test.p,
+        eps_gg: test.eps_gg,
+        p_gg: test.p_gg,
+        eps_hf: test.eps_hf,
+        p_hf: test.p_hf,
+        mauchly: test
+            .covariance
+            .filter(|_| with_mauchly)
+            .and_then(|s| mauchly(&s, df)),
+    }
+}
+
+/// F of an effect, with its corrections for a lack of sphericity: the fields of [`Effect`].
+pub(super) struct FTest {
+    pub(super) ss_error: f64,
+    pub(super) f: Option<f64>,
+    pub(super) p: Option<f64>,
+    pub(super) eps_gg: Option<f64>,
+    pub(super) p_gg: Option<f64>,
+    pub(super) eps_hf: Option<f64>,
+    pub(super) p_hf: Option<f64>,
+    /// That of the contrasts, but for a factor where `df` is not the number of rows − 1.
+    covariance: Option<SymmetricMatrix>,
+}
+
+/// Tests a sum of squares with `df1` degrees of freedom by the errors `y`, a row for each
+/// subject with q contrasts, less the means that were fitted to them, which leave each
+/// contrast `df` degrees of freedom. With S − 1 = `df`, ε of Huynh and Feldt is that of
+/// several groups as Lecoutre (1991) corrected it. Errors whose sum of squares is not above
+/// `least` are 0 but for rounding.
+pub(super) fn f_test(ss: f64, df1: f64, y: &[Vec<f64>], df: f64, least: f64) -> FTest {
+    let q = y.first().map_or(0, Vec::len) as f64;
+    let ss_error: f64 = y.iter().map(|v| dot(v, v)).sum();
+    let df2 = q * df;
+    let defined = ss_error > least && ss_error.is_finite();
     let f = if defined {
         finite((ss / df1) / (ss_error / df2))
     } else {
         None
     };
-    let covariance = defined.then(|| covariance(&y));
+    let covariance = defined.then(|| covariance(y));
     let eps_gg = covariance.as_ref().and_then(greenhouse_geisser);
     let eps_hf = eps_gg.and_then(|e| {
-        let denominator = q * (n - 1.0 - q * e);
-        (denominator > 0.0).then(|| (n * q * e - 2.0) / denominator)
+        let denominator = q * (df - q * e);
+        (denominator > 0.0).then(|| ((df + 1.0) * q * e - 2.0) / denominator)
     });
     let corrected_p = |eps: Option<f64>| {
         let (f, e) = (f?, eps?);
         (e > 0.0).then(|| f_upper(f, df1 * e, df2 * e)).flatten()
     };
-    Effect {
-        ss,
+    FTest {
         ss_error,
-        df1,
-        df2,
         f,
         p: f.and_then(|f| f_upper(f, df1, df2)),
         eps_gg,
         p_gg: corrected_p(eps_gg),
         eps_hf,
         p_hf: corrected_p(eps_hf.map(|e| e.min(1.0))),
-        mauchly: covariance
-            .filter(|_| with_mauchly)
-            .and_then(|s| mauchly(&s, n - 1.0)),
+        covariance,
     }
 }
 
 /// Covariance matrix of centered columns.
-pub(super) fn covariance(y: &[Vec<f64>]) -> SymmetricMatrix {
+fn covariance(y: &[Vec<f64>]) -> SymmetricMatrix {
     let q = y.first().map_or(0, Vec::len);
     let df = y.len() as f64 - 1.0;
     let mut s = SymmetricMatrix::zero(q);
@@ -234,7 +270,7 @@ pub(super) fn covariance(y: &[Vec<f64>]) -> SymmetricMatrix {
 }
 
 /// Greenhouse & Geisser's ε of a covariance matrix of contrasts.
-pub(super) fn greenhouse_geisser(s: &SymmetricMatrix) -> Option<f64> {
+fn greenhouse_geisser(s: &SymmetricMatrix) -> Option<f64> {
     let size = s.size();
     let squares = |i: usize| (0..size).map(|j| s.get(i, j) * s.get(i, j)).sum::<f64>();
     let (trace, squares) = (trace(s), (0..size).map(squares).sum::<f64>());

@@ -11,9 +11,9 @@
 
 pub mod welch;
 
-use super::anova::{covariance, greenhouse_geisser, helmert, unit};
+use super::anova::{f_test, helmert, unit};
 use super::describe;
-use super::distribution::{f_upper, t_quantile, t_two_sided};
+use super::distribution::{t_quantile, t_two_sided};
 use super::matrix::dot;
 use super::{finite, rectangular};
 
@@ -78,41 +78,56 @@ fn between<R: AsRef<[f64]>>(groups: &[Vec<R>], contrasts: &[Vec<f64>]) -> Option
     let mut y: Vec<Vec<f64>> = (rows.iter())
         .map(|row| contrasts.iter().map(|c| dot(c, row)).collect())
         .collect();
-    let mean = |y: &[Vec<f64>], j: usize| y.iter().map(|v| v[j]).sum::<f64>() / y.len() as f64;
-    let all: Vec<f64> = (0..q).map(|j| mean(&y, j)).collect();
-    let (mut ss, mut start) = (0.0, 0);
-    for group in groups {
-        let own = &mut y[start..start + group.len()];
-        start += group.len();
-        for (j, all) in all.iter().enumerate() {
-            let mean = mean(own, j);
-            ss += own.len() as f64 * (mean - all).powi(2);
-            for v in own.iter_mut() {
-                v[j] -= mean;
-            }
-        }
-    }
-    let ss_error: f64 = y.iter().map(|v| dot(v, v)).sum();
+    let sizes: Vec<usize> = groups.iter().map(Vec::len).collect();
+    let means = center_groups(&mut y, &sizes);
+    let ss = between_groups(&means, &sizes);
     let size: f64 = rows.iter().map(|r| dot(r, r)).sum();
-    let (df1, df2) = ((q * (g - 1)) as f64, (q * (n - g)) as f64);
+    let df1 = (q * (g - 1)) as f64;
     // A smaller error is due to rounding.
-    let defined = ss_error > 1e-24 * size && ss_error.is_finite();
-    let f = finite((ss / df1) / (ss_error / df2)).filter(|_| defined);
-    // ε does not depend on what the sums are divided by.
-    let eps_gg = defined
-        .then(|| greenhouse_geisser(&covariance(&y)))
-        .flatten();
-    let corrected = f.zip(eps_gg);
+    let test = f_test(ss, df1, &y, (n - g) as f64, 1e-24 * size);
     Some(Between {
         ss,
-        ss_error,
+        ss_error: test.ss_error,
         df1,
-        df2,
-        f,
-        p: f.and_then(|f| f_upper(f, df1, df2)),
-        eps_gg,
-        p_gg: corrected.and_then(|(f, e)| f_upper(f, df1 * e, df2 * e)),
+        df2: (q * (n - g)) as f64,
+        f: test.f,
+        p: test.p,
+        eps_gg: test.eps_gg,
+        p_gg: test.p_gg,
     })
+}
+
+/// Subtracts the mean of its group from each row of `y`, which is in the order of the groups,
+/// and returns these means.
+pub(super) fn center_groups(y: &mut [Vec<f64>], sizes: &[usize]) -> Vec<Vec<f64>> {
+    let q = y.first().map_or(0, Vec::len);
+    let mut start = 0;
+    let mut means = Vec::new();
+    for size in sizes {
+        let own = &mut y[start..start + size];
+        start += size;
+        let mean = |j: usize| own.iter().map(|v| v[j]).sum::<f64>() / *size as f64;
+        let mean: Vec<f64> = (0..q).map(mean).collect();
+        for v in own {
+            v.iter_mut().zip(&mean).for_each(|(v, mean)| *v -= mean);
+        }
+        means.push(mean);
+    }
+    means
+}
+
+/// Σ ng·|ȳg − ȳ|² of the means of groups of these sizes.
+pub(super) fn between_groups(means: &[Vec<f64>], sizes: &[usize]) -> f64 {
+    let q = means.first().map_or(0, Vec::len);
+    let n = sizes.iter().sum::<usize>() as f64;
+    let of_groups = || means.iter().zip(sizes.iter().map(|n| *n as f64));
+    let squares = |j: usize| {
+        let all = of_groups().map(|(mean, n)| n * mean[j]).sum::<f64>() / n;
+        of_groups()
+            .map(|(mean, n)| n * (mean[j] - all).powi(2))
+            .sum::<f64>()
+    };
+    (0..q).map(squares).sum()
 }
 
 /// The difference of the means of two groups.

@@ -204,6 +204,17 @@ pub fn lag1_autocorrelation(x: &[f64]) -> Option<f64> {
     finite(numerator.get() / denominator.get())
 }
 
+/// The power of two that brings the largest absolute value to at least 1 and below 2, as far
+/// as numbers of ordinary size can; 1 if all are 0. Multiplying by it rounds nothing.
+pub(crate) fn power_of_two<'a>(x: impl Iterator<Item = &'a f64>) -> f64 {
+    let largest = x.fold(0.0f64, |largest, x| largest.max(x.abs()));
+    if largest > 0.0 {
+        (-largest.log2().floor()).clamp(-1000.0, 1000.0).exp2()
+    } else {
+        1.0
+    }
+}
+
 /// The number rounded to 10⁻¹⁰, so that means that differ only by rounding errors are
 /// equal. Numbers of 10⁵ or more are returned unchanged: a double does not have enough
 /// digits.

@@ -6,6 +6,7 @@
 //! |---|---|
 //! | Means, standard deviations, quantiles | [`describe`] |
 //! | Do the realizations differ? | [`anova`], [`friedman`] (rank test), [`lmm`] (unbalanced data), [`clm`] and [`clmm`] (ordered categories) |
+//! | Which factors of a crossed design have effects, and which interact? | [`factorial`] (also by aligned ranks, and with groups) |
 //! | Do groups of subjects differ, or does a difference depend on the group? | [`between`] (equal variances), [`between::welch`] (variances of their own) |
 //! | Do the ratings follow a given order? | [`friedman::page`] |
 //! | The same where not everybody rated everything, within subjects | [`within`] |
@@ -56,6 +57,7 @@ pub mod describe;
 pub mod detection;
 pub mod disagreement;
 pub mod distribution;
+pub mod factorial;
 pub mod friedman;
 pub mod grim;
 pub mod level;

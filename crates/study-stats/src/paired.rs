@@ -1,7 +1,7 @@
 //! Paired and one-sample comparisons: t, Wilcoxon's signed-rank test, equivalence, and
 //! Holm's correction.
 
-use super::describe::{is_constant, mean, rounded, sd};
+use super::describe::{is_constant, mean, power_of_two, rounded, sd};
 use super::distribution::{normal_upper, t_quantile, t_two_sided, t_upper};
 use super::finite;
 use super::rank::{doubled_ranks, tie_term_of_ranks};
@@ -178,12 +178,8 @@ pub fn paired(a: &[f64], b: &[f64]) -> Option<Paired> {
 
 /// A power of two that brings small numbers to the size of 1, without rounding.
 fn scale<'a>(x: impl Iterator<Item = &'a f64>) -> f64 {
-    let largest = x.fold(0.0f64, |largest, x| largest.max(x.abs()));
-    if largest > 0.0 && largest < 0.5 {
-        (-largest.log2().floor()).min(1000.0).exp2()
-    } else {
-        1.0
-    }
+    let scale = power_of_two(x);
+    if scale > 2.0 { scale } else { 1.0 }
 }
 
 /// Wilcoxon's signed ranks without zeros, as doubled mid-ranks.
