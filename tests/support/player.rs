@@ -1,7 +1,7 @@
 //! A participant who takes part by keys alone, looking only at the screen.
 //!
-//! Every key is pressed once, on a complete page that asks for it, and the player then
-//! waits for what only that key can have changed. A clock that ticks, a notice that
+//! Every key is pressed once, on a complete page that asks for it (once more if nothing happens), and
+//! the player then waits for what only that key can have changed. A clock that ticks, a notice that
 //! appears and a counter that moves do not count as an answer.
 
 use super::{PATIENCE, Shown, Terminal};
@@ -25,6 +25,9 @@ pub enum Did {
 
 /// How a page says that a playback, one of several intervals or the last of them can be ended.
 const FELT: [&str; 3] = ["Enter: rate", "Enter: next", "Enter: answer"];
+
+/// A key on a page that has not changed for so long was not read.
+const NOT_READ: Duration = Duration::from_secs(10);
 
 /// Interval between two reads of the screen.
 const INTERVAL: Duration = Duration::from_millis(3);
@@ -175,10 +178,23 @@ fn act(terminal: &mut Terminal, participant: &str, page: &Shown, until: Option<I
     let mut before = page.clone();
     if !compact(&body(page)).contains(&compact(&look)) {
         terminal.keys(&typed);
-        let read = waited(terminal, until, &look, |now| {
+        // A key that comes with the page, before the program could note that it is on the screen, is
+        // not meant for it. A person presses it again; more than that is a fault.
+        let (untouched, pressed) = (body(page), Instant::now());
+        let is_read = |now: &Shown| compact(&body(now)).contains(&compact(&look));
+        let mut ignored = false;
+        let mut read = waited(terminal, until, &look, |now| {
             before = now.clone();
-            compact(&body(now)).contains(&compact(&look))
+            ignored = body(now) == untouched && pressed.elapsed() > NOT_READ;
+            ignored || is_read(now)
         });
+        if ignored {
+            terminal.keys(&typed);
+            read = waited(terminal, until, &look, |now| {
+                before = now.clone();
+                is_read(now)
+            });
+        }
         if !read {
             return did;
         }
