@@ -9,7 +9,7 @@
 //! | Which factors of a crossed design have effects, and which interact? | [`factorial`] (also by aligned ranks, and with groups) |
 //! | Do groups of subjects differ, or does a difference depend on the group? | [`between`] (equal variances), [`between::welch`] (variances of their own) |
 //! | Do the ratings follow a given order? | [`friedman::page`] |
-//! | The same where not everybody rated everything, within subjects | [`within`] |
+//! | The same where not everybody rated everything, within subjects | [`within`] (equal variances), [`within::Clustered`] (errors correlated within subjects) |
 //! | Which pairs differ? Are they equivalent? | [`paired`] |
 //! | Are the ratings correlated with a covariate? | [`correlation`], [`permutation`] (exact p), [`bootstrap`] (interval), [`bayes`] |
 //! | What is the slope on a covariate? | [`regression`], [`two_way_slope`] (beside two fixed factors), [`lmm`] (random effects) |

@@ -10,8 +10,10 @@
 //!
 //! Realizations that no chain of subjects links cannot be compared: see [`Within::sets`].
 
+mod clustered;
 mod trend;
 
+pub use clustered::{Clustered, Differences, MAX_CLUSTERED_REALIZATIONS, MAX_CLUSTERED_SUBJECTS};
 pub use trend::Trend;
 
 use crate::distribution::{f_upper, t_quantile, t_two_sided};
@@ -34,6 +36,11 @@ pub enum WithinError {
     /// Too many of them.
     #[error("realizations are compared within participants up to {MAX_REALIZATIONS}")]
     TooMany,
+    /// Too many for standard errors clustered by subject.
+    #[error(
+        "standard errors clustered by participant are computed for up to {MAX_CLUSTERED_REALIZATIONS} realizations and {MAX_CLUSTERED_SUBJECTS} participants"
+    )]
+    TooManyClustered,
     /// A number is not finite.
     #[error("the ratings are too large to be squared")]
     Overflow,
