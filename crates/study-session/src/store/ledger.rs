@@ -20,11 +20,16 @@ use std::io;
 use std::ops::RangeInclusive;
 use std::path::Path;
 use std::sync::Arc;
+use std::time::Duration;
 use study_base::text::ParticipantId;
 use study_plan::protocol::{Assigned, Seat};
 
 /// Free space below which the operator is warned, bytes.
 const LOW_SPACE_BYTES: u64 = 32 << 20;
+
+/// How often a lock that somebody has is asked for again, and the time between.
+const LOCK_ATTEMPTS: u32 = 15;
+const BETWEEN_ATTEMPTS: Duration = Duration::from_millis(20);
 
 /// The kind of a participant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -276,7 +281,17 @@ impl StudyFolder {
         number: u32,
     ) -> Result<Arc<SessionLock>, StoreError> {
         let path = layout::session(&self.path, id, number);
-        match self.disk.lock(&path).at(&path)? {
+        let mut lock = self.disk.lock(&path).at(&path)?;
+        // A program that was started a moment ago has the lock of a session that has just ended
+        // until it runs.
+        for _ in 0..LOCK_ATTEMPTS {
+            if lock.is_some() {
+                break;
+            }
+            std::thread::sleep(BETWEEN_ATTEMPTS);
+            lock = self.disk.lock(&path).at(&path)?;
+        }
+        match lock {
             Some(lock) => {
                 let disk = Arc::clone(&self.disk);
                 self.settle_names(id)?;
