@@ -159,7 +159,7 @@ fn effects_agree_with_afex() {
     assert_eq!(compared, 64);
 }
 
-/// F of the books: Maxwell & Delaney (1990, ch. 12), and of ARTool's page on Higgins' table.
+/// F of the books: Maxwell & Delaney (2004, ch. 12), and of ARTool's page on Higgins' table.
 #[test]
 fn published_analyses_agree() {
     let f = |found: Factorial| -> Vec<String> {

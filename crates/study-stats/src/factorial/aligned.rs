@@ -8,6 +8,10 @@
 //! of the term counts. As in ARTool, marginal means are those of all values, so that larger
 //! groups have more weight; sums of squares are of type III.
 //!
+//! Tests of aligned ranks do not hold their level where values are tied, such as single ratings,
+//! or spread unequally: they reject too often, the more the more subjects there are (Luepsen
+//! 2017; `docs/calibration.md`, "Factors"). The analysis of variance of the same values does.
+//!
 //! For the contrasts of a term its factors are one factor with all their combinations: the
 //! value gains the marginal mean of its combination.
 

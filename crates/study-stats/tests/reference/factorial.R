@@ -112,10 +112,10 @@ design <- function(name, source, rows, levels, groups = rep(0, nrow(rows)), cont
 
 data(obk.long, package = "afex"); o <- obk.long[order(obk.long$id, obk.long$phase, obk.long$hour), ]
 o$phase <- factor(o$phase, c("pre", "post", "fup")); o <- o[order(o$id, o$phase, as.numeric(as.character(o$hour))), ]
-design("obrien_kaiser", "O'Brien & Kaiser (1985), Psychological Bulletin 97, table 7: group, phase, hour",
+design("obrien_kaiser", "O'Brien & Kaiser (1985), Psychological Bulletin 97: group, phase, hour",
        matrix(o$value, 16, byrow = TRUE), c(3, 5), as.integer(factor(o$treatment[seq(1, 240, 15)], c("control", "A", "B"))) - 1)
 data(md_12.1, package = "afex"); m <- md_12.1[order(as.numeric(as.character(md_12.1$id)), md_12.1$noise, as.numeric(as.character(md_12.1$angle))), ]
-design("maxwell_delaney", "Maxwell & Delaney (1990), Designing Experiments and Analyzing Data, table 12.1: noise, angle",
+design("maxwell_delaney", "Maxwell & Delaney (2004), Designing Experiments and Analyzing Data, table 12.1: noise, angle",
        matrix(m$rt, 10, byrow = TRUE), c(2, 3))
 higgins <- c(3.3,4.3,4.5,5.8, 4.0,4.1,6.5,7.3, 1.9,3.8,4.4,5.1, 5.0,7.9,10.7,13.5, 5.9,8.5,10.3,13.9, 6.9,7.0,10.9,15.2,
              6.5,10.7,12.2,15.7, 8.2,8.9,13.4,14.9, 5.2,8.6,11.1,15.6, 6.8,9.0,10.3,12.5, 6.4,6.0,10.7,12.5, 4.0,3.8,9.4,10.2)
