@@ -22,6 +22,7 @@ mod reveals;
 
 mod atomic;
 mod derive;
+mod doctor;
 mod error;
 mod head;
 mod journal;
@@ -38,6 +39,7 @@ mod sessions;
 mod tables;
 mod telemetry;
 mod tombstone;
+mod trial;
 mod verify;
 
 pub use derive::{Derived, participants};
@@ -52,10 +54,11 @@ pub use plan::{Next, Plan, next_session};
 pub use receipt::Receipt;
 pub use replay::{Damage, DamageKind};
 pub use session_folder::SessionFolder;
-pub use session_lock::RESERVE_BYTES;
+pub use session_lock::{LEAST_FREE_BYTES, RESERVE_BYTES};
 pub use sessions::SessionData;
 pub use telemetry::TelemetryWriter;
 pub use tombstone::Tombstone;
+pub use trial::{Broken, DiskTrial, SavingTime};
 pub use verify::Finding;
 
 use crate::outcome::Moment;

@@ -34,6 +34,11 @@ pub const INTERVALS: &str = "intervals.csv";
 /// Derived: one row for each participant.
 pub const PARTICIPANTS: &str = "participants.csv";
 
+/// Folder of the records of `study doctor`, which nothing is derived from.
+pub const DOCTOR: &str = "doctor";
+/// Folder in which a disk is tried.
+pub const TRIAL: &str = ".study-doctor.tmp";
+
 /// What a session's folder contains beside the segments of its journal.
 pub const OF_SESSION: [&str; 5] = [HEAD, ".head.json.tmp", RECEIPT, TELEMETRY, RESERVE];
 

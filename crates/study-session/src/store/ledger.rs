@@ -10,7 +10,7 @@ use super::journal::{self, Journal};
 use super::journal_record::{Claim, Record};
 use super::manifest::Manifest;
 use super::plan::{self, Next, Plan, done, next_session};
-use super::session_lock::{RESERVE_BYTES, SessionLock};
+use super::session_lock::{LEAST_FREE_BYTES, RESERVE_BYTES, SessionLock};
 use super::sessions::{SessionData, deciding};
 use super::{SessionFolder, StudyFolder, atomic, layout};
 use crate::outcome::fold::Standing;
@@ -326,7 +326,7 @@ impl StudyFolder {
             _ => {}
         }
         let free = disk.free_bytes(&self.path).at(&self.path)?;
-        let needed = 2 * RESERVE_BYTES;
+        let needed = LEAST_FREE_BYTES;
         if let Some(free) = free.filter(|free| *free < needed) {
             return Err(StoreError::Full {
                 path: self.path.clone(),

@@ -9,6 +9,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Disk space kept free for the last records of a session, bytes.
 pub const RESERVE_BYTES: u64 = 64 << 10;
+/// Free disk space below which no session starts, bytes.
+pub const LEAST_FREE_BYTES: u64 = 2 * RESERVE_BYTES;
 
 /// The lock of a session's folder, shared by its journal and telemetry.
 pub(super) struct SessionLock {

@@ -9,8 +9,8 @@ use std::path::Path;
 
 impl StudyFolder {
     /// Compares every file with a copy of the study in the folder `copy`, except
-    /// `analysis/` and what a session needs only while it is open. Derived tables that
-    /// differ are notes.
+    /// `analysis/`, the records of `study doctor`, which are of one machine, and what a session
+    /// needs only while it is open. Derived tables that differ are notes.
     ///
     /// # Errors
     /// [`StoreError`] if a folder cannot be listed.
@@ -43,7 +43,8 @@ fn compare(sides: &Sides<'_>, place: &str, found: &mut Vec<Finding>) -> Result<(
     for (side, (disk, root)) in sides.iter().enumerate() {
         let path = root.join(place);
         for item in disk.list(&path).at(&path)? {
-            if !layout::is_passing(&item.name) && item.name != layout::ANALYSIS {
+            let local = [layout::ANALYSIS, layout::DOCTOR].contains(&item.name.as_str());
+            if !layout::is_passing(&item.name) && !local {
                 kinds.entry(item.name).or_default()[side] = Some(item.kind);
             }
         }
