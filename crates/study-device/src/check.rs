@@ -12,6 +12,7 @@ mod mechanism;
 mod moving;
 mod playing;
 mod strange;
+mod trips;
 mod uploads;
 
 use super::link::LinkError;
@@ -21,6 +22,7 @@ use std::fmt::Display;
 use std::time::Duration;
 use study_wire::frame::crc32;
 use study_wire::message::Identity;
+pub use trips::{ADAPTER_MS, REPLY_MS, RoundTrips, longest_ms, round_trips};
 
 /// Largest force of the test, N.
 pub const FORCE_N: f64 = 2.0;
@@ -232,7 +234,7 @@ pub fn commission(
 /// # Errors
 /// [`CheckFailure`] if there is no answer, an incorrect one, or another version.
 pub fn identify(connection: &mut dyn Connection, nonce: u32) -> Result<Identity, CheckFailure> {
-    clauses::identify(&mut Exchange::new(connection, nonce))
+    Exchange::new(connection, nonce).identify()
 }
 
 /// Quantile of sorted values by the nearest rank, `fraction` between 0 and 1; `None`

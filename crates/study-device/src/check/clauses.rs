@@ -7,6 +7,7 @@ use super::exchange::{Exchange, unexpected};
 use super::mechanism;
 use super::moving;
 use super::playing;
+use super::trips::{self, ADAPTER_MS, REPLY_MS};
 use super::uploads::Upload;
 use super::{CheckFailure, Clause, ClauseResult, fail, quantile};
 use crate::host::RETRY_INTERVAL;
@@ -60,23 +61,9 @@ clauses! {
 
 /// Number of round trips that are measured.
 const TRIPS: usize = 300;
-/// Bytes of the frames of STATE and OUTCOME.
-const STATE_BYTES: usize = 113;
-/// Longest time from a request to its reply, ms (11.1).
-const REPLY_MS: f64 = 2.0;
-/// What an adapter or a USB port adds in both directions, ms: at most two frames of 1 ms each
-/// way.
-const ADAPTER_MS: f64 = 4.0;
-
-/// Makes the device limp, whatever it was doing, and identifies it.
-pub(super) fn identify(exchange: &mut Exchange<'_>) -> Result<Identity, CheckFailure> {
-    let limp = Request::Limp.frame(0);
-    let _ = exchange.send(limp.as_bytes(), 0, RETRY_INTERVAL)?;
-    exchange.hello()
-}
 
 fn handshake(exchange: &mut Exchange<'_>) -> ClauseResult {
-    let device = identify(exchange)?;
+    let device = exchange.identify()?;
     let [oldest, newest] = device.versions;
     if !(oldest..=newest).contains(&message::VERSION) {
         return Err(CheckFailure::Disconnected(format!(
@@ -119,20 +106,15 @@ fn handshake(exchange: &mut Exchange<'_>) -> ClauseResult {
 
 fn latency(exchange: &mut Exchange<'_>) -> ClauseResult {
     let device = exchange.identity()?;
-    let mut trips = Vec::new();
-    for _ in 0..TRIPS {
-        let sent = exchange.now();
-        let received = exchange.ask(Request::State)?;
-        trips.push(received.at.saturating_sub(sent).as_secs_f64() * 1e3);
-    }
+    let mut trips = trips::of_state(exchange, TRIPS, None)?;
     trips.sort_by(f64::total_cmp);
     let quantiles = [0.5, 0.99, 1.0].map(|fraction| quantile(&trips, fraction));
     let [Some(median), Some(p99), Some(max)] = quantiles else {
         return fail("no round trips");
     };
     exchange.latency_ms = Some([median, p99, max]);
-    let allowed = f64::from(device.watchdog_ms) / 3.0;
-    let line_ms = 1e3 * exchange.line_time(STATE_BYTES).as_secs_f64();
+    let allowed = trips::longest_ms(device.watchdog_ms);
+    let line_ms = trips::line_ms(exchange);
     let seen = format!("median {median:.2} ms, 99 % {p99:.2} ms, at most {max:.2} ms");
     if median > REPLY_MS + line_ms + ADAPTER_MS {
         fail(format!(

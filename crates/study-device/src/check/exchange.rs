@@ -312,6 +312,16 @@ impl<'w> Exchange<'w> {
         self.expect_done(Request::Limp).map(drop)
     }
 
+    /// Makes the device limp, whatever it was doing, and identifies it.
+    ///
+    /// # Errors
+    /// As [`Exchange::hello`].
+    pub(crate) fn identify(&mut self) -> Result<Identity, CheckFailure> {
+        let limp = Request::Limp.frame(0);
+        let _ = self.send(limp.as_bytes(), 0, RETRY_INTERVAL)?;
+        self.hello()
+    }
+
     /// Opens a new connection.
     ///
     /// # Errors

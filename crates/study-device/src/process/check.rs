@@ -5,6 +5,7 @@
 //! it once comes in time.
 
 mod talk;
+mod trips;
 
 use super::hello::Told;
 use crate::DeviceError;
@@ -14,6 +15,7 @@ use std::time::Duration;
 use study_haptics::model::{Realization, Trained};
 use study_session::outcome::Sample;
 use talk::{Failed, Talk};
+pub use trips::{ProgramTrips, round_trips};
 
 /// Largest force of the test, N.
 pub const FORCE_N: f64 = 2.0;

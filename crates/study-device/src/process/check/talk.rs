@@ -265,15 +265,26 @@ impl Talk {
             self.started = false;
             return Ok("version 1 does not confirm it".to_owned());
         }
-        let free = |m: &ChildMessage| match m {
-            ChildMessage::Free { sample, .. } => Some(sample.as_ref().map(sample_of)),
-            _ => None,
-        };
-        let (sample, took) = self.await_message("free", LATEST.max(wait), free)?;
+        let (sample, took) = self.confirmed(wait)?;
         self.started = false;
         in_time("free", took, wait)?;
         self.limp(sample)?;
         Ok(format!("after {:.0} ms", 1e3 * took.as_secs_f64()))
+    }
+
+    /// Waits for the confirmation of `free`: its sample, and how long it took.
+    fn confirmed(&mut self, wait: Duration) -> Result<(Option<Sample>, Duration), Failed> {
+        let free = |m: &ChildMessage| match m {
+            ChildMessage::Free { sample, .. } => Some(sample.as_ref().map(sample_of)),
+            _ => None,
+        };
+        self.await_message("free", LATEST.max(wait), free)
+    }
+
+    /// How long a program without a load takes to confirm `free`.
+    pub(super) fn trip(&mut self) -> Result<Duration, Failed> {
+        self.say(self.told.free())?;
+        Ok(self.confirmed(LATEST)?.1)
     }
 
     /// Whether the sample after the end of the force has none.
