@@ -11,6 +11,7 @@ mod command_line;
 mod completions;
 mod device;
 mod device_selection;
+mod doctor;
 mod export;
 mod help;
 mod identify;
@@ -88,6 +89,8 @@ enum Command {
     Schema(schema::Args),
     /// Find, check and simulate playback devices
     Device(device::Args),
+    /// Measure this computer, its disk, terminal and device: fit for which sessions?
+    Doctor(doctor::Args),
     /// Print shell completions
     Completions(completions::Args),
     /// Write manual pages
@@ -128,6 +131,7 @@ pub fn run(cli: Cli, console: &mut Console) -> Result<(), Failure> {
         Command::New(args) => new::run(&args, console),
         Command::Schema(args) => schema::run(&args, console),
         Command::Device(args) => device::run(&args, console),
+        Command::Doctor(args) => doctor::run(&args, console),
         Command::Completions(args) => completions::run(&args, console),
         Command::Man(args) => completions::man(&args, console),
     }

@@ -16,7 +16,7 @@
 //! | 1 | `study-haptics` (trajectory, plant, recording, identify, model); `study-plan` (protocol, procedure, schedule) |
 //! | 2 | `study-session` (outcome, session, rendering, store) |
 //! | 3 | `study-analysis` (analyze, power, preregister, export); `study-device`; [`rater`] |
-//! | 4 | `study-report`; [`runner`] |
+//! | 4 | `study-report`; [`runner`], [`doctor`] |
 //! | 5 | [`tui`]; [`plain`], [`screen`] |
 //! | 6 | [`cli`] |
 //!
@@ -46,6 +46,7 @@
 //!   mass, damping, stiffness, offset force. The paper's symbols.
 
 pub mod cli;
+pub mod doctor;
 pub mod front;
 pub mod plain;
 pub mod rater;

@@ -66,6 +66,7 @@ plant: trajectory wire
 identify: model recording wire
 device: outcome model plant wire
 rater: protocol model plant wire
+doctor: device store
 rehearsal: analyze device load protocol rater runner store
 runner: session device store identify outcome protocol rendering model rater safe_play wire
 report: archive analyze stats identify load model outcome power preregister procedure protocol recording safe_play store study wire
@@ -73,7 +74,7 @@ tui: runner page session outcome protocol
 plain: runner page session outcome protocol tui
 screen: runner page session protocol
 front: runner page session protocol
-cli: analyze archive check device export front identify load model outcome plain plant power procedure protocol rater recording rehearsal rendering report runner schedule screen session stats store study trajectory tui wire
+cli: analyze archive check device doctor export front identify load model outcome plain plant power procedure protocol rater recording rehearsal rendering report runner schedule screen session stats store study trajectory tui wire
 main: cli
 certificate: predict
 predict: real

@@ -224,6 +224,7 @@ impl SerialPortArgs {
     /// The serial port or the address over TCP, from the arguments or `device.toml`.
     pub(super) fn serial(&self) -> Result<Box<dyn Opener>, Failure> {
         let config = DeviceConfig::read(Path::new(CONFIG_FILE))?.serial;
+        let baud = self.rate(&config);
         let given = self.port.clone();
         // A port argument takes precedence over a serial number in the file.
         let usb_serial = config.usb_serial.filter(|_| given.is_none());
@@ -235,12 +236,21 @@ impl SerialPortArgs {
                 )),
             );
         }
-        let baud = self.baud.or(config.baud).unwrap_or(BAUD);
         let port = port.unwrap_or_default();
         Ok(match TcpAddress::read(&port) {
             Some(address) => Box::new(address.map_err(|e| Failure::usage(format!("--port: {e}")))?),
             None => Box::new(SerialOpener::new(&port, baud, usb_serial)),
         })
+    }
+
+    /// Bits per second of a serial port, from the arguments or `device.toml`.
+    pub(super) fn bits_per_s(&self) -> Result<u32, Failure> {
+        let config = DeviceConfig::read(Path::new(CONFIG_FILE))?.serial;
+        Ok(self.rate(&config))
+    }
+
+    fn rate(&self, config: &SerialConfig) -> u32 {
+        self.baud.or(config.baud).unwrap_or(BAUD)
     }
 
     /// Opens the device behind a serial port.

@@ -1,6 +1,7 @@
 //! What the other commands say, above all of bad input.
 
 mod bad_input;
+mod doctor;
 mod families;
 mod power;
 mod power_parts;
