@@ -442,6 +442,28 @@ proptest! {
     }
 }
 
+/// Once a participant has dropped out nothing is recorded: a trial marked as bad for the last time, and a
+/// crash before its closing is recorded, would leave a trial that is neither to come nor closed.
+#[test]
+fn nothing_is_marked_as_bad_after_a_drop_out() {
+    let bad = || {
+        Move::Act(Act::Send(Input::MarkBad {
+            reason: "why".to_owned(),
+        }))
+    };
+    let steps = |n: usize| std::iter::repeat_n(Move::Act(Act::Step), n);
+    let mut moves: Vec<Move> = steps(9).collect();
+    moves.extend([bad(), Move::Act(Act::Step), Move::Fault]);
+    moves.extend(steps(3).chain([Move::Return(Choice::DropOut), bad()]));
+    let protocol = Arc::new(rich());
+    let rig = moves.into_iter().fold(Rig::new(rich()), make);
+    assert_eq!(rig.session.history().failures(1), 2);
+    assert_eq!(Expected(&rig.journal).state(), State::DroppedOut);
+    for end in 1..=rig.journal.len() {
+        check_resumed(&rig.journal[..end], &protocol);
+    }
+}
+
 /// The strategy reaches what it is there for.
 #[test]
 fn the_random_sessions_contain_every_kind_of_event() {

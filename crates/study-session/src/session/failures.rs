@@ -116,8 +116,11 @@ impl Session {
     }
 
     /// The trial that can be marked as bad now (the one under way, or else the last
-    /// completed one), its attempt and its title.
+    /// completed one), its attempt and its title; none once the session is over.
     pub(super) fn markable(&self) -> Option<(u32, u32, String)> {
+        if self.history.over() {
+            return None;
+        }
         if let Some(open) = self.history.open() {
             let practice = open.trial.practice;
             let number = self.history.closed(practice) + 1;
@@ -133,7 +136,7 @@ impl Session {
         );
         let trial = self.history.last_done.filter(|_| between)?;
         let (attempt, done) = self.history.completion(trial)?;
-        (!self.history.over()).then(|| (trial, attempt, title(false, done.number)))
+        Some((trial, attempt, title(false, done.number)))
     }
 
     /// Records the attempt under way as failed.
