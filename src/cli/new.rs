@@ -43,11 +43,33 @@ const WITH_ANCHORS: [(&str, &str); 5] = [
     MODELS[2],
 ];
 
+/// Two factors with two levels each.
+const CROSSED: [(&str, &str); 4] = [
+    (
+        "models/low-soft.toml",
+        include_str!("new/factorial/low-soft.toml"),
+    ),
+    (
+        "models/low-crisp.toml",
+        include_str!("new/factorial/low-crisp.toml"),
+    ),
+    (
+        "models/high-soft.toml",
+        include_str!("new/factorial/high-soft.toml"),
+    ),
+    (
+        "models/high-crisp.toml",
+        include_str!("new/factorial/high-crisp.toml"),
+    ),
+];
+
 /// What a trial of a new study is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum TrialKind {
     /// One realization is rated
     Rating,
+    /// One realization of a factorial design is rated
+    Factorial,
     /// Two realizations, one is chosen
     Pairs,
     /// Two-interval forced choice with constant stimuli
@@ -74,6 +96,7 @@ impl TrialKind {
     fn files(self) -> (&'static str, &'static [(&'static str, &'static str)]) {
         match self {
             Self::Rating => (PROTOCOL, &MODELS),
+            Self::Factorial => (include_str!("new/factorial.toml"), &CROSSED),
             Self::Pairs => (include_str!("new/pairs.toml"), &MODELS),
             Self::TwoIntervals => (include_str!("new/constant.toml"), &[STATIC]),
             Self::Staircase => (include_str!("new/staircase.toml"), &[STATIC]),

@@ -5,6 +5,7 @@ mod command;
 #[path = "../support/designs.rs"]
 mod designs;
 mod docs;
+mod factors;
 mod findings;
 mod golden;
 #[path = "../support/json_schema.rs"]

@@ -5,7 +5,8 @@
 #![allow(clippy::print_stderr, reason = "says what is missing on this machine")]
 
 use crate::studies::{
-    export, files, grouped, hostile, japanese, new, of_groups_and_sessions, real_study, rehearsed,
+    export, factorial_with_groups, files, grouped, hostile, japanese, new, of_groups_and_sessions,
+    real_study, rehearsed,
 };
 use crate::support::{copy_folder, repository, study};
 use serde_json::Value;
@@ -156,6 +157,15 @@ fn studies(home: &Path) -> Vec<(PathBuf, &'static [&'static str])> {
         (grouped(4, &of("grouped")), SIMULATED),
         (
             rehearsed(&new("abx", &of("abx")), 3, &home.join("abx"), &[]),
+            SIMULATED,
+        ),
+        (
+            rehearsed(
+                &factorial_with_groups(&of("factors")),
+                10,
+                &home.join("factors"),
+                &[],
+            ),
             SIMULATED,
         ),
         several("pairs", 8),

@@ -235,6 +235,38 @@ pub(crate) fn of_groups_and_sessions(kind: &str, home: &Path) -> PathBuf {
     folder
 }
 
+/// A new factorial study of 2 × 3 levels whose groups are a factor between participants.
+pub(crate) fn factorial_with_groups(home: &Path) -> PathBuf {
+    let folder = new("factorial", home);
+    let protocol = folder.join("protocol.toml");
+    let text = fs::read_to_string(&protocol).unwrap();
+    let third = |friction: &str| {
+        format!(
+            "\n[[models]]\nid = \"{friction}-none\"\nfile = \"models/{friction}-soft.toml\"\n\
+             levels = {{ friction = \"{friction}\", detent = \"none\" }}\n"
+        )
+    };
+    let changed = [
+        ("repetitions = 3\n", ""),
+        (
+            "levels = [\"soft\", \"crisp\"]",
+            "levels = [\"none\", \"soft\", \"crisp\"]",
+        ),
+        ("friction * detent\"", "friction * detent * group\""),
+    ];
+    let mut text = changed.iter().fold(text, |text, (old, new)| {
+        assert!(text.contains(old), "{old}");
+        text.replace(old, new)
+    });
+    let order = text.lines().find(|l| l.starts_with("order = ")).unwrap();
+    text = text.replace(&format!("{order}\n"), "");
+    text += &(third("low") + &third("high"));
+    text += "\n[[parts]]\nid = \"rating\"\nkind = \"rating\"\nrepetitions = 2\norder = \"blocked\"\n\
+             [groups]\n[[groups.list]]\nid = \"novices\"\n[[groups.list]]\nid = \"experts\"\nshare = 2\n";
+    fs::write(protocol, text).unwrap();
+    folder
+}
+
 /// A new study of a kind.
 pub(crate) fn new(kind: &str, home: &Path) -> PathBuf {
     let (code, _, err) = study(&["new", "--seed", "20261123", kind, "--kind", kind], home);

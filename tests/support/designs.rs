@@ -62,6 +62,7 @@ pub(crate) fn design(models: usize, repetitions: u32, order: Order) -> Protocol 
             .take(models)
             .map(|c| model(&char::from(c).to_string()))
             .collect(),
+        factors: Vec::new(),
         questions: Vec::new(),
         setup: Vec::new(),
         parts: Vec::new(),
@@ -84,6 +85,7 @@ pub(crate) fn design(models: usize, repetitions: u32, order: Order) -> Protocol 
             exclude: Vec::new(),
             alpha: None,
             construct: None,
+            model: None,
         },
     }
 }
@@ -112,5 +114,6 @@ pub(crate) fn model(id: &str) -> ModelEntry {
         duplicate_of: None,
         device: None,
         covariates: BTreeMap::new(),
+        levels: BTreeMap::new(),
     }
 }

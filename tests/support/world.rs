@@ -40,6 +40,7 @@ pub fn protocol() -> Protocol {
         duplicate_of: None,
         device: None,
         covariates: BTreeMap::from([("lambda".to_owned(), 0.9 + 0.01 * i as f64)]),
+        levels: BTreeMap::new(),
     };
     let mut small = design(0, 1, Order::Blocked);
     "small".clone_into(&mut small.study.id);

@@ -23,6 +23,7 @@ mod disagreement;
 mod draws;
 mod effects;
 mod exclude;
+mod factorial;
 pub mod findings;
 mod headline;
 mod identifiers;
@@ -71,7 +72,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use study_plan::protocol::{Protocol, Role, Unfinished};
+use study_plan::protocol::{Crossing, Protocol, Role, Unfinished};
 pub use study_session::outcome::ratings::Felt;
 use study_session::outcome::ratings::{Practice, Ratings};
 
@@ -107,6 +108,8 @@ pub struct Rules {
     pub construct: Option<String>,
     /// Which ratings are better.
     pub better: Better,
+    /// The factors of the realizations; `None` in a study without.
+    pub crossing: Option<Crossing>,
 }
 
 impl Default for Rules {
@@ -126,6 +129,7 @@ impl Default for Rules {
             alpha: ALPHA,
             construct: None,
             better: Better::default(),
+            crossing: None,
         }
     }
 }
@@ -159,6 +163,7 @@ impl Rules {
             alpha: protocol.analysis.alpha(),
             construct: protocol.analysis.construct.clone().filter(|_| primary),
             better: Better::default(),
+            crossing: protocol.crossing(),
         }
     }
 }
@@ -257,6 +262,8 @@ pub struct Analysis {
     pub covariates: Vec<String>,
     /// Names of the sites; empty if there is only one. Untrusted.
     pub sites: Vec<String>,
+    /// The factors of the realizations; `None` in a study without. Its levels are untrusted.
+    pub crossing: Option<Crossing>,
     /// Who rated which realizations.
     pub design: Design,
     /// The answers to the questions of the study, in the order of a report.
@@ -365,6 +372,7 @@ pub fn analyze_with_progress(ratings: &Ratings, rules: &Rules, progress: &Progre
         better: rules.better,
         covariates: memory::covariates(&used),
         sites: ratings.sites.clone(),
+        crossing: rules.crossing.clone(),
         design,
         findings,
         pairs,
@@ -497,6 +505,7 @@ fn evidence(
         order,
         differences,
         references,
+        factorial: factorial::factorial(cells, rules),
         cells: adjusted::adjusted(cells, adjusted),
         pairs: pairs::pairs(cells, adjusted, rules),
         sites: sites::sites(cells, rules),

@@ -14,6 +14,7 @@ pub mod conditions;
 pub mod control;
 pub mod difference;
 pub mod example;
+pub mod factors;
 pub mod file;
 pub mod fingerprint;
 pub mod groups;
@@ -34,6 +35,7 @@ mod section;
 
 pub use answer::{Answer, Given, Refusal};
 pub use control::{Control, Pick};
+pub use factors::{Crossing, Factor};
 pub use groups::{Assign, Assigned, GroupRules, Groups, SessionPlan};
 pub use kinds::QuestionKind;
 pub use pairs::{IntervalOrder, Pairs};
@@ -80,6 +82,9 @@ pub struct Protocol {
     pub trial: TrialRules,
     /// `[[models]]`, in the order of the file.
     pub models: Vec<ModelEntry>,
+    /// `[[factors]]`
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub factors: Vec<Factor>,
     /// `[[questions]]`, asked after each trial.
     pub questions: Vec<Question>,
     /// `[[setup]]`, asked of the experimenter before the first trial.
@@ -460,6 +465,9 @@ pub struct ModelEntry {
     pub device: Option<DeviceKind>,
     /// Numbers that may explain the ratings; each becomes a column.
     pub covariates: BTreeMap<String, f64>,
+    /// Its level in each of `[[factors]]`.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub levels: BTreeMap<String, String>,
 }
 
 words! {
@@ -516,6 +524,10 @@ pub struct AnalysisRules {
     /// absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub construct: Option<String>,
+    /// Which effects of the factors are tested, as a formula ([`factors::effects`]); `None`: all.
+    /// Not part of the fingerprint if absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub model: Option<String>,
 }
 
 impl AnalysisRules {

@@ -2,6 +2,7 @@
 //! of the analysis, in sentences.
 
 mod conditional;
+mod factors;
 mod pairs;
 mod sites;
 mod target;
@@ -60,7 +61,8 @@ pub(super) fn answers(a: &Analysis) -> Vec<Answer> {
         order(a),
         carry_over(a),
     ];
-    let mut answers: Vec<Answer> = all.into_iter().flatten().collect();
+    let mut answers = factors::factors(a);
+    answers.extend(all.into_iter().flatten());
     answers.extend(target::repeats(a));
     answers.extend(sites::sites(a));
     answers

@@ -46,6 +46,16 @@ pub fn tables(source: &Source, analysis: &Analysis) -> Vec<TableFile> {
             content: super::json::document(source, analysis),
         },
     ];
+    if analysis.crossing.is_some() {
+        all.extend([
+            table("factors.csv", of(tables::factors::effects(analysis))),
+            table("factor_means.csv", of(tables::factors::means(analysis))),
+            table(
+                "factor_contrasts.csv",
+                of(tables::factors::contrasts(analysis)),
+            ),
+        ]);
+    }
     if !analysis.parts.is_empty() {
         all.extend(part_tables(&analysis.parts));
     }

@@ -6,6 +6,7 @@
 //! columns and of one column of a journal.
 
 mod counts;
+mod factors;
 mod means;
 mod pairs;
 mod parts;
@@ -30,7 +31,8 @@ use study_stats::describe::mean;
 pub const MAX_DRAWN: usize = 60;
 
 /// File names of all figures, without extension.
-pub const NAMES: [&str; 11] = [
+pub const NAMES: [&str; 12] = [
+    "factors",
     "fig10-means",
     // Of earlier versions: now below fig10-means.
     "fig11-rating-and-vaf",
@@ -112,6 +114,7 @@ pub fn all(a: &Analysis, traces: &[Trace]) -> Vec<Drawn> {
     let scene = Scene::of(a);
     let note = note(a);
     let all = [
+        factors::interaction(&scene),
         means::fig10(&scene),
         vaf::against_vaf(&scene),
         pairs::forest(&scene),

@@ -276,6 +276,23 @@ fn design(c: &Content<'_>) -> Vec<String> {
     if !all.is_empty() {
         lines.push(format!("Tested realizations: {}.", all.join(", ")));
     }
+    if let Some(crossing) = p.crossing() {
+        let mut factors: Vec<String> = (crossing.factors.iter())
+            .map(|factor| format!("`{}` ({})", factor.id, factor.levels.join(", ")))
+            .collect();
+        if !crossing.groups.is_empty() {
+            let groups = crossing.groups.join(", ");
+            factors.push(format!("the group between participants ({groups})"));
+        }
+        let effects: Vec<String> = (crossing.effects.iter())
+            .map(|effect| crossing.effect_name(effect).replace(':', " × "))
+            .collect();
+        lines.push(format!(
+            "Factors: {}. Effects that are tested, as one family: {}.",
+            factors.join(", "),
+            effects.join(", ")
+        ));
+    }
     for m in p.models.iter().filter(|m| !tested(m)) {
         lines.push(match &m.duplicate_of {
             Some(of) => format!("`{}`: hidden duplicate of `{of}`.", m.id),

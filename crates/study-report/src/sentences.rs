@@ -50,6 +50,10 @@ pub(super) fn test_name(kind: TestKind) -> &'static str {
             "analysis of variance between and within participants, Greenhouse–Geisser correction"
         }
         TestKind::BetweenSites => "analysis of variance between sites",
+        TestKind::FactorialAnova => "factorial repeated-measures analysis of variance",
+        TestKind::FactorialAnovaGreenhouseGeisser => {
+            "factorial repeated-measures analysis of variance, Greenhouse–Geisser correction"
+        }
     }
 }
 

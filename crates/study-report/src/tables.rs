@@ -1,6 +1,7 @@
 //! The tables of ratings: one function each for terminal, report and CSV file.
 
 mod exclusions;
+pub(crate) mod factors;
 mod pairs;
 pub(crate) mod parts;
 mod rendering;

@@ -237,6 +237,7 @@ analysis = { primary = "better" }
             Question::SiteRealizations,
             Question::SiteVaf,
             Question::SiteLevel,
+            Question::Effect(of()),
         ] {
             let mut f = Finding {
                 question,
@@ -245,6 +246,17 @@ analysis = { primary = "better" }
                 ..usual.clone()
             };
             told_of_all += &told(&f, |f| all(&of_ratings(&a, f)));
+            // One factor, and an interaction of three.
+            if matches!(f.question, Question::Effect(_)) {
+                let all = f.names.clone();
+                for names in [
+                    all[..1].to_vec(),
+                    [all.clone(), vec!["C".to_owned()]].concat(),
+                ] {
+                    f.names = names;
+                    told_of_all += &told(&f, |f| self::all(&of_ratings(&a, f)));
+                }
+            }
             // two that share the best mean
             if f.question == Question::Best {
                 f.test = None;

@@ -303,6 +303,9 @@ pub(super) fn plan(
     };
     Plan::of(protocol, &overrides).map_err(|error| {
         let hint = match error {
+            PlanError::Factors(_) => {
+                "plan the least interesting effect as a paired t test, with a program such as G*Power or Superpower"
+            }
             PlanError::FewRealizations(_) => "add realizations with a VAF to [[models]]",
             PlanError::NoMargin(_) => "equivalence_margin states which difference is negligible",
             PlanError::NoPilot => "add --from RESULTS, or thresholds: logit:-2,-1,…",

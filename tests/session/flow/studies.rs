@@ -45,6 +45,7 @@ pub(crate) fn plain() -> Protocol {
         duplicate_of: None,
         device: None,
         covariates: BTreeMap::new(),
+        levels: BTreeMap::new(),
     };
     let mut models: Vec<_> = MODELS[..3].iter().map(|id| model(id, Role::Test)).collect();
     models.push(model(PRACTICE, Role::Practice));

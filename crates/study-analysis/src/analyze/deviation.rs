@@ -62,6 +62,7 @@ pub fn deviations(before: &Protocol, after: &Protocol) -> Vec<Deviation> {
         exclude,
         alpha,
         construct,
+        model,
     } = &after.analysis;
     let b = &before.analysis;
     let mut found = Vec::new();
@@ -128,6 +129,15 @@ pub fn deviations(before: &Protocol, after: &Protocol) -> Vec<Deviation> {
     );
     compare("alpha", &[], shown(&b.alpha), shown(alpha));
     compare("construct", &[], shown(&b.construct), shown(construct));
+    compare("tested effects", &[], shown(&b.model), shown(model));
+    let factors = |protocol: &Protocol| {
+        let all = protocol.factors.iter();
+        joined(
+            all.map(|f| format!("{} ({})", f.id, f.levels.join(", ")))
+                .collect(),
+        )
+    };
+    compare("factors", &[], factors(before), factors(after));
     for new in &after.models {
         let Some(old) = before.model(&new.id) else {
             continue;
@@ -147,6 +157,16 @@ pub fn deviations(before: &Protocol, after: &Protocol) -> Vec<Deviation> {
             &[],
             numbers(old),
             numbers(new),
+        );
+        let levels = |m: &study_plan::protocol::ModelEntry| {
+            let all = m.levels.iter().map(|(k, v)| format!("{k} = {v}"));
+            joined(all.collect())
+        };
+        compare(
+            &format!("levels of {}", new.id),
+            &[],
+            levels(old),
+            levels(new),
         );
     }
     for new in &after.tracks {

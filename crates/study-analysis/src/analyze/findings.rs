@@ -6,6 +6,7 @@
 //! depends on the design and never on a rating.
 
 mod differ;
+mod factors;
 mod others;
 mod pairs;
 mod sites;
@@ -126,6 +127,10 @@ pub enum TestKind {
     BetweenSites,
     /// Welch's analysis of variance between groups of participants.
     Welch,
+    /// F of an effect of a factorial analysis of variance over participants.
+    FactorialAnova,
+    /// The same with the Greenhouse–Geisser correction.
+    FactorialAnovaGreenhouseGeisser,
 }
 
 impl TestKind {
@@ -155,6 +160,8 @@ impl TestKind {
             Self::BetweenWithin => "between-within",
             Self::BetweenSites => "between-sites",
             Self::Welch => "welch",
+            Self::FactorialAnova => "factorial-anova",
+            Self::FactorialAnovaGreenhouseGeisser => "factorial-anova-greenhouse-geisser",
         }
     }
 }
@@ -352,7 +359,8 @@ pub(super) fn findings(
             rules.better,
         ),
     };
-    let mut found = others::against_references(&facts);
+    let mut found = factors::factors(&facts);
+    found.extend(others::against_references(&facts));
     let about_vaf = AboutVaf {
         adjusted: &evidence.corr_adjusted,
         beside: Some((&evidence.corr, &evidence.equivalence)),

@@ -69,6 +69,59 @@ names! {
     ParameterName = "PARAMETER",
     /// The name of an item of a questionnaire.
     ItemName = "NAME",
+    /// The name of an effect: its factors, joined by `:`.
+    EffectName = "EFFECT",
+}
+
+/// Levels of some factors.
+#[derive(Debug, Clone, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct LevelsName(pub Vec<(String, String)>);
+
+/// A difference between two levels of a factor, where other factors have these levels.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct ContrastName {
+    /// The factor.
+    pub factor: String,
+    /// Its levels: the first minus the second.
+    pub levels: [String; 2],
+    /// Levels of other factors; over those that are not among them the mean is taken.
+    pub at: LevelsName,
+}
+
+/// A level or a factor in an identifier: what separates them there is written `%3D` and `%40`, too.
+fn separated(name: &str) -> String {
+    let name = escaped(name).replace('=', "%3D");
+    name.replace('@', "%40").replace(',', "%2C")
+}
+
+impl Key for LevelsName {
+    const PLACEHOLDER: &'static str = "FACTOR=LEVEL";
+
+    fn part(&self) -> Cow<'_, str> {
+        let one = |(factor, level): &(String, String)| {
+            format!("{}={}", separated(factor), separated(level))
+        };
+        let all: Vec<String> = self.0.iter().map(one).collect();
+        all.join(",").into()
+    }
+}
+
+impl Key for ContrastName {
+    const PLACEHOLDER: &'static str = "FACTOR=a|b";
+
+    fn part(&self) -> Cow<'_, str> {
+        let [a, b] = &self.levels;
+        let contrast = format!(
+            "{}={}|{}",
+            separated(&self.factor),
+            separated(a),
+            separated(b)
+        );
+        match self.at.0.is_empty() {
+            true => contrast.into(),
+            false => format!("{contrast}@{}", self.at.part()).into(),
+        }
+    }
 }
 
 /// Two realizations. The one whose name sorts first comes first.

@@ -37,6 +37,8 @@ pub enum Question {
     SiteVaf,
     /// Do the sites differ in their mean rating?
     SiteLevel,
+    /// Does this factor matter or, of several joined by `:`, does the effect of one depend on the others?
+    Effect(String),
 }
 
 impl Question {
@@ -58,6 +60,7 @@ impl Question {
             Self::SiteRealizations => "site-realizations".to_owned(),
             Self::SiteVaf => "site-vaf".to_owned(),
             Self::SiteLevel => "site-level".to_owned(),
+            Self::Effect(name) => group_id("effect", &[name]),
         }
     }
 }
@@ -71,7 +74,7 @@ impl Key for Question {
 }
 
 statistics! {
-    /// The answer to a question of the report: `vaf`, `delivered`, `memory`, `best`, `differ`, `pairs`, `disagreement`, `order`, `carry-over`, `reference/R`, `equivalence/R` (the realization with the best mean against the reference, anchor or physical sample R) or `repeat/D` (the hidden duplicate D), with several sites also `site-realizations`, `site-vaf` and `site-level`.
+    /// The answer to a question of the report: `vaf`, `delivered`, `memory`, `best`, `differ`, `pairs`, `disagreement`, `order`, `carry-over`, `reference/R`, `equivalence/R` (the realization with the best mean against the reference, anchor or physical sample R) or `repeat/D` (the hidden duplicate D), with several sites also `site-realizations`, `site-vaf` and `site-level`, with factors also `effect/E` (the factor E, or the interaction of several, joined by `:`).
     pub struct FindingNumbers {
         /// 1 (yes) or 0 (not shown)
         verdict: Stat,

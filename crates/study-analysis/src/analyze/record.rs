@@ -19,8 +19,8 @@
 //! 4. Findings and reports read `results.order.trial.slope.number()` instead of a string.
 
 pub use super::keys::{
-    CovariateName, DuplicateName, Key, PairName, ParticipantName, RealizationName, ReferenceName,
-    SiteName,
+    ContrastName, CovariateName, DuplicateName, EffectName, Key, LevelsName, PairName,
+    ParticipantName, RealizationName, ReferenceName, SiteName,
 };
 use super::values::{Value, Values};
 use std::borrow::Cow;

@@ -12,6 +12,7 @@ pub use super::describe::{
 };
 pub use super::disagreement::{Disagree, Interaction};
 pub use super::effects::{Anova, Differences, Friedman, Posthoc, TwoWay, TwoWayEffect};
+pub use super::factorial::{FactorialContrast, FactorialEffect, FactorialMean, FactorialTests};
 pub use super::headline::{
     EquivalenceOfVaf, Realistic, Sensitivity, SmallCorrelation, SmallEffect, Variance,
     VarianceShares,
@@ -32,8 +33,9 @@ pub use super::question::FindingNumbers;
 use super::question::Question;
 use super::record::statistics;
 pub use super::record::{
-    CovariateName, Declared, DuplicateName, Field, Interval, Key, List, Number, PairName,
-    ParticipantName, RealizationName, ReferenceName, SiteName, Stat, Why,
+    ContrastName, CovariateName, Declared, DuplicateName, EffectName, Field, Interval, Key,
+    LevelsName, List, Number, PairName, ParticipantName, RealizationName, ReferenceName, SiteName,
+    Stat, Why,
 };
 pub use super::reference::{DuplicateTest, ReferenceEquivalence, ReferenceTest, References};
 pub use super::rendering::{DeliveredVaf, Gain, Judged, Playbacks, RenderedVaf, Rendering};
@@ -61,6 +63,8 @@ statistics! {
         rendering: Option<Rendering> as "",
         /// the crossed mixed model with VAF
         crossed: LmmVafCrossed as "lmm_vaf_crossed",
+        /// the effects of the factors
+        factorial: Option<FactorialTests> as "",
         /// whether realizations differ
         differences: Differences as "",
         /// the means on which verdicts rest

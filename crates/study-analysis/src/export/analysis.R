@@ -114,6 +114,59 @@ if (has_ratings) {
   }
 }
 
+#' ## Effects of the factors
+#'
+#' The participants' means in each combination of levels, of those who rated every realization.
+#' Each effect is tested by orthonormal contrasts of these means, in a multivariate linear model
+#' with Greenhouse and Geisser's correction; with groups, sums of squares are of type III.
+
+# F, degrees of freedom and p of one effect; `y` has a column for each contrast.
+spherical <- function(y, group, of_group) {
+  if (length(group) == 0) {
+    full <- lm(y ~ 1)
+    less <- lm(y ~ 0)
+  } else {
+    coded <- model.matrix(~ group, contrasts.arg = list(group = "contr.sum"))
+    full <- lm(y ~ 0 + coded)
+    less <- if (of_group) lm(y ~ 1) else lm(y ~ 0 + coded[, -1])
+  }
+  if (ncol(y) == 1) {
+    found <- anova(less, full)
+    return(c(F = found$F[2], df1 = found$Df[2], df2 = found$Res.Df[2], p_gg = found[["Pr(>F)"]][2]))
+  }
+  found <- anova(full, less, X = ~0, test = "Spherical")
+  c(F = found$F[2], df1 = found[["num Df"]][2], df2 = found[["den Df"]][2], p_gg = found[["G-G Pr"]][2])
+}
+factors <- kept("factor")
+if (has_ratings && length(factors) > 0) {
+  of_models <- tested[!duplicated(tested$model), ]
+  of_models <- of_models[order(of_models$model), ]
+  combination <- interaction(of_models[factors], lex.order = TRUE)
+  cells <- tapply(tested$rating, list(tested$participant, tested$model), mean)
+  cells <- cells[rowSums(is.na(cells)) == 0, , drop = FALSE]
+  by_combination <- lapply(levels(combination), function(k) rowMeans(cells[, combination == k, drop = FALSE]))
+  wide <- do.call(cbind, by_combination)
+  group <- if (is.na(setting("group is a factor"))) character(0) else {
+    factor(participants$group[match(rownames(cells), participants$participant)])
+  }
+  sizes <- vapply(factors, function(name) nlevels(ratings[[name]]), 0L)
+  for (inside in seq_len(2^length(factors)) - 1) {
+    chosen <- bitwAnd(inside, 2^(seq_along(factors) - 1)) > 0
+    contrasts <- matrix(1)
+    for (i in seq_along(factors)) {
+      own <- if (chosen[i]) contr.helmert(sizes[i]) else matrix(1, sizes[i], 1)
+      contrasts <- kronecker(contrasts, sweep(own, 2, sqrt(colSums(own^2)), "/"))
+    }
+    for (of_group in if (length(group) > 0) c(FALSE, TRUE) else FALSE) {
+      name <- paste(c(factors[chosen], if (of_group) "group"), collapse = ":")
+      if (name == "") next
+      found <- spherical(wide %*% contrasts, group, of_group)
+      print(c(effect = name, signif(found, 6)), quote = FALSE)
+      value[paste0("factorial/", name, "/", names(found))] <- found
+    }
+  }
+}
+
 #' ## VAF and mean rating
 #'
 #' The mean of each participant's ratings of a realization, then the mean over
@@ -135,6 +188,7 @@ correlated <- function(x, y) {
   }
   list(r = cor(x, y), p_exact = p)
 }
+if (has_ratings) value["corr/n_models"] <- 0
 with_vaf <- if (has_ratings) tested[!is.na(tested$vaf), ] else data.frame()
 if (nrow(with_vaf) > 0) {
   with_vaf$model <- droplevels(with_vaf$model)

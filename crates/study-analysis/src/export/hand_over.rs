@@ -278,6 +278,14 @@ fn settings(
     {
         put("share of", option);
     }
+    if let Some(crossing) = protocol.crossing() {
+        for factor in &crossing.factors {
+            put(&format!("factor {}", factor.id), "true");
+        }
+        if !crossing.groups.is_empty() {
+            put("group is a factor", "true");
+        }
+    }
     for part in parts.iter().filter_map(|own| protocol.part(&own.part)) {
         let question = asked(protocol, part).map_or("", |q| q.as_str());
         let kind = match part.task {

@@ -10,7 +10,7 @@ use study_base::text::ModelId;
 use study_plan::protocol::columns::{
     Column, IntervalColumn, Kind, ParticipantColumn, RatingColumn, Repeats, Typed,
 };
-use study_plan::protocol::{Protocol, Question, Scale};
+use study_plan::protocol::{Factor, Protocol, Question, Scale};
 use study_session::outcome::cell::{Cell, Header, Row};
 use study_session::outcome::{IntervalRow, ParticipantRow, RatingRow};
 
@@ -328,6 +328,7 @@ impl<'a> Realizations<'a> {
             .filter(|(c, _)| *c == RatingColumn::Covariates);
         let covariates: Vec<&str> = covariates.map(|(_, name)| name.as_str()).collect();
         fields.extend((covariates.iter()).map(|c| covariate_field(c)));
+        fields.extend(self.protocol.factors.iter().map(factor_field));
         let number = |x: Option<f64>| x.map_or(Cell::Empty, Cell::Number);
         let text = |t: Option<&str>| t.map_or(Cell::Empty, |t| Cell::Text(t.to_owned().into()));
         let row = |(id, level): &(ModelId, Option<(&str, f64)>)| {
@@ -346,6 +347,10 @@ impl<'a> Realizations<'a> {
                 (covariates.iter())
                     .map(|c| number(model.and_then(|m| m.covariates.get(*c)).copied())),
             );
+            cells.extend(self.protocol.factors.iter().map(|factor| {
+                let level = model.and_then(|m| m.levels.get(factor.id.as_str()));
+                text(level.map(String::as_str))
+            }));
             cells
         };
         Table {
@@ -372,6 +377,16 @@ fn covariate_field(name: &str) -> Field {
     field
 }
 
+fn factor_field(factor: &Factor) -> Field {
+    let mut field = Field::declared(RatingColumn::Levels.column(), factor.id.as_str());
+    field.meaning = "level of the realization in the factor".to_owned();
+    field.levels = (factor.levels.iter())
+        .map(|level| (level.clone(), level.clone()))
+        .collect();
+    field.ordered = true;
+    field
+}
+
 /// The unit of a level is that of its family, if there is only one.
 fn level_field(mut field: Field, protocol: &Protocol) -> Field {
     let units: Vec<_> = protocol.families.iter().map(|f| &f.unit).collect();
@@ -392,6 +407,10 @@ impl<'a> Tables<'a> {
             let mut field = Field::declared(column, name);
             match name {
                 _ if column.repeats == Repeats::Covariate => field = covariate_field(name),
+                _ if column.repeats == Repeats::Factor => {
+                    let factor = protocol.factors.iter().find(|f| f.id.as_str() == name);
+                    field = factor.map_or(field, factor_field);
+                }
                 "vaf" | "rendered_vaf" | "delivered_vaf" => field.max = Some(1.0),
                 "level" | "level_proposed" => field = level_field(field, protocol),
                 name if is_realization(name) => field.levels.clone_from(&levels),

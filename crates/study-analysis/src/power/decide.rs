@@ -223,6 +223,7 @@ impl<'a> Judge<'a> {
                 state: None,
                 reason: String::new(),
                 site: None,
+                group: None,
             })
             .collect();
         made.models = (0..q)

@@ -27,6 +27,11 @@ pub enum PlanError {
     /// Too few realizations with a VAF.
     #[error("{0} tested realizations have a VAF, but a correlation over them takes three")]
     FewRealizations(usize),
+    /// A factorial study without VAF.
+    #[error(
+        "the power of effects of [[factors]] is not computed, only that of VAF, and {0} tested realizations have one"
+    )]
+    Factors(usize),
     /// No number and no part of pairs or tracks.
     #[error("`{0}` is no rating, and no part of pairs or tracks asks it")]
     NoRatings(QuestionId),
@@ -232,6 +237,9 @@ impl Plan {
         let asked = protocol.questions.iter().find(|q| q.id == *primary);
         if asked.is_some_and(|q| !q.kind.scale().is_number()) {
             return Err(PlanError::NoRatings(primary.clone()));
+        }
+        if listed.len() < 3 && !protocol.factors.is_empty() {
+            return Err(PlanError::Factors(listed.len()));
         }
         if listed.len() < 3 {
             return Err(PlanError::FewRealizations(listed.len()));

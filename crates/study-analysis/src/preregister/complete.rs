@@ -35,6 +35,11 @@ pub fn complete_study(protocol: &Protocol, question: &QuestionId, participants: 
     let mut models: Vec<_> = protocol.models.iter().filter(presented).collect();
     let participants = participants.min(ENOUGH);
     models.sort_by(|a, b| a.id.as_str().cmp(b.id.as_str()));
+    let groups = protocol.groups.as_ref().map_or(&[][..], |g| &g.list);
+    let group_of = |i: u32| {
+        let group = groups.get(i as usize % groups.len().max(1));
+        group.map(|group| group.id.to_string())
+    };
     let mut made = Ratings {
         question: question.to_string(),
         subjects: (0..participants)
@@ -43,6 +48,7 @@ pub fn complete_study(protocol: &Protocol, question: &QuestionId, participants: 
                 state: None,
                 reason: String::new(),
                 site: None,
+                group: group_of(i),
             })
             .collect(),
         models: (models.iter())

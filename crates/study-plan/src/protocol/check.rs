@@ -269,7 +269,10 @@ fn realizations(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
         return;
     }
     // What ratings are correlated with.
-    let of_forces = tests(protocol).any(|m| m.file.is_some() || m.vaf.is_some());
+    let has_vaf = tests(protocol).any(|m| m.vaf.is_some());
+    let has_file = tests(protocol).any(|m| m.file.is_some());
+    // A factorial study compares levels, unless it states a VAF.
+    let of_forces = has_vaf || (has_file && protocol.factors.is_empty());
     let with = match of_forces {
         true => "VAF",
         false if tests(protocol).any(|m| !m.covariates.is_empty()) => "a covariate",

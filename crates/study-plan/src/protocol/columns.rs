@@ -33,6 +33,8 @@ pub enum Repeats {
     Question,
     /// One for each covariate of the realizations, by name.
     Covariate,
+    /// One for each factor, named by its id.
+    Factor,
 }
 
 /// The declaration of a column.
@@ -335,8 +337,7 @@ table! {
         ).empty("not known, or the force did not vary").optional(),
         DeliveredVaf: number(
             "delivered_vaf",
-            "VAF of what was delivered: of the table's force on the validation recording, with the gain \
-             and the delay of the playback",
+            "VAF of what was delivered: of the table's force on the validation recording, with the gain and the delay of the playback",
         ).empty("not judged, or there is no validation recording with the protocol").optional(),
         RenderedGain: number("rendered_gain", "slope of the commanded on the table's force")
             .empty("not known, or the force did not vary").optional(),
@@ -365,6 +366,8 @@ table! {
             .empty("not judged").optional(),
         ErrorJnd: number("error_jnd", "largest difference from the right force that lasted 20 ms, in just noticeable differences")
             .empty("not known").optional(),
+        Levels: text("one for each factor", "level of the realization in the factor; factors in the order of the protocol")
+            .empty("the realization is not part of the factorial design").repeats(Repeats::Factor),
     }
 }
 

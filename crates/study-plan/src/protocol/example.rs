@@ -47,6 +47,7 @@ pub fn model(id: &str) -> ModelEntry {
         duplicate_of: None,
         device: None,
         covariates: BTreeMap::new(),
+        levels: BTreeMap::new(),
     }
 }
 

@@ -12,6 +12,7 @@ mod agree;
 mod analysis;
 mod design;
 mod device;
+mod factors;
 mod families;
 mod general;
 mod grids;
@@ -60,6 +61,9 @@ pub const ROOT: &[Key] = keys! {
     "trial": Kind::Table(general::TRIAL), "";
     /// The realizations; at least one whose role is not `practice`.
     "models": Kind::Tables(models::MODELS), "", derived("required, unless every part takes its levels from families");
+    /// The factors of a factorial design: what is varied within participants. Every combination of
+    /// their levels has a realization. Needs the format `study-protocol/3`.
+    "factors": Kind::Tables(factors::FACTORS), "";
     /// The parts of a session, in their order. Without any, the study is one rating part, whose
     /// keys are in `[design]`. Parts need the format `study-protocol/2`.
     "parts": Kind::Variants(&parts::PARTS), "";
@@ -109,8 +113,11 @@ const FORMATS: &[Word] = &[
 const OF_FORMAT_2: [&str; 5] = ["parts", "families", "tracks", "groups", "sessions"];
 
 /// Keys that need [`FORMAT_3`], without the places in lists.
-pub const OF_FORMAT_3: [&str; 4] = [
+pub const OF_FORMAT_3: [&str; 7] = [
     "design.order_version",
+    "factors",
+    "models.levels",
+    "analysis.model",
     "device.commissioned_within_days",
     "tracks.relative",
     "tracks.condition",
@@ -306,6 +313,8 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
     let device = root.section("device").and_then(device::read);
     let trial = root.section("trial").and_then(general::trial);
     let models = root.sections("models").into_iter().map(models::read);
+    let factors = root.sections("factors").into_iter().map(factors::read);
+    let factors: Option<Vec<_>> = factors.collect();
     let mut questions = questions::read(&mut root, "questions");
     let own_questions = raw.questions();
     let has_faulty_parts = raw.rating_parts() + own_questions.len() < raw.parts.len();
@@ -324,6 +333,7 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
         minimum_strokes: trial.as_ref().map_or(0, |t| t.minimum_strokes),
         exposure: trial.as_ref().map(|t| t.exposure).unwrap_or_default(),
         models: models.collect(),
+        factors: factors.as_deref().unwrap_or_default(),
         questions,
         setup,
         intake,
@@ -345,6 +355,11 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
         let known = groups.as_ref().and_then(Option::as_ref);
         groups::agree(known, sessions, (parts, families), document);
     }
+    if let (Some(factors), false) = (&factors, broken) {
+        let known = groups.as_ref().and_then(Option::as_ref);
+        let rules = analysis.as_ref();
+        factors::agree(factors, &sections.models, known, rules, document);
+    }
     sections.fill_duplicates();
     let Sections {
         models,
@@ -362,6 +377,7 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
         session: session?,
         trial: trial?,
         models: models?,
+        factors: factors?,
         questions: all(questions)?,
         setup: all(setup)?,
         intake: all(intake)?,

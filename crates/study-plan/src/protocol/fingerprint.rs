@@ -86,6 +86,7 @@ pub fn parts(
         device,
         trial,
         models,
+        factors,
         questions,
         setup,
         intake,
@@ -219,7 +220,14 @@ pub fn parts(
         "participants": participants,
         "models": known,
     });
-    // Absent from the fingerprints of protocols without it.
+    // Absent from the fingerprints of protocols without them.
+    if !factors.is_empty() {
+        analysis["factors"] = json!(factors);
+        let levels = models
+            .iter()
+            .map(|m| json!({ "id": m.id, "levels": m.levels }));
+        analysis["levels"] = levels.collect();
+    }
     if device.rendering != super::RenderingRules::default() {
         analysis["rendering"] = json!(device.rendering);
     }

@@ -72,6 +72,8 @@ pub enum Kind {
     NumberLabels,
     /// A table of numbers by name.
     Numbers,
+    /// A table of texts by name.
+    TextsByName,
     /// A table of sentences by the key of a [`Phrase`](super::phrases::Phrase).
     Sentences,
     /// A section.
@@ -219,6 +221,7 @@ impl Kind {
             Self::WholeLabels => "a table of texts by whole number".to_owned(),
             Self::NumberLabels => "a table of texts by number".to_owned(),
             Self::Numbers => "a table of numbers by name".to_owned(),
+            Self::TextsByName => "a table of texts by name".to_owned(),
             Self::Sentences => "a table of texts by the key of a sentence".to_owned(),
             Self::Table(_) | Self::Variant(_) => "a table".to_owned(),
             Self::Tables(_) | Self::Variants(_) => "tables".to_owned(),

@@ -93,6 +93,7 @@ fn of(kind: Kind) -> Value {
         Kind::WholeLabels => map("^-?[0-9]+$", text),
         Kind::NumberLabels => map("^-?[0-9]+([.][0-9]+)?$", text),
         Kind::Numbers => map(Id::Question.pattern(), json!({ "type": "number" })),
+        Kind::TextsByName => map(Id::Question.pattern(), text),
         Kind::Sentences => {
             let keys = super::phrases::Phrase::ALL.iter().map(|p| p.key());
             map(&format!("^({})$", keys.collect::<Vec<_>>().join("|")), text)

@@ -247,6 +247,36 @@ fn exclusions(a: &Analysis) -> Vec<String> {
     text
 }
 
+/// The factorial design, and how its effects were tested.
+fn factors(a: &Analysis) -> Option<String> {
+    let crossing = a.crossing.as_ref()?;
+    let mut factors: Vec<String> = (crossing.factors.iter())
+        .map(|factor| format!("{} ({})", factor.id, factor.levels.join(", ")))
+        .collect();
+    if !crossing.groups.is_empty() {
+        factors.push(format!(
+            "group between participants ({})",
+            crossing.groups.join(", ")
+        ));
+    }
+    let n = crossing.effects.len();
+    let effects = match n {
+        1 => "Its effect was".to_owned(),
+        n => format!("{} effects were", capital(&apa::count(n))),
+    };
+    let correction = match n {
+        1 => "",
+        _ => ", and Holm's correction over the effects",
+    };
+    Some(format!(
+        "The factors were {}. {effects} tested by a repeated-measures analysis of variance of the participants' \
+         means in each combination of levels, each effect within participants against its own interaction with \
+         participants, with the Greenhouse–Geisser correction{correction}; simple effects by t tests over \
+         participants with Holm's correction. An aligned rank transform (Wobbrock et al., 2011) is given besides.",
+        apa::listing(&factors)
+    ))
+}
+
 /// How differences between realizations were tested.
 fn differences(a: &Analysis) -> Option<String> {
     let test = a.finding(&Question::Differ)?.test.as_ref()?;
@@ -321,6 +351,7 @@ fn tests(a: &Analysis) -> Vec<String> {
              correlation over the {means}; {p}."
         ));
     }
+    text.extend(factors(a));
     text.extend(differences(a));
     let wilcoxon = (a.results.posthoc.values()).any(|p| defined(&p.p_wilcoxon_exact));
     let test = finding(&Question::Pairs).and_then(|f| f.test.as_ref());

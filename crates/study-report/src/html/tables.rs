@@ -55,7 +55,13 @@ fn shown(cell: &Cell) -> Markup {
 }
 
 pub(super) fn section(a: &Analysis) -> Markup {
-    let mut all = vec![tables::realizations(a, ""), tables::pairs(a)];
+    let mut all = vec![
+        tables::factors::effects(a),
+        tables::factors::means(a),
+        tables::factors::contrasts(a),
+        tables::realizations(a, ""),
+        tables::pairs(a),
+    ];
     all.extend(tables::against_references(a));
     all.extend([
         tables::repeats(a),

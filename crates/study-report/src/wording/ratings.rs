@@ -196,6 +196,38 @@ fn texts(f: &Finding) -> Wording {
             paper: "{said}, {result} ({corrected} of the participants' slopes).",
             ..USUAL
         },
+        Question::Effect(_) => {
+            let (ask, about, yes, not_shown) = match f.names.len() {
+                0 | 1 => (
+                    "Does {factor} matter?",
+                    "Whether {factor} matters",
+                    "{factor} had an effect on {asked}{levels}",
+                    "An effect of {factor} on {asked} was not shown{levels}",
+                ),
+                2 => (
+                    "Does the effect of {factor} depend on {other-factor}?",
+                    "Whether the effect of {factor} depends on {other-factor}",
+                    "The effect of {factor} on {asked} depended on {other-factor}",
+                    "A dependence of the effect of {factor} on {other-factor} was not shown",
+                ),
+                _ => (
+                    "Do {factors} interact?",
+                    "Whether {factors} interact",
+                    "{factors} interacted in their effect on {asked}",
+                    "An interaction of {factors} was not shown",
+                ),
+            };
+            Wording {
+                ask,
+                about,
+                yes,
+                not_shown,
+                answer: "{verdict}{levels}: {result}{effect-of} ({of-effects}, {people}).",
+                paper: "{said}, {result}{effect-of} ({of-effects}).",
+                declared: "{of-effects}, level {level}",
+                ..USUAL
+            }
+        }
         Question::SiteLevel => Wording {
             ask: "Do the sites differ in their mean rating?",
             about: "Whether the sites differ in their mean rating",
@@ -280,6 +312,20 @@ fn value(a: &Analysis, f: &Finding, key: &str) -> Option<String> {
             let decimals = apa::decimals(evidence.order.trial.se.number().unwrap_or(0.0), 3);
             (f.estimate).map_or_else(String::new, |e| apa::number(e.value, decimals))
         }
+        "factor" => f.names.first()?.clone(),
+        "other-factor" => f.names.get(1)?.clone(),
+        "factors" => apa::listing(&f.names),
+        "levels" => levels(a, f).unwrap_or_default(),
+        "effect-of" => (f.effect.as_ref()).map_or_else(String::new, |e| {
+            format!(", generalized η² = {}", apa::share(e.value, 2))
+        }),
+        "of-effects" => test.map_or_else(String::new, |t| {
+            let name = sentences::test_name(t.kind);
+            match t.comparisons {
+                0 | 1 => name.to_owned(),
+                n => format!("{name}, Holm's correction over {n} effects"),
+            }
+        }),
         "margin" => {
             let Question::Equivalence(of) = &f.question else {
                 return None;
@@ -293,6 +339,22 @@ fn value(a: &Analysis, f: &Finding, key: &str) -> Option<String> {
         "later" => String::new(),
         _ => return None,
     })
+}
+
+/// Of a factor with two levels how much higher the second was rated than the first: the level's
+/// name and the difference.
+fn levels(a: &Analysis, f: &Finding) -> Option<String> {
+    let estimate = f.estimate.as_ref()?;
+    let crossing = a.crossing.as_ref()?;
+    let [name] = &f.names[..] else {
+        return None;
+    };
+    let factor = crossing.factors.iter().find(|x| x.id.as_str() == name)?;
+    let [first, second] = &factor.levels[..] else {
+        return None;
+    };
+    let size = sentences::estimate(estimate, apa::two);
+    Some(format!(" ({second} − {first}: {size})"))
 }
 
 /// The effect size of Friedman's test.

@@ -105,6 +105,7 @@ fields! {
         let mut found = answers.iter().filter(|(id, _)| id.as_str() == name);
         found.next().map_or(Cell::Empty, |(_, answer)| Field::cell(answer, name))
     };
+    BTreeMap<String, String>: |texts, name| texts.get(name).map_or(Cell::Empty, |text| Cell::text(text));
     BTreeMap<String, f64>: |numbers, name| numbers.get(name).map_or(Cell::Empty, |x| x.cell(name));
 }
 
@@ -127,6 +128,7 @@ fn header<C: Copy>(all: &[C], declaration: fn(C) -> Column, repeated: &Repeated<
         Repeats::Once => vec![column.name],
         Repeats::Question => repeated.questions.clone(),
         Repeats::Covariate => repeated.covariates.clone(),
+        Repeats::Factor => repeated.factors.clone(),
     };
     (all.iter())
         .filter(|c| declaration(**c).is_in(repeated.has_parts, repeated.has_replays))
@@ -142,6 +144,7 @@ fn header<C: Copy>(all: &[C], declaration: fn(C) -> Column, repeated: &Repeated<
 struct Repeated<'a> {
     questions: Vec<&'a str>,
     covariates: Vec<&'a str>,
+    factors: Vec<&'a str>,
     /// Whether the study has parts.
     has_parts: bool,
     /// Whether its trials can be felt again.
@@ -150,7 +153,7 @@ struct Repeated<'a> {
 
 impl RatingRow {
     /// The header of `ratings.csv`: questions in the protocol's order, covariates
-    /// sorted by name.
+    /// sorted by name, factors in the protocol's order.
     pub fn header(protocol: &Protocol) -> Header<RatingColumn> {
         let models = protocol.models.iter();
         let covariates: BTreeSet<&str> = models
@@ -159,6 +162,7 @@ impl RatingRow {
         let repeated = Repeated {
             questions: protocol.questions.iter().map(|q| q.id.as_str()).collect(),
             covariates: covariates.into_iter().collect(),
+            factors: protocol.factors.iter().map(|f| f.id.as_str()).collect(),
             has_parts: !protocol.parts.is_empty(),
             has_replays: protocol.trial.exposure.replays > 0,
         };
@@ -292,6 +296,7 @@ row! {
         Status: status,
         Vaf: vaf,
         Covariates: covariates,
+        Levels: levels,
         Part: part,
         Track: track,
         Level: level,

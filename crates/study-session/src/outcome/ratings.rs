@@ -79,6 +79,8 @@ pub struct Subject {
     pub reason: String,
     /// Index into [`Ratings::sites`], in a study of several sites.
     pub site: Option<u32>,
+    /// The participant's group, in a study with groups.
+    pub group: Option<String>,
 }
 
 /// A text that was answered or remarked in a trial.
@@ -249,13 +251,14 @@ impl Ratings {
         }
     }
 
-    /// Sets the states of the participants.
+    /// Sets the states and groups of the participants.
     pub fn set_states(&mut self, participants: &[ParticipantRow]) {
         for p in participants {
             let id = p.participant.as_str();
             if let Ok(i) = self.subjects.binary_search_by(|s| s.id.as_str().cmp(id)) {
                 self.subjects[i].state = Some(p.state);
                 self.subjects[i].reason.clone_from(&p.reason);
+                self.subjects[i].group = p.group.as_ref().map(ToString::to_string);
             }
         }
     }

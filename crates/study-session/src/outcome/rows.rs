@@ -68,6 +68,8 @@ pub struct RatingRow {
     pub status: Status,
     pub vaf: Option<f64>,
     pub covariates: BTreeMap<String, f64>,
+    /// Factor → level of the realization.
+    pub levels: BTreeMap<String, String>,
     pub part: Option<PartId>,
     pub track: Option<PartId>,
     pub level: Option<f64>,
@@ -128,6 +130,7 @@ impl RatingRow {
             status: Status::Ok,
             vaf: None,
             covariates: BTreeMap::new(),
+            levels: BTreeMap::new(),
             part: None,
             track: None,
             level: None,

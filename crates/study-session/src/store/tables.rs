@@ -185,6 +185,7 @@ mod tests {
             status,
             vaf: d.maybe(Draws::number),
             covariates: BTreeMap::from([("lambda".to_owned(), d.number())]),
+            levels: BTreeMap::from([("friction".to_owned(), d.text())]),
             part: Some(PartId::new("p").unwrap()),
             track: d.maybe(|_| PartId::new("t").unwrap()),
             level: d.maybe(Draws::number),
@@ -304,6 +305,7 @@ mod tests {
                 Repeats::Once => vec![(*c, declaration(*c).name.to_owned())],
                 Repeats::Question => questions.iter().map(|q| (*c, (*q).to_owned())).collect(),
                 Repeats::Covariate => vec![(*c, "lambda".to_owned())],
+                Repeats::Factor => vec![(*c, "friction".to_owned())],
             })
             .collect()
     }

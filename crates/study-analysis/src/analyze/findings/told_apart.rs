@@ -27,9 +27,10 @@ pub(super) fn withdraw(
                 vaf.as_ref().or(one_order.as_ref())
             }
             Question::Best | Question::Differ => all.as_ref().or(one_order.as_ref()),
-            Question::Pairs | Question::Reference(_) | Question::Equivalence(_) => {
-                one_order.as_ref()
-            }
+            Question::Effect(_)
+            | Question::Pairs
+            | Question::Reference(_)
+            | Question::Equivalence(_) => one_order.as_ref(),
             Question::Disagreement
             | Question::Order
             | Question::CarryOver

@@ -26,6 +26,14 @@ pub(super) fn of_ratings(analysis: &Analysis) -> Vec<Number> {
     let mut numbers = Numbers(Vec::new());
     let described = ["n", "mean", "sd"];
     numbers.each("desc", &results.descriptives.desc, &described, CLOSED);
+    if let Some(tests) = &evidence.factorial {
+        numbers.each(
+            "factorial",
+            &tests.effects,
+            &["F", "df1", "df2", "p_gg"],
+            CLOSED,
+        );
+    }
     let correlation = ["n_models", "pearson/r", "pearson/p_t"];
     numbers.add("corr", &evidence.corr, &correlation, CLOSED);
     if evidence.corr.n() <= MAX_PERMUTED {

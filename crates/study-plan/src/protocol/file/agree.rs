@@ -8,7 +8,7 @@ use crate::protocol::columns::{
     is_participants_column, is_participants_column_of_parts, is_parts_column, is_ratings_column,
 };
 use crate::protocol::{
-    AnalysisRules, Design, DeviceKind, DeviceRules, Exposure, Order, Role, Scale,
+    AnalysisRules, Design, DeviceKind, DeviceRules, Exposure, Factor, Order, Role, Scale,
 };
 use study_base::diagnostic::table::Document;
 use study_base::diagnostic::{Fault, did_you_mean};
@@ -22,6 +22,7 @@ pub(super) struct Sections<'a> {
     pub(super) minimum_strokes: u32,
     pub(super) exposure: Exposure,
     pub(super) models: Vec<PartialModel>,
+    pub(super) factors: &'a [Factor],
     pub(super) questions: Vec<PartialQuestion>,
     pub(super) setup: Vec<PartialQuestion>,
     pub(super) intake: Vec<PartialQuestion>,
@@ -244,7 +245,7 @@ impl Sections<'_> {
         }
     }
 
-    /// Questions and covariates become columns: of `ratings.csv`, or of
+    /// Questions, covariates and factors become columns: of `ratings.csv`, or of
     /// `participants.csv` for those that are asked once.
     fn columns(&self, document: &Document<'_>) {
         let mut taken: Vec<String> = Vec::new();
@@ -264,6 +265,23 @@ impl Sections<'_> {
         let mut once: Vec<String> = Vec::new();
         for question in self.setup.iter().chain(&self.intake).chain(&self.outro) {
             column(document, question, &mut once, fixed_once, participants);
+        }
+        for (i, factor) in self.factors.iter().enumerate() {
+            let name = factor.id.as_str();
+            let covariate = |model: &PartialModel| {
+                let mut names = model.covariates.keys();
+                names.any(|own| own.eq_ignore_ascii_case(name))
+            };
+            let fault = if fixed_in_ratings(name) {
+                fixed(name, ratings)
+            } else if taken.iter().any(|t| t.eq_ignore_ascii_case(name)) {
+                Fault::error(format!("`{name}` is a question and a factor"))
+            } else if self.models.iter().any(covariate) {
+                Fault::error(format!("`{name}` is a covariate and a factor"))
+            } else {
+                continue;
+            };
+            document.fault(fault.at(at(document, &format!("factors[{i}]"), "id")));
         }
         let mut reported: Vec<&str> = Vec::new();
         for model in &self.models {

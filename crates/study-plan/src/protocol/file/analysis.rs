@@ -33,6 +33,10 @@ pub(super) const ANALYSIS: &[Key] = keys! {
     "alpha": Kind::Number((Bound::Excluded(0.0), Bound::Excluded(1.0)), ""), "0.01";
     /// What the primary question measures, as a noun: the report uses it in its sentences.
     "construct": Kind::Text, r#""pleasantness""#;
+    /// Which effects of `[[factors]]` are tested, as a formula: `a * b` stands for both main
+    /// effects and their interaction, `a:b` for the interaction alone, and `+` adds effects.
+    /// `group` is the factor between participants. Without it every effect is tested.
+    "model": Kind::Text, r#""realism ~ friction * detent""#;
 };
 
 static EXCLUDE: Variants = Variants {
@@ -52,6 +56,7 @@ pub(super) fn read(mut section: Section<'_, '_>) -> Option<AnalysisRules> {
     let unfinished = section.word("unfinished");
     let alpha = section.number("alpha");
     let construct = section.text("construct");
+    let model = section.text("model");
     let exclude = (section.variants("exclude", rules::RULES).into_iter())
         .filter_map(|(mut section, rule)| (rule?.read)(&mut |name| section.number(name)))
         .collect();
@@ -66,5 +71,6 @@ pub(super) fn read(mut section: Section<'_, '_>) -> Option<AnalysisRules> {
         exclude,
         alpha,
         construct,
+        model,
     })
 }

@@ -2,7 +2,7 @@
 
 use super::Content;
 use crate::protocol::keys::{Id, Key, Kind, NumberRange, Words as _, keys};
-use crate::protocol::section::Section;
+use crate::protocol::section::{Section, text};
 use crate::protocol::{DeviceKind, ModelEntry, Role};
 use std::collections::BTreeMap;
 use std::ops::Bound;
@@ -32,6 +32,8 @@ pub(super) const MODELS: &[Key] = keys! {
     /// Numbers that may explain the ratings. Each becomes a column of the results and is
     /// correlated with the ratings.
     "covariates": Kind::Numbers, "{ lambda = 0.9995, dx_mm = 1.0 }";
+    /// Its level in each of `[[factors]]`. A realization under study has one in each; no other has any.
+    "levels": Kind::TextsByName, r#"{ friction = "low", detent = "crisp" }"#;
 };
 
 /// An entry that may be faulty in part.
@@ -50,6 +52,7 @@ pub(super) struct PartialModel {
     pub(super) duplicate_of: Option<ModelId>,
     pub(super) device: Option<DeviceKind>,
     pub(super) covariates: BTreeMap<String, f64>,
+    pub(super) levels: BTreeMap<String, String>,
 }
 
 impl PartialModel {
@@ -71,6 +74,7 @@ impl PartialModel {
             duplicate_of: self.duplicate_of,
             device: self.device,
             covariates: self.covariates,
+            levels: self.levels,
         })
     }
 }
@@ -90,6 +94,7 @@ pub(super) fn read(mut section: Section<'_, '_>) -> PartialModel {
         duplicate_of: section.model_id("duplicate_of"),
         device: section.word("device"),
         covariates: covariates(&mut section),
+        levels: levels(&mut section),
     }
 }
 
@@ -116,6 +121,13 @@ fn file(section: &mut Section<'_, '_>) -> (Option<String>, Content) {
     }
     let file = format!("bundles/{hash}.tar");
     (Some(file), Content::Bundle(Some(hash.to_owned())))
+}
+
+fn levels(section: &mut Section<'_, '_>) -> BTreeMap<String, String> {
+    let entries = section.entries("levels").into_iter();
+    entries
+        .filter_map(|(name, value)| Some((name, text(&value)?)))
+        .collect()
 }
 
 fn covariates(section: &mut Section<'_, '_>) -> BTreeMap<String, f64> {

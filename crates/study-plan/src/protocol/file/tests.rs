@@ -565,6 +565,7 @@ fn any_text_is_read_without_a_panic() {
     assert!(parse("p", &bom).protocol.is_some());
 }
 
+mod factors;
 mod fits;
 mod keys;
 mod parts;

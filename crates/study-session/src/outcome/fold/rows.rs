@@ -121,6 +121,7 @@ impl History {
             },
             vaf: entry.and_then(|m| m.vaf),
             covariates: entry.map(|m| m.covariates.clone()).unwrap_or_default(),
+            levels: entry.map(|m| m.levels.clone()).unwrap_or_default(),
             part: trial.part.clone(),
             track: trial.track().cloned(),
             level: (track.and_then(TrackRules::family))

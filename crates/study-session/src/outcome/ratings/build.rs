@@ -118,6 +118,7 @@ impl Builder {
                 state: None,
                 reason: String::new(),
                 site: None,
+                group: None,
             });
         }
         at

@@ -26,8 +26,9 @@ fn example(key: &Key) -> Value {
     table["v"].clone()
 }
 
-/// Without parts their order is refused, and the share of an answer without a choice.
-const LEFT_OUT: [&str; 2] = ["parts_order", "share_of"];
+/// Without parts their order is refused, without a choice the share of an answer, and without
+/// factors levels and the effects that are tested; `factors` tests those.
+const LEFT_OUT: [&str; 4] = ["parts_order", "share_of", "levels", "model"];
 
 fn with_examples<'a>(keys: impl IntoIterator<Item = &'a Key>) -> Table {
     (keys.into_iter())
@@ -110,11 +111,11 @@ fn table_at<'t>(document: &'t mut Table, path: &[&str]) -> &'t mut Table {
 fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
     let mut whole = least();
-    // Keys of parts exclude each other; `parts` tests them.
-    let root = || {
-        ROOT.iter()
-            .filter(|key| !crate::protocol::file::OF_FORMAT_2.contains(&key.name))
+    // Keys of parts exclude each other; `parts` tests them. Factors need levels of all realizations.
+    let elsewhere = |key: &&Key| {
+        crate::protocol::file::OF_FORMAT_2.contains(&key.name) || key.name == "factors"
     };
+    let root = || ROOT.iter().filter(|key| !elsewhere(key));
     for key in root() {
         match key.kind {
             Kind::Table(keys) => tables(vec![key.name], keys, &mut cases),
@@ -355,6 +356,7 @@ fn bad_values(kind: Kind) -> Vec<Value> {
         Kind::WholeLabels => parsed(&["1", "{ x = \"a\" }", "{ 1 = \"\" }", "{ 1 = 2 }"]),
         Kind::NumberLabels => parsed(&["1", "{ x = \"a\" }", "{ 0 = \"\" }", "{ 5000 = \"a\" }"]),
         Kind::Numbers => parsed(&["1", "{ a = \"1\" }", "{ a = nan }", "{ \"a b\" = 1 }"]),
+        Kind::TextsByName => parsed(&["1", "{ a = 1 }", "{ a = \"\" }"]),
         Kind::Sentences => parsed(&[
             "1",
             "{ zz = \"a\" }",

@@ -1,0 +1,281 @@
+use crate::analyze::findings::Direction;
+use crate::analyze::{Analysis, Question, Rules, TestKind, Verdict, analyze};
+use study_base::text::QuestionId;
+use study_plan::protocol::{Crossing, Factor};
+use study_session::outcome::ratings::Ratings;
+
+/// Nine participants rate each combination of friction (low, high) and grain (fine, medium,
+/// coarse) twice; made with random numbers, so that no effect is exact.
+const RATINGS: [(&str, &str); 9] = [
+    ("novices", "343233433555"),
+    ("experts", "557555666677"),
+    ("novices", "545454656767"),
+    ("novices", "333332435454"),
+    ("experts", "455666567777"),
+    ("experts", "555445667777"),
+    ("novices", "554454654776"),
+    ("experts", "545566566777"),
+    ("experts", "233433432566"),
+];
+
+const FRICTION: [&str; 2] = ["low", "high"];
+const GRAIN: [&str; 3] = ["fine", "medium", "coarse"];
+
+fn factor(id: &str, levels: &[&str]) -> Factor {
+    Factor {
+        id: QuestionId::new(id).unwrap(),
+        levels: levels.iter().map(|l| (*l).to_owned()).collect(),
+    }
+}
+
+fn crossing(groups: &[&str], effects: &[&[usize]]) -> Crossing {
+    let combinations = (0..2).flat_map(|a| (0..3).map(move |b| (a, b)));
+    Crossing {
+        factors: vec![factor("friction", &FRICTION), factor("grain", &GRAIN)],
+        levels_of: combinations
+            .map(|(a, b)| (format!("{}-{}", FRICTION[a], GRAIN[b]), vec![a, b]))
+            .collect(),
+        groups: groups.iter().map(|g| (*g).to_owned()).collect(),
+        effects: effects.iter().map(|e| e.to_vec()).collect(),
+    }
+}
+
+const ALL: [&[usize]; 3] = [&[0], &[1], &[0, 1]];
+
+/// The table without some cells; each a participant and the number of a rating.
+fn table(missing: &[(usize, usize)]) -> Ratings {
+    let mut csv = "subject,model,repetition,rating\n".to_owned();
+    for (s, (_, ratings)) in RATINGS.iter().enumerate() {
+        for (i, rating) in ratings.chars().enumerate() {
+            if !missing.contains(&(s, i)) {
+                let model = format!("{}-{}", FRICTION[i / 6], GRAIN[i / 2 % 3]);
+                csv += &format!("P{s},{model},{},{rating}\n", i % 2 + 1);
+            }
+        }
+    }
+    let mut ratings = Ratings::read_csv("table.csv", csv.as_bytes(), None).unwrap();
+    for (subject, (group, _)) in ratings.subjects.iter_mut().zip(RATINGS) {
+        subject.group = Some(group.to_owned());
+    }
+    ratings
+}
+
+fn analyzed(ratings: &Ratings, crossing: Crossing) -> Analysis {
+    let rules = Rules {
+        crossing: Some(crossing),
+        ..Rules::default()
+    };
+    analyze(ratings, &rules)
+}
+
+fn close(a: &Analysis, id: &str, expected: f64) {
+    let found = a.values.number(id).unwrap_or_else(|| panic!("{id}"));
+    let apart = (found / expected - 1.0).abs();
+    assert!(apart < 1e-9, "{id}: {found}, not {expected}");
+}
+
+/// R 4.2.2, afex 1.2.1: aov_ez over the cell means, ges and pes; contrasts: pairs(emmeans(…, model =
+/// "multivariate")), whose printed digits are checked.
+#[test]
+fn effects_within_participants_agree_with_r() {
+    let a = analyzed(&table(&[]), crossing(&[], &ALL));
+    for (effect, numbers) in [
+        (
+            "friction",
+            [
+                24.671_296_296_3,
+                1.120_370_370_37,
+                0.956_560_761_084_2,
+                0.287_231_175_551_12,
+            ],
+        ),
+        (
+            "grain",
+            [
+                5.064_814_814_8,
+                4.268_518_518_52,
+                0.542_658_730_158_7,
+                0.076_407_319_458_02,
+            ],
+        ),
+        (
+            "friction:grain",
+            [
+                3.064_814_814_8,
+                3.768_518_518_52,
+                0.448_509_485_094_9,
+                0.047_673_916_174_56,
+            ],
+        ),
+    ] {
+        for (name, number) in ["ss", "ss_error", "pes", "ges"].iter().zip(numbers) {
+            close(&a, &format!("factorial/{effect}/{name}"), number);
+        }
+    }
+    close(&a, "factorial/grain/eps_gg", 0.933_563_223_440_005);
+    close(&a, "factorial/grain/p_gg", 0.002_508_585_468_024_4);
+    close(&a, "factorial/grain/eps_hf", 1.206_949_555_839_836);
+    close(&a, "factorial/friction:grain/p_hf", 0.009_075_317_741_465_5);
+    // Holm's correction of these three p by hand.
+    close(
+        &a,
+        "factorial/friction:grain/p_holm",
+        0.014_571_714_022_800_5,
+    );
+    close(&a, "factorial/grain/p_holm", 2.0 * 0.002_508_585_468_024_4);
+    let near = |id: &str, expected: f64, digits: f64| {
+        let found = a.values.number(id).unwrap_or_else(|| panic!("{id}"));
+        assert!((found - expected).abs() < digits, "{id}: {found}");
+    };
+    near(
+        "factorial_contrast/friction=low|high@grain=coarse/t",
+        -9.191,
+        5e-4,
+    );
+    near(
+        "factorial_contrast/friction=low|high@grain=fine/difference",
+        -0.778,
+        5e-4,
+    );
+    near("factorial_contrast/grain=fine|coarse/t", -3.928, 5e-4);
+    near("factorial_contrast/grain=fine|coarse/p", 0.0044, 5e-5);
+    near("factorial_mean/grain=medium/mean", 4.94, 5e-3);
+    near("factorial_mean/grain=medium/ci95_hi", 5.84, 5e-3);
+    near("factorial_mean/friction=low,grain=fine/n", 9.0, 1e-12);
+
+    let finding = |effect: &str| a.finding(&Question::Effect(effect.to_owned())).unwrap();
+    let interaction = finding("friction:grain");
+    let test = interaction.test.as_ref().unwrap();
+    let kind = TestKind::FactorialAnovaGreenhouseGeisser;
+    assert_eq!(
+        (test.kind, test.comparisons, interaction.is_yes()),
+        (kind, 3, true)
+    );
+    // df with the correction: 2ε and 16ε.
+    let df = &test.statistic.as_ref().unwrap().df;
+    assert!((df[0] - 1.611_269_715_436).abs() < 1e-9 && (df[1] - 12.890_157_723_49).abs() < 1e-8);
+    let friction = finding("friction");
+    assert_eq!(
+        friction.test.as_ref().unwrap().kind,
+        TestKind::FactorialAnova
+    );
+    // High minus low, and a warning that this is a mean over what it depends on.
+    assert_eq!(friction.direction, Some(Direction::Up));
+    let estimate = friction.estimate.unwrap();
+    assert!((estimate.value - (0.778 + 1.333 + 1.944) / 3.0).abs() < 1e-3);
+    assert!(estimate.ci95.unwrap().0 > 0.0);
+    assert!(friction.caveats.iter().any(|c| c.code == "interaction"));
+    assert!(interaction.caveats.iter().all(|c| c.code != "interaction"));
+    // The effects are the first findings.
+    assert_eq!(
+        a.findings[0].question,
+        Question::Effect("friction".to_owned())
+    );
+}
+
+/// The same with a factor between participants of unequal groups, type 3.
+#[test]
+fn effects_with_groups_agree_with_r() {
+    let effects: [&[usize]; 7] = [&[0], &[1], &[2], &[0, 1], &[0, 2], &[1, 2], &[0, 1, 2]];
+    let a = analyzed(&table(&[]), crossing(&["novices", "experts"], &effects));
+    close(&a, "factorial/group/ss", 12.566_898_148_1);
+    close(&a, "factorial/group/ss_error", 39.497_916_666_67);
+    close(&a, "factorial/group/ges", 0.211_459_286_813_3);
+    close(&a, "factorial/friction/ss", 24.450_231_481_5);
+    close(&a, "factorial/grain:group/p_gg", 0.100_552_296_252_708_71);
+    close(&a, "factorial/grain:group/ges", 0.024_920_527_887_5);
+    close(&a, "factorial/friction:grain:group/ss", 0.589_351_851_9);
+    close(
+        &a,
+        "factorial/friction:grain/p_gg",
+        0.018_282_552_374_337_35,
+    );
+    close(&a, "factorial_mean/group=novices/n", 4.0);
+    // A group within a level has a mean of its own participants: P0 P2 P3 P6.
+    close(
+        &a,
+        "factorial_mean/friction=low,group=novices/mean",
+        89.0 / 24.0,
+    );
+}
+
+/// Only what is stated is tested and corrected for.
+#[test]
+fn the_formula_says_how_many_effects_are_corrected_for() {
+    let a = analyzed(&table(&[]), crossing(&[], &[&[0], &[1]]));
+    close(&a, "factorial/grain/p_holm", 0.002_508_585_468_024_4);
+    assert!(
+        a.finding(&Question::Effect("friction:grain".to_owned()))
+            .is_none()
+    );
+    assert_eq!(a.values.number("factorial/friction:grain/p_holm"), None);
+    // It is computed all the same.
+    close(&a, "factorial/friction:grain/p_gg", 0.014_571_714_022_800_5);
+}
+
+#[test]
+fn what_cannot_be_analyzed_has_a_reason() {
+    let reason = |ratings: &Ratings, crossing: Crossing| {
+        let a = analyzed(ratings, crossing);
+        let found = a.finding(&Question::Effect("grain".to_owned())).unwrap();
+        assert_eq!(found.test, None);
+        match &found.verdict {
+            Verdict::Undefined(why) => why.clone(),
+            other => panic!("{other:?}"),
+        }
+    };
+    // Nobody felt high friction on coarse grain.
+    let hole: Vec<(usize, usize)> = (0..9).flat_map(|s| [(s, 10), (s, 11)]).collect();
+    let why = reason(&table(&hole), crossing(&[], &ALL));
+    assert!(why.contains("friction = high, grain = coarse"), "{why}");
+    // Experts alone rated everything.
+    let novices: Vec<(usize, usize)> = [0, 2, 3, 6]
+        .iter()
+        .flat_map(|s| [(*s, 0), (*s, 1)])
+        .collect();
+    let why = reason(&table(&novices), crossing(&["novices", "experts"], &ALL));
+    assert!(why.contains("of one group"), "{why}");
+    // One participant rated everything.
+    let most: Vec<(usize, usize)> = (1..9).flat_map(|s| [(s, 0), (s, 1)]).collect();
+    let why = reason(&table(&most), crossing(&[], &ALL));
+    assert!(why.contains("fewer than two"), "{why}");
+    // A realization that the protocol does not know.
+    let mut unknown = crossing(&[], &ALL);
+    unknown.levels_of.remove("low-fine");
+    let why = reason(&table(&[]), unknown);
+    assert!(why.contains("no levels"), "{why}");
+}
+
+/// Who did not rate everything is left out, and the finding says so.
+#[test]
+fn incomplete_participants_are_named() {
+    let a = analyzed(&table(&[(8, 0), (8, 1)]), crossing(&[], &ALL));
+    let found = a.finding(&Question::Effect("friction".to_owned())).unwrap();
+    assert_eq!(found.participants, 8);
+    let caveat = found
+        .caveats
+        .iter()
+        .find(|c| c.code == "complete-only")
+        .unwrap();
+    assert!(
+        caveat.text.starts_with("8 of 9 participants"),
+        "{}",
+        caveat.text
+    );
+}
+
+/// Everybody felt the realizations in one order: what differs may be practice.
+#[test]
+fn one_order_for_everybody_withdraws_the_verdict() {
+    let mut ratings = table(&[]);
+    let order: Vec<Option<u32>> = (0..ratings.len())
+        .map(|i| {
+            let repetition = ratings.repetition[i];
+            ratings.model[i].map(|m| m + 1 + 6 * (repetition - 1))
+        })
+        .collect();
+    ratings.trial_index = order;
+    let a = analyzed(&ratings, crossing(&[], &ALL));
+    let found = a.finding(&Question::Effect("grain".to_owned())).unwrap();
+    assert!(found.reason().unwrap().contains("same order"), "{found:?}");
+}

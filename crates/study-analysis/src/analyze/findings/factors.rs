@@ -1,0 +1,135 @@
+//! Do the factors of a factorial design matter, and does the effect of one depend on another?
+
+use super::{Direction, Estimate, Facts, Finding, Question, Test, TestKind};
+use crate::analyze::results::{ContrastName, FactorialEffect, LevelsName, Number as _};
+use study_base::apa;
+use study_base::text::counted;
+use study_stats::level::rejects;
+
+/// A finding for each effect that is tested; nothing in a study without factors.
+pub(super) fn factors(facts: &Facts<'_>) -> Vec<Finding> {
+    let (Some(crossing), Some(tests)) = (&facts.rules.crossing, &facts.evidence.factorial) else {
+        return Vec::new();
+    };
+    let shown = |effect: &[usize]| {
+        let own = tests.effects.get(crossing.effect_name(effect).as_str());
+        own.and_then(|e| e.p_holm.number())
+            .is_some_and(|p| rejects(p, facts.rules.alpha))
+    };
+    let mut found = Vec::new();
+    for effect in &crossing.effects {
+        let name = crossing.effect_name(effect);
+        let Some(numbers) = tests.effects.get(name.as_str()) else {
+            continue;
+        };
+        let names = effect.iter().map(|at| crossing.name(*at).to_owned());
+        let mut finding = Finding {
+            names: names.collect(),
+            ..decided(facts, Question::Effect(name), numbers)
+        };
+        if finding.reason().is_none() {
+            if let [factor] = effect[..] {
+                estimate(facts, factor, &mut finding);
+            }
+            let larger = |other: &&Vec<usize>| {
+                other.len() > effect.len() && effect.iter().all(|at| other.contains(at))
+            };
+            let depends: Vec<String> = (crossing.effects.iter().filter(larger))
+                .filter(|other| shown(other))
+                .map(|other| crossing.effect_name(other).replace(':', " × "))
+                .collect();
+            if !depends.is_empty() {
+                finding.caveat(
+                    "interaction",
+                    format!(
+                        "it is a mean over levels on which it depends: the interaction {} is shown, so read the simple effects",
+                        depends.join(" and ")
+                    ),
+                );
+            }
+            ranks(facts, numbers, &mut finding);
+        }
+        found.push(finding);
+    }
+    found
+}
+
+fn decided(facts: &Facts<'_>, question: Question, numbers: &FactorialEffect) -> Finding {
+    let design = facts.design;
+    let Some(p) = numbers.p_holm.number() else {
+        let why = numbers.p_holm.reason().unwrap_or("there is no test");
+        return Finding::undefined(question, why, design);
+    };
+    let epsilon = numbers.eps_gg.number().unwrap_or(1.0);
+    let df = [&numbers.df1, &numbers.df2].map(|df| df.number().map(|df| df * epsilon));
+    let comparisons = (facts.rules.crossing.as_ref()).map_or(1, |c| c.effects.len());
+    // With one contrast there is no sphericity to depart from.
+    let kind = match numbers.eps_gg.number() {
+        Some(epsilon) if epsilon < 1.0 => TestKind::FactorialAnovaGreenhouseGeisser,
+        _ => TestKind::FactorialAnova,
+    };
+    let test = Test {
+        comparisons,
+        ..Test::single(kind, p, facts.rules.alpha)
+    };
+    let test = test.with("F", numbers.f.number(), &df);
+    let mut found = Finding::decided(question, test, design);
+    found.participants = design.complete;
+    let ges = numbers.ges.number();
+    found.effect = ges.and_then(|ges| Estimate::of("generalized eta squared", ges));
+    if design.complete < design.participants {
+        found.caveat(
+            "complete-only",
+            format!(
+                "{} of {} rated every realization; the others are left out of the analysis of the factors",
+                design.complete,
+                counted(design.participants, "participant", "participants")
+            ),
+        );
+    }
+    found
+}
+
+/// Of a factor with two levels the difference, second minus first, and its direction.
+fn estimate(facts: &Facts<'_>, factor: usize, finding: &mut Finding) {
+    let (Some(crossing), Some(tests)) = (&facts.rules.crossing, &facts.evidence.factorial) else {
+        return;
+    };
+    let [first, second] = crossing.levels(factor) else {
+        return;
+    };
+    let name = ContrastName {
+        factor: crossing.name(factor).to_owned(),
+        levels: [first.clone(), second.clone()],
+        at: LevelsName::default(),
+    };
+    let Some(contrast) = tests.contrasts.get(&name) else {
+        return;
+    };
+    finding.estimate = contrast.difference.number().map(|difference| Estimate {
+        name: "difference",
+        value: -difference,
+        ci95: (contrast.difference_ci95.ends()).map(|(lo, hi)| (-hi, -lo)),
+    });
+    if finding.is_yes() {
+        finding.direction = finding.estimate.map(|e| Direction::of(e.value));
+    }
+}
+
+/// Says so if the ranks disagree with the ratings.
+fn ranks(facts: &Facts<'_>, numbers: &FactorialEffect, finding: &mut Finding) {
+    let alpha = facts.rules.alpha;
+    let (Some(p), Some(of_ranks)) = (numbers.p_gg.number(), numbers.art_p.number()) else {
+        return;
+    };
+    if rejects(p, alpha) != rejects(of_ranks, alpha) {
+        finding.caveat(
+            "ranks",
+            format!(
+                "the aligned ranks of the ratings say otherwise: p {} for {} of the ratings, both without correction for the number of effects",
+                apa::p_beside(of_ranks, alpha),
+                apa::p_beside(p, alpha)
+            ),
+        );
+    }
+}
