@@ -227,7 +227,7 @@ impl Factorial {
 /// let rows = [[1.0, 2.0, 3.0, 5.0], [2.0, 2.0, 4.0, 5.0], [1.0, 3.0, 2.0, 6.0]].map(Vec::from);
 /// let found = analysis(&rows, &[2, 2], &[]).unwrap();
 /// let f: Vec<String> = (found.effects.iter().map(|e| format!("{:.2}", e.f.unwrap()))).collect();
-/// assert_eq!(f, ["75.00", "9.80", "16.00"]);
+/// assert_eq!(f, ["196.00", "5.26", "16.00"]);
 /// ```
 pub fn analysis(
     rows: &[Vec<f64>],

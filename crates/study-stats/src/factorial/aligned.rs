@@ -31,7 +31,7 @@ use crate::rank::mid_ranks;
 /// # use study_stats::factorial::aligned_ranks;
 /// let rows = [[1.0, 2.0, 3.0, 5.0], [2.0, 2.0, 4.0, 5.0], [1.0, 3.0, 2.0, 6.0]].map(Vec::from);
 /// let found = aligned_ranks(&rows, &[2, 2], &[]).unwrap();
-/// assert_eq!(format!("{:.3}", found.effects[2].f.unwrap()), "16.000");
+/// assert_eq!(format!("{:.3}", found.effects[2].f.unwrap()), "84.211");
 /// ```
 pub fn aligned_ranks(
     rows: &[Vec<f64>],
