@@ -176,6 +176,21 @@ impl Abilities {
         ))
     }
 
+    /// The standard error of the order effect by the sandwich over participants; `None` without the effect, or with
+    /// one participant.
+    pub fn order_clustered_se(&self) -> Option<f64> {
+        let sandwich = self.clustered.as_ref().filter(|_| self.model.order)?;
+        let place = self.abilities.len() - 1;
+        Some(sandwich.get(place, place).max(0.0).sqrt())
+    }
+
+    /// On how many participants the order effect rests, as [`Difference::participants`]; `None` without the effect.
+    pub fn participants_of_order(&self) -> Option<f64> {
+        let mut contrast = vec![0.0; self.covariance.0.size()];
+        *contrast.get_mut(self.abilities.len() - 1)? = 1.0;
+        self.model.order.then(|| self.participants(&contrast))
+    }
+
     fn participants(&self, contrast: &[f64]) -> f64 {
         let v = &self.covariance.0;
         let along: Vec<f64> = (0..contrast.len())

@@ -218,12 +218,16 @@ fn with_vaf(facts: &PartFacts, question: PartQuestion, vaf: &Correlation) -> Par
 fn interval_order(facts: &PartFacts, preferences: &Preferences) -> Option<PartFinding> {
     let question = PartQuestion::IntervalOrder;
     let effect = preferences.order.as_ref()?;
-    let (order, se) = (effect.order.number(), effect.order_se.number());
+    let order = effect.order.number();
     let Some(p) = effect.order_p.number() else {
         return Some(facts.undefined(question, &effect.order_p, 0));
     };
-    let z = order.zip(se).map(|(order, se)| order / se);
-    let test = Test::single(TestKind::Wald, p, facts.alpha).with("z", z, &[]);
+    let (kind, symbol) = match effect.order_t_df {
+        Some(_) => (TestKind::ClusteredT, "t"),
+        None => (TestKind::Wald, "z"),
+    };
+    let df: Vec<Option<f64>> = effect.order_t_df.iter().map(Number::number).collect();
+    let test = Test::single(kind, p, facts.alpha).with(symbol, effect.order_t.number(), &df);
     Some(Finding {
         direction: order.map(Direction::of).filter(|_| test.is_significant()),
         estimate: order.and_then(|value| Estimate::of("order", value)),
