@@ -78,6 +78,8 @@ struct World {
     camps: f64,
     /// What the camps disagree about.
     about: About,
+    /// Participants' own slopes, per standard deviation of VAF.
+    slopes: Slopes,
     /// The first half of the participants rates higher by this, the others lower.
     severity: f64,
     /// How often the last realization is rated in a repetition.
@@ -97,6 +99,15 @@ enum About {
     VafByChance,
 }
 
+/// Participants' own slopes: normal with this standard deviation.
+#[derive(Clone, Copy)]
+enum Slopes {
+    None,
+    Own(f64),
+    /// Less their mean, so that they cancel in tables without a missing cell.
+    Cancel(f64),
+}
+
 const COMPLETE: World = World {
     name: "complete",
     participants: 10,
@@ -106,6 +117,7 @@ const COMPLETE: World = World {
     taste: 0.5,
     camps: 0.0,
     about: About::Vaf,
+    slopes: Slopes::None,
     severity: 0.0,
     last: 1,
     one_order: false,
@@ -184,6 +196,41 @@ const CAMPS_BY_CHANCE: World = World {
     about: About::VafByChance,
     ..CAMPS
 };
+const OWN_COMPLETE: World = World {
+    name: "own slopes, complete",
+    slopes: Slopes::Own(0.5),
+    ..COMPLETE
+};
+const OWN_RANDOM: World = World {
+    name: "own slopes, random",
+    missing: Missing::Random,
+    ..OWN_COMPLETE
+};
+const OWN_THIN: World = World {
+    name: "own slopes, thin bridge",
+    slopes: Slopes::Own(0.5),
+    ..THIN
+};
+const OWN_EXTREMES: World = World {
+    name: "own slopes, extremes",
+    slopes: Slopes::Own(0.5),
+    ..EXTREMES
+};
+const CANCEL_COMPLETE: World = World {
+    name: "slopes cancel, complete",
+    slopes: Slopes::Cancel(0.5),
+    ..COMPLETE
+};
+const CANCEL_RANDOM: World = World {
+    name: "slopes cancel, random",
+    missing: Missing::Random,
+    ..CANCEL_COMPLETE
+};
+const CANCEL_THIN: World = World {
+    name: "slopes cancel, thin bridge",
+    slopes: Slopes::Cancel(0.5),
+    ..THIN
+};
 const EIGHT: World = World {
     name: "eight",
     realizations: 8,
@@ -252,6 +299,18 @@ fn study(world: &World, truth: Truth, number: u32) -> Vec<Trial> {
     if world.about == About::Anything {
         camps.shuffle(&mut about);
     }
+    let slopes: Vec<f64> = match world.slopes {
+        Slopes::None => vec![0.0; world.participants as usize],
+        Slopes::Own(sd) | Slopes::Cancel(sd) => {
+            let own: Vec<f64> = (0..world.participants)
+                .map(|_| sd * camps.normal())
+                .collect();
+            let cancels = matches!(world.slopes, Slopes::Cancel(_));
+            let mean = own.iter().sum::<f64>() / own.len() as f64;
+            let less = if cancels { mean } else { 0.0 };
+            own.iter().map(|slope| slope - less).collect()
+        }
+    };
     let mut trials = Vec::new();
     for p in 0..world.participants {
         let severe = if p < world.participants / 2 {
@@ -265,8 +324,11 @@ fn study(world: &World, truth: Truth, number: u32) -> Vec<Trial> {
             About::VafByChance => camps.below(2) == 0,
         };
         let camp = if rises { world.camps } else { -world.camps };
+        let slope = slopes[p as usize];
         let own: Vec<f64> = (0..k)
-            .map(|m| level + means[m] + camp * about[m] + world.taste * noise.normal())
+            .map(|m| {
+                level + means[m] + camp * about[m] + slope * x[m] + world.taste * noise.normal()
+            })
             .collect();
         let rated: Vec<bool> = (0..k)
             .map(|m| match world.missing {
@@ -310,9 +372,11 @@ fn study(world: &World, truth: Truth, number: u32) -> Vec<Trial> {
 type Results = BTreeMap<String, Option<bool>>;
 
 /// Statistics of the analysis that are compared with 5 %.
-const TESTS: [&str; 14] = [
+const TESTS: [&str; 16] = [
     "corr_adjusted/trend/p",
     "within_cells/p",
+    "within_clustered/p_gg",
+    "within_clustered/p_hf",
     "rmanova/p_gg",
     "rmanova/p_hf",
     "rmanova/p",
@@ -550,6 +614,23 @@ fn main() {
         &in_unlike(Truth::Equal),
         verdicts,
     );
+    let own = [
+        &OWN_COMPLETE,
+        &OWN_RANDOM,
+        &OWN_THIN,
+        &OWN_EXTREMES,
+        &CANCEL_COMPLETE,
+        &CANCEL_RANDOM,
+        &CANCEL_THIN,
+    ];
+    let with_own = |truth: Truth| own.map(|world| (world, truth));
+    table(
+        "No realization is better: slopes of their own",
+        null,
+        true,
+        &with_own(Truth::Equal),
+        verdicts,
+    );
     table(
         "They differ, unrelated to VAF",
         null,
@@ -562,6 +643,13 @@ fn main() {
         null,
         true,
         &in_unlike(Truth::Unrelated),
+        verdicts,
+    );
+    table(
+        "They differ, unrelated to VAF: slopes of their own",
+        null,
+        true,
+        &with_own(Truth::Unrelated),
         verdicts,
     );
     table(
@@ -583,6 +671,13 @@ fn main() {
         power,
         false,
         &in_unlike(Truth::Vaf),
+        verdicts,
+    );
+    table(
+        "Power: 0.5 per standard deviation of VAF: slopes of their own",
+        power,
+        false,
+        &with_own(Truth::Vaf),
         verdicts,
     );
     let worlds = |truth: Truth| {

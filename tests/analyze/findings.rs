@@ -208,6 +208,43 @@ fn the_verdict_rests_on_everybody_who_rated() {
     ]);
 }
 
+/// Two halves with a realization each of their own, and one participant who links them: what this one alone determines is left out, as its
+/// pairs are; with another one it is not.
+#[test]
+fn what_one_participant_alone_links_is_left_out() {
+    let study = |links: usize| {
+        let mut random = Numbers::new(11);
+        let mut rows = Vec::new();
+        for s in 0..12 {
+            let level = random.normal();
+            for m in (0..4).filter(|m| s < links || (s % 2 == 0) == (*m < 2)) {
+                let half = if m < 2 { 0.0 } else { 3.0 };
+                rows.push((s, m, 1, level + half + 0.7 * random.normal()));
+            }
+        }
+        analysis_of(&rating_table(&rows, |_| None))
+    };
+    let a = study(1);
+    let f = finding(&a, Question::Differ);
+    assert_eq!(a.values.number("within_clustered/left_out"), Some(1.0));
+    assert_eq!(a.values.number("within_clustered/df1"), Some(2.0));
+    assert_eq!(f.verdict, Verdict::NotShown);
+    assert!(f.caveats.iter().any(|c| c.code == "one-participant-links"));
+    let tested: Vec<(&str, &str)> = (a.pairs.iter())
+        .map(|p| (p.first.as_str(), p.second.as_str()))
+        .collect();
+    assert_eq!(tested, [("m00", "m01"), ("m02", "m03")]);
+    Printed::of(&a).answers(&[
+        "1 difference between realizations that one participant alone links is left out",
+    ]);
+
+    let a = study(4);
+    let f = finding(&a, Question::Differ);
+    assert_eq!(a.values.number("within_clustered/left_out"), Some(0.0));
+    assert_eq!((&f.verdict, a.pairs.len()), (&Verdict::Yes, 6));
+    assert!(f.caveats.iter().all(|c| c.code != "one-participant-links"));
+}
+
 /// ε̂ of Greenhouse and Geisser is at most (S − 1)/(k − 1), so that it could not say yes.
 #[test]
 fn few_participants_can_show_that_many_realizations_differ() {

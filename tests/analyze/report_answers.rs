@@ -35,7 +35,7 @@ fn incomplete() -> Analysis {
 fn with_incomplete_tables_participants_are_compared_with_themselves() {
     let a = incomplete();
     assert!(a.values.number("rmanova/F").is_none());
-    let f = a.values.number("within_cells/F").unwrap();
+    let f = a.values.number("within_clustered/F").unwrap();
     let text = words(&html(&a));
     for text in [text.clone(), terminal(&a)] {
         assert!(!text.contains("too few subjects rated both"), "{text}");

@@ -14,7 +14,7 @@ use study_stats::describe::mean;
 use study_stats::lmm::{
     AdjustedMeans, CellSummary, ContrastT, FixedEffects, LmmData, LmmError, adjusted_means,
 };
-use study_stats::within::{Within, WithinError};
+use study_stats::within::{Clustered, Within, WithinError};
 
 /// Most realizations that are compared pair by pair.
 pub(super) const MAX_COMPARED: usize = 60;
@@ -29,6 +29,9 @@ pub(super) struct Adjusted {
     pub(super) means: Result<Vec<f64>, WithinError>,
     /// The comparison within participants.
     pub(super) within: Result<Within, WithinError>,
+    /// The same with standard errors clustered by participant, on which verdicts rest where more than one in ten participants
+    /// would be left out. `None` elsewhere, and where there are too many realizations or participants.
+    pub(super) clustered: Option<Clustered>,
     /// The mixed model, for the standard errors of means.
     pub(super) fit: Result<AdjustedMeans, LmmError>,
 }
@@ -57,6 +60,9 @@ impl Adjusted {
             true => Ok(found),
             false => Err(WithinError::Overflow),
         });
+        let clustered = (within.is_ok() && !design.uses_complete())
+            .then(|| Clustered::of(&own).ok())
+            .flatten();
         let by_model = cells.subject_means();
         let raw = || (models.iter()).map(|&m| mean(&by_model[m]).ok_or(WithinError::NoData));
         let means = match &within {
@@ -73,6 +79,7 @@ impl Adjusted {
             models,
             means,
             within,
+            clustered,
             fit,
         }
     }
@@ -123,6 +130,26 @@ statistics! {
         p: Stat,
     }
 
+    /// The differences of `within_cells`, where more than one in ten participants did not rate every realization, without the assumption that errors have one variance and do not depend on each other within a participant. Their covariance is clustered by participant (CR2, Bell & McCaffrey 2002; Pustejovsky & Tipton 2018); F is the sum of squares of the differences, uncorrelated and of one variance if cells are, over its expectation by that covariance; Box's (1954) ε corrects its degrees of freedom. If no cell were missing it would be the F of `rmanova` with `p_gg` and `p_hf`. Not given for more than 100 realizations or 1000 participants, where `within_cells` decides.
+    pub struct WithinClustered {
+        /// differences that one participant alone determines, which does not show how much participants vary; they are left out
+        left_out: Stat,
+        /// of the differences between realizations of a set
+        f: Stat as "F",
+        /// ε̂ of the clustered covariance, as Greenhouse and Geisser estimate it
+        eps_gg: Stat,
+        /// Huynh and Feldt's, at most 1, with Satterthwaite's degrees of freedom for each difference in place of participants less one
+        eps_hf: Stat,
+        /// differences
+        df1: Stat,
+        /// Satterthwaite's degrees of freedom of the denominator
+        df2: Stat,
+        /// of `F` with `eps_gg`
+        p_gg: Stat,
+        /// of `F` with `eps_hf`
+        p_hf: Stat,
+    }
+
     /// What a mean participant would rate, by the model `within_cells`; if no cell is missing, or if nothing links the realizations, `desc/M/subject_mean/mean`. Standard error and interval, about the mean, are those of the marginal mean in `lmm_cells`, for other participants.
     pub struct AdjustedMean {
         /// the mean
@@ -137,10 +164,23 @@ statistics! {
     pub struct AdjustedCells {
         /// the comparison within participants
         within: WithinCells as "within_cells",
+        /// the same, clustered by participant
+        clustered: Option<WithinClustered> as "within_clustered",
         /// the mixed model of cell means
         model: CellModel as "lmm_cells",
         /// the mean of each test realization
         means: BTreeMap<RealizationName, AdjustedMean> as "adjusted",
+    }
+}
+
+impl WithinClustered {
+    /// ε and p by which differences are decided: as in complete tables those of Greenhouse and Geisser, where there are not more participants
+    /// than realizations those of Huynh and Feldt.
+    pub(super) fn deciding(&self, design: Design) -> (&Stat, &Stat) {
+        match design.participants > design.realizations {
+            true => (&self.eps_gg, &self.p_gg),
+            false => (&self.eps_hf, &self.p_hf),
+        }
     }
 }
 
@@ -183,6 +223,7 @@ pub(super) fn adjusted(cells: &Cells<'_>, found: &Adjusted) -> AdjustedCells {
     AdjustedCells {
         means: means.collect(),
         within: within_cells(&found.within),
+        clustered: found.clustered.as_ref().map(within_clustered),
         model,
     }
 }
@@ -202,5 +243,23 @@ fn within_cells(found: &Result<Within, WithinError>) -> WithinCells {
         f: or(effect.map(|f| f.f)),
         df2: or(effect.and_then(|f| f.df2)),
         p: or(effect.and_then(|f| f.p)),
+    }
+}
+
+fn within_clustered(found: &Clustered) -> WithinClustered {
+    let Some(test) = found.differences() else {
+        return WithinClustered::undefined(
+            "the ratings leave no variance of error, or one participant alone links any two realizations",
+        );
+    };
+    WithinClustered {
+        left_out: Stat::count(test.left_out),
+        f: Stat::of(test.f),
+        eps_gg: Stat::of(test.epsilon_gg),
+        eps_hf: Stat::of(test.epsilon_hf),
+        df1: Stat::of(test.df1),
+        df2: Stat::of(test.df2),
+        p_gg: Stat::or(test.p_gg, "F overflows"),
+        p_hf: Stat::or(test.p_hf, "F overflows"),
     }
 }

@@ -1,7 +1,7 @@
 //! The comparison of pairs on which verdicts rest: `pair/a|b/*`.
 //!
 //! The paired t test of cell means over the participants who rated everything; where
-//! they are too few, the differences within participants over all cells. Holm's correction is
+//! they are too few, the differences within participants over all cells, clustered by participant. Holm's correction is
 //! over all pairs. Up to [`MAX_PAIRED`] realizations every pair is given, above the
 //! best-rated realization against each other one; the correction counts the pairs that are
 //! not given, because the best is chosen by the ratings. With a
@@ -28,7 +28,7 @@ statistics! {
         ci90: Interval,
     }
 
-    /// The comparison of two realizations on which verdicts rest: the paired t test over the participants who rated every realization or, where these are too few, a difference in `within_cells`; pairs that no participants link are left out.
+    /// The comparison of two realizations on which verdicts rest: the paired t test over the participants who rated every realization or, where these are too few, a difference in `within_cells` with a standard error clustered by participant (see `within_clustered`); pairs that no two participants link are left out.
     pub struct PairTest {
         /// participants
         n: Stat,
@@ -93,12 +93,20 @@ pub(super) fn pairs(cells: &Cells<'_>, adjusted: &Adjusted, rules: &Rules) -> Op
                     by_participant.map(|own| own.iter().find_map(set)).collect();
                 let people = |set: usize| of.iter().filter(|of| **of == Some(set)).count();
                 let places = (0..k).flat_map(|a| (a + 1..k).map(move |b| (a, b)));
+                let difference = |first: usize, second: usize| match &adjusted.clustered {
+                    Some(clustered) => {
+                        let mut weights = vec![0.0; k];
+                        (weights[first], weights[second]) = (1.0, -1.0);
+                        clustered.contrast(&weights)
+                    }
+                    None => within.difference(first, second),
+                };
                 let found = places.filter_map(|(first, second)| {
                     Some(Difference {
                         first,
                         second,
                         n: people(within.sets[first]),
-                        t: within.difference(first, second)?,
+                        t: difference(first, second)?,
                         dz: None,
                     })
                 });

@@ -144,6 +144,20 @@ fn models(a: &Analysis) -> Vec<Model> {
         df,
         &within.p,
     ));
+    if let Some(clustered) = &evidence.cells.clustered {
+        all.push(by_statistic(
+            ("differ", "within-participants-clustered-greenhouse-geisser"),
+            &clustered.f,
+            [&clustered.df1, &clustered.df2],
+            &clustered.p_gg,
+        ));
+        all.push(by_statistic(
+            ("differ", "within-participants-clustered-huynh-feldt"),
+            &clustered.f,
+            [&clustered.df1, &clustered.df2],
+            &clustered.p_hf,
+        ));
+    }
     let pearson = &evidence.corr.pearson;
     let permuted = pearson.permuted.as_ref();
     let of_pearson = |test, p: &dyn Number| Model {

@@ -277,6 +277,19 @@ fn factors(a: &Analysis) -> Option<String> {
     ))
 }
 
+/// The errors of comparisons within participants.
+fn clustered(a: &Analysis) -> &'static str {
+    match a.results.evidence.cells.clustered {
+        Some(_) if a.design.participants > a.design.realizations => {
+            " with errors clustered by participant (CR2; Pustejovsky & Tipton, 2018) and the Greenhouse–Geisser correction"
+        }
+        Some(_) => {
+            " with errors clustered by participant (CR2; Pustejovsky & Tipton, 2018) and the Huynh–Feldt correction"
+        }
+        None => "",
+    }
+}
+
 /// How differences between realizations were tested.
 fn differences(a: &Analysis) -> Option<String> {
     let test = a.finding(&Question::Differ)?.test.as_ref()?;
@@ -293,7 +306,8 @@ fn differences(a: &Analysis) -> Option<String> {
         }
         TestKind::WithinParticipants => format!(
             "an analysis of variance of all cell means with participants and realizations as fixed factors \
-             (comparisons within participants), because only {} of {} rated every realization",
+             (comparisons within participants){}, because only {} of {} rated every realization",
+            clustered(a),
             a.design.complete,
             counted(a.design.participants, "participant", "participants")
         ),

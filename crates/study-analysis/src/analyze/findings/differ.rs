@@ -41,10 +41,12 @@ pub(super) fn differ(facts: &Facts<'_>) -> Option<Finding> {
     let Differences {
         friedman, rmanova, ..
     } = &facts.evidence.differences;
-    let within = &facts.evidence.cells.within;
+    let cells = &facts.evidence.cells;
     let Some(test) = found else {
         let p = match kind {
-            TestKind::WithinParticipants => &within.p,
+            TestKind::WithinParticipants => {
+                (cells.clustered.as_ref()).map_or(&cells.within.p, |c| c.deciding(d).1)
+            }
             TestKind::Friedman | TestKind::FriedmanExact => &friedman.p,
             _ => &rmanova.p,
         };
@@ -62,6 +64,10 @@ pub(super) fn differ(facts: &Facts<'_>) -> Option<Finding> {
     };
     found.effect = effect.and_then(|(name, value)| Estimate::of(name, value?));
     if used == TestKind::WithinParticipants {
+        let alike = match cells.clustered {
+            Some(_) => "",
+            None => " and that all pairs of realizations correlate alike",
+        };
         let complete = match d.complete {
             0 => "none".to_owned(),
             n => n.to_string(),
@@ -71,10 +77,22 @@ pub(super) fn differ(facts: &Facts<'_>) -> Option<Finding> {
             format!(
                 "{complete} of {} rated every realization; realizations are compared within \
                  participants, by the ratings of all, assuming that what is missing does not depend on \
-                 what the rating would have been and that all pairs of realizations correlate alike",
+                 what the rating would have been{alike}",
                 counted(d.participants, "participant", "participants")
             ),
         );
+        let left_out = cells.clustered.as_ref().and_then(|c| c.left_out.number());
+        if let Some(n) = left_out.filter(|n| *n > 0.0) {
+            found.caveat(
+                "one-participant-links",
+                format!(
+                    "{} between realizations that one participant alone links {} left out, because nothing shows \
+                     how much others would vary about it; let more participants rate both",
+                    counted(n as usize, "difference", "differences"),
+                    if n > 1.0 { "are" } else { "is" }
+                ),
+            );
+        }
     } else if d.complete < d.participants {
         found.caveat(
             "complete-only",
@@ -135,10 +153,17 @@ fn test(facts: &Facts<'_>, kind: TestKind) -> Option<Test> {
             rmanova.eps_hf_unclipped.number()?.min(1.0),
         ),
         TestKind::WithinParticipants => {
-            let within = &facts.evidence.cells.within;
-            let df = [within.df1.number(), within.df2.number()];
-            let test = Test::single(kind, within.p.number()?, alpha);
-            Some(test.with("F", within.f.number(), &df))
+            let cells = &facts.evidence.cells;
+            let equal = &cells.within;
+            let (f, df, p, epsilon) = match &cells.clustered {
+                Some(own) => {
+                    let (epsilon, p) = own.deciding(facts.design);
+                    (&own.f, [&own.df1, &own.df2], p, epsilon.number()?)
+                }
+                None => (&equal.f, [&equal.df1, &equal.df2], &equal.p, 1.0),
+            };
+            let df = df.map(|df| df.number().map(|df| df * epsilon));
+            Some(Test::single(kind, p.number()?, alpha).with("F", f.number(), &df))
         }
         TestKind::FriedmanExact => of_friedman(friedman.exact_p.number()),
         TestKind::Friedman => {

@@ -136,9 +136,12 @@ fn not_compared(facts: &Facts<'_>, pair: Option<&Pair>) -> String {
     } else if let Some(Verdict::Undefined(why)) = pair.map(|p| &p.verdict) {
         why.clone()
     } else {
+        let alone = match d.uses_complete() {
+            true => "fewer than two participants rated every realization",
+            false => "fewer than two participants link the realizations",
+        };
         let why = facts.evidence.cells.within.f.reason();
-        why.unwrap_or("fewer than two participants rated every realization")
-            .to_owned()
+        why.unwrap_or(alone).to_owned()
     }
 }
 

@@ -8,18 +8,20 @@ use crate::matrix::{Matrix, SymmetricEigen, dot};
 /// The test that all realizations of a set have one mean, over all sets.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Differences {
-    /// F on `df1` and `df2` degrees of freedom.
+    /// F; with sphericity on `df1` and `df2` degrees of freedom.
     pub f: f64,
-    /// Contrasts times `epsilon`.
+    /// Contrasts.
     pub df1: f64,
-    /// Satterthwaite's degrees of freedom of the denominator, times `epsilon`.
+    /// Satterthwaite's degrees of freedom of the denominator.
     pub df2: f64,
-    /// P(F ≥ f).
-    pub p: Option<f64>,
-    /// Huynh and Feldt's, from `epsilon_gg` to 1.
-    pub epsilon: f64,
-    /// Box's by the clustered covariance, as Greenhouse and Geisser estimate it.
+    /// Box's ε by the clustered covariance, as Greenhouse and Geisser estimate it.
     pub epsilon_gg: f64,
+    /// P(F ≥ f) with both degrees of freedom times `epsilon_gg`.
+    pub p_gg: Option<f64>,
+    /// Huynh and Feldt's, from `epsilon_gg` to 1.
+    pub epsilon_hf: f64,
+    /// P(F ≥ f) with both degrees of freedom times `epsilon_hf`.
+    pub p_hf: Option<f64>,
     /// Contrasts that are left out, because one subject alone determines them.
     pub left_out: usize,
 }
@@ -31,7 +33,7 @@ impl Clustered {
     /// Whether any linked realizations differ. With d all contrasts, uncorrelated and of the same variance by the working model, and V their clustered
     /// covariance, F is ‖d‖²/tr V; without sphericity it has Box's degrees of freedom (Box 1954, Ann. Math. Stat. 25, 484–498), ε times those under the working model, with
     /// ε̂ = (tr V)²/(q tr V²) for q contrasts and Huynh & Feldt's (1976, J. Educ. Stat. 1, 69–82) correction of it, in which Satterthwaite's degrees of freedom of tr V take the place of
-    /// subjects less one. In complete tables it is the analysis of variance with Huynh and Feldt's ε.
+    /// subjects less one. In complete tables it is the analysis of variance with both corrections.
     ///
     /// `None` without residuals, and if one subject alone determines each contrast.
     pub fn differences(&self) -> Option<Differences> {
@@ -82,18 +84,19 @@ impl Clustered {
         let of_each = total / q;
         let left = of_each - q * epsilon_gg;
         let huynh_feldt = ((of_each + 1.0) * q * epsilon_gg - 2.0) / (q * left);
-        let epsilon = match left > ROUNDING {
+        let epsilon_hf = match left > ROUNDING {
             true => huynh_feldt.max(epsilon_gg).min(1.0),
             false => 1.0,
         };
-        let (df1, df2) = (q * epsilon, total * epsilon);
+        let p = |epsilon: f64| f_upper(f, q * epsilon, total * epsilon);
         Some(Differences {
             f,
-            df1,
-            df2,
-            p: f_upper(f, df1, df2),
-            epsilon,
+            df1: q,
+            df2: total,
             epsilon_gg,
+            p_gg: p(epsilon_gg),
+            epsilon_hf,
+            p_hf: p(epsilon_hf),
             left_out: all.rows() - shown.rows(),
         })
     }

@@ -16,7 +16,7 @@ struct Reference {
     contrasts: &'static str,
     /// F, its degrees of freedom and p: of all realizations, and of the first three.
     tests: &'static str,
-    /// F, ε of Greenhouse and Geisser and of Huynh and Feldt, degrees of freedom and p of all differences.
+    /// F, ε of Greenhouse and Geisser and of Huynh and Feldt, degrees of freedom, and p with either of all differences.
     differences: &'static str,
 }
 
@@ -35,7 +35,7 @@ const REFERENCES: [Reference; 8] = [
             -0.0511940298507452 0.560476643292058 2.39722635273487 0.934298247728374 -2.11751552828968 2.01512746858819",
         tests: "0.399337577683243 3.0 1.27098747317391 0.781028002846092 / \
             0.688351093052418 2.0 1.86973195831139 0.597008672362224",
-        differences: "1.81066004371488 0.499667413881777 1 3 6.6860003304079 0.236527552964502",
+        differences: "1.81066004371488 0.499667413881777 1 3 6.6860003304079 0.282062261467309 0.236527552964502",
     },
     Reference {
         name: "thin",
@@ -47,7 +47,7 @@ const REFERENCES: [Reference; 8] = [
             -0.954000000000001 0.682602373274515 4.0 0.23476784053652 -2.84920801807442 0.941208018074422",
         tests: "1.27744562761026 4.0 1.74375528058515 0.500294909815898 / \
             5.08535697335077 2.0 3.0 0.108709602037933",
-        differences: "2.59506378375259 0.713878877813504 1 4 8.85904272829019 0.109222084037159",
+        differences: "2.59506378375259 0.713878877813504 1 4 8.85904272829019 0.144119634798502 0.109222084037159",
     },
     Reference {
         name: "single",
@@ -58,7 +58,7 @@ const REFERENCES: [Reference; 8] = [
             -0.470952380952381 1.17686202428509 3.24328833561797 0.713942688960373 -4.06222478722518 3.12032002532042",
         tests: "8.96351762032012 3.0 1.9694407949012 0.104371681028691 / \
             2.22218098274454 2.0 2.73228924784305 0.267328676016478",
-        differences: "3.09234884616219 0.568089520369331 1 3 8.85501352123092 0.0832794699514792",
+        differences: "3.09234884616219 0.568089520369331 1 3 8.85501352123092 0.135061946354622 0.0832794699514792",
     },
     Reference {
         name: "blocks",
@@ -70,7 +70,7 @@ const REFERENCES: [Reference; 8] = [
             -0.526000000000001 0.512502747960113 5.73857598299681 0.346035353366056 -1.79402829658476 0.742028296584756",
         tests: "0.797842981166697 4.0 4.22891566265061 0.581519389569718 / \
             1.58980686071332 2.0 5.17299631652484 0.289601874466163",
-        differences: "0.774166438781023 0.708175308530671 1 4 16 0.557839795823683",
+        differences: "0.774166438781023 0.708175308530671 1 4 16 0.525128927501824 0.557839795823683",
     },
     Reference {
         name: "chain",
@@ -81,7 +81,7 @@ const REFERENCES: [Reference; 8] = [
             -0.863363028953229 0.478097372289277 3.88767828626367 0.147316889066615 -2.20603674893924 0.479310691032785",
         tests: "0.551605927824277 4.0 1.33936574351582 0.738130472222009 / \
             1.26185145763875 2.0 3.09338802524252 0.397454181114017",
-        differences: "0.675559909307614 0.430740216645398 1 4 8.92722038470156 0.625765899477659",
+        differences: "0.675559909307614 0.430740216645398 1 4 8.92722038470156 0.539814628705173 0.625765899477659",
     },
     Reference {
         name: "uneven",
@@ -95,7 +95,7 @@ const REFERENCES: [Reference; 8] = [
             -1.10905727822066 0.513179735271789 7.09483115222442 0.066976892746448 -2.31925424638588 0.101139689944562",
         tests: "5.33567634486461 5.0 5.19546151048538 0.0420756611329131 / \
             6.68469761340585 2.0 7.46285691266679 0.0216976707700743",
-        differences: "4.06096289785679 0.393359545751823 0.559706554694795 2.79853277347398 18.4080504349264 0.024292665091359",
+        differences: "4.06096289785679 0.393359545751823 0.559706554694795 5 32.8887526517608 0.0433155520898392 0.024292665091359",
     },
     Reference {
         name: "complete",
@@ -107,7 +107,7 @@ const REFERENCES: [Reference; 8] = [
             0.214444444444445 0.449141499329279 8.0 0.645810622412895 -0.821277710300673 1.25016659918956",
         tests: "2.4842996068438 3.0 6.0 0.157997836905972 / \
             4.00053951293299 2.0 7.0 0.0694087772716921",
-        differences: "1.78896231782573 0.788112322614896 1 3 24 0.176166442231754",
+        differences: "1.78896231782573 0.788112322614896 1 3 24 0.190569825977645 0.176166442231754",
     },
     Reference {
         name: "bridges",
@@ -120,7 +120,7 @@ const REFERENCES: [Reference; 8] = [
             -0.222857142857143 0.465129844696544 6.95101723091472 0.646552758820089 -1.32428757743999 0.878573291725702",
         tests: "0.402375740178639 5.0 3.4925757974684 0.826079319397358 / \
             1.03417317945318 2.0 5.52142204673238 0.41546231287263",
-        differences: "0.436045204037847 0.630829003598563 1 5 18.3002367156909 0.817637766247448",
+        differences: "0.436045204037847 0.630829003598563 1 5 18.3002367156909 0.740176113429518 0.817637766247448",
     },
 ];
 
@@ -207,7 +207,15 @@ fn contrasts_tests_and_differences_are_those_of_club_sandwich() {
             }
         }
         let f = found.differences().unwrap();
-        let all = [f.f, f.epsilon_gg, f.epsilon, f.df1, f.df2, f.p.unwrap()];
+        let all = [
+            f.f,
+            f.epsilon_gg,
+            f.epsilon_hf,
+            f.df1,
+            f.df2,
+            f.p_gg.unwrap(),
+            f.p_hf.unwrap(),
+        ];
         for (number, expected) in all.iter().zip(&numbers(table.differences)[0]) {
             near(*number, *expected, table.name);
         }
@@ -308,7 +316,7 @@ proptest! {
         }
     }
 
-    /// In complete tables it is the analysis of variance with Huynh and Feldt's ε.
+    /// In complete tables it is the analysis of variance with both corrections.
     #[test]
     fn in_complete_tables_differences_are_those_of_the_analysis_of_variance(
         seed in 0u64..1000, subjects in 3usize..12, k in 2usize..7
@@ -322,9 +330,10 @@ proptest! {
         let found = clustered(&rows).differences().unwrap();
         near(found.f, expected.f.unwrap(), "F");
         near(found.epsilon_gg, expected.eps_gg.unwrap(), "ε");
-        near(found.epsilon, expected.eps_hf.unwrap().min(1.0), "Huynh–Feldt's ε");
-        near(found.df2, expected.df2 * found.epsilon, "df2");
-        near(found.p.unwrap(), expected.p_hf.unwrap(), "p");
+        near(found.epsilon_hf, expected.eps_hf.unwrap().min(1.0), "Huynh–Feldt's ε");
+        near(found.df2, expected.df2, "df2");
+        near(found.p_gg.unwrap(), expected.p_gg.unwrap(), "p, Greenhouse–Geisser");
+        near(found.p_hf.unwrap(), expected.p_hf.unwrap(), "p, Huynh–Feldt");
         prop_assert_eq!(found.left_out, 0);
     }
 
@@ -446,7 +455,8 @@ fn the_difference_of_two_realizations_is_their_contrast() {
     );
     near(f.f, t.t.unwrap().powi(2), "F");
     near(f.df2, t.df.unwrap(), "df2");
-    near(f.p.unwrap(), t.p.unwrap(), "p");
+    near(f.p_gg.unwrap(), t.p.unwrap(), "p");
+    near(f.p_hf.unwrap(), t.p.unwrap(), "p");
     let lone: [Row; 5] = [
         (0, 0, 1.0),
         (0, 1, 3.0),
