@@ -198,7 +198,10 @@ fn an_offset_and_a_unit_change_no_test() {
     let alike: Vec<Vec<f64>> = [1e9, 2.0, 0.1]
         .map(|level| [0.0, 0.1, 0.3, 0.7].map(|x| x + level).to_vec())
         .into();
-    for rows in [&alike, &alike[1..]] {
+    // Their own differences are small beside the offset, which rounds them.
+    let far = [0.123_456_789, 0.377_777_7, 1.171_171_7]
+        .map(|level| [0.0, 0.1, 0.3, 0.7].map(|x| 1e9 + (level + x)).to_vec());
+    for rows in [&alike, &alike[1..], &far[..]] {
         let found = analysis(rows, &[2, 2], &[]).unwrap();
         for effect in &found.effects {
             assert_eq!((effect.f, effect.p, effect.p_gg), (None, None, None));
