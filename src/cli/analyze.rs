@@ -11,8 +11,12 @@ use std::io::{self, BufReader};
 use std::path::{Path, PathBuf};
 use study_analysis::analyze::psychophysics::PartAnalysis;
 use study_analysis::analyze::{Better, Include, Progress, Rules};
-use study_analysis::study::{Analyzed, Options, Pool, Results, Study, analyze_table};
+use study_analysis::study::{
+    Analyzed, Options, Pool, Results, Study, analyze_factorial_table, analyze_table, check_factors,
+    factor,
+};
 use study_base::text::Untrusted;
+use study_plan::protocol::Factor;
 use study_report::figures::Trace;
 use study_report::html::Details;
 use study_report::study::{self as report, Output};
@@ -52,6 +56,14 @@ pub(super) struct Args {
     /// The scale of the ratings in a CSV, such as 1..7; ratings outside it are reported
     #[arg(long, value_name = "LOW..HIGH", value_parser = parse_scale, allow_hyphen_values = true)]
     scale: Option<(f64, f64)>,
+    /// A factor of a CSV: its column and its levels in their order, such as friction=low,high; once for each
+    #[arg(
+        long = "factor",
+        value_name = "NAME=LEVEL,LEVEL",
+        value_parser = factor,
+        conflicts_with_all = ["pool", "task"]
+    )]
+    factors: Vec<Factor>,
     /// Which ratings of a CSV are better
     #[arg(
         long,
@@ -143,6 +155,11 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             "--direction is for a CSV: in a study higher ratings are better",
         ));
     }
+    if !args.factors.is_empty() {
+        return Err(Failure::input(
+            "--factor is for a CSV: a study states its factors in its protocol, as [[factors]]",
+        ));
+    }
     let studies = store::studies(results)?;
     if args.json && studies.len() > 1 {
         return Err(Failure::input(format!(
@@ -220,14 +237,11 @@ fn of_csv(path: &Path, args: &Args, console: &mut Console) -> Result<(), Failure
         better: args.direction.into(),
         ..Rules::default()
     };
-    let analyzed = shown(GROUPS, |progress| {
-        analyze_table(
-            path,
-            input,
-            args.question.as_deref(),
-            &rules,
-            Some(progress),
-        )
+    check_factors(&args.factors).map_err(Failure::usage)?;
+    let question = args.question.as_deref();
+    let analyzed = shown(GROUPS, |progress| match &args.factors[..] {
+        [] => analyze_table(path, input, question, &rules, Some(progress)),
+        factors => analyze_factorial_table(path, input, factors, question, &rules, Some(progress)),
     })?;
     let details = Details {
         seed: Some(rules.seed),

@@ -68,3 +68,41 @@ fn a_factorial_study_answers_by_its_factors() {
             .is_file()
     );
 }
+
+/// A table from elsewhere with a column for each factor, and without one for realizations.
+#[test]
+fn a_table_has_factors_where_they_are_named() {
+    let home = tempfile::tempdir().unwrap();
+    let mut table = "subject,friction,detent,rating\n".to_owned();
+    for (subject, ratings) in ["2434", "3455", "1324", "2546", "3344"].iter().enumerate() {
+        for (i, rating) in ratings.chars().enumerate() {
+            let (friction, detent) = (["low", "high"][i / 2], ["soft", "crisp"][i % 2]);
+            table += &format!("P{subject},{friction},{detent},{rating}\n");
+        }
+    }
+    std::fs::write(home.path().join("t.csv"), table).unwrap();
+    let factors = [
+        "--factor",
+        "friction=low,high",
+        "--factor",
+        "detent=soft,crisp",
+    ];
+    let (code, out, err) = study(&[&["analyze", "t.csv"][..], &factors].concat(), home.path());
+    assert_eq!(code, 0, "{err}");
+    assert!(
+        out.contains("Does the effect of friction depend on detent?"),
+        "{out}"
+    );
+    let (code, _, err) = study(
+        &["analyze", "t.csv", "--factor", "friction=low,hi"],
+        home.path(),
+    );
+    assert_eq!(code, 1);
+    assert!(
+        err.contains("t.csv, line 4: `high` in column `friction` is not one of the levels low, hi"),
+        "{err}"
+    );
+    let (code, _, err) = study(&["analyze", "t.csv", "--factor", "friction"], home.path());
+    assert_eq!(code, 2);
+    assert!(err.contains("such as friction=low,high"), "{err}");
+}

@@ -505,7 +505,7 @@ fn evidence(
         order,
         differences,
         references,
-        factorial: factorial::factorial(cells, rules),
+        factorial: factorial::factorial(cells, adjusted, rules),
         cells: adjusted::adjusted(cells, adjusted),
         pairs: pairs::pairs(cells, adjusted, rules),
         sites: sites::sites(cells, rules),

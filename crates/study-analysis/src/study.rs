@@ -16,12 +16,14 @@
 //! ```
 
 mod error;
+mod factors;
 mod pool;
 mod preregistered;
 mod source;
 mod traces;
 
 pub use error::{Difference, PoolError, StudyError};
+pub use factors::{check_factors, factor};
 pub use pool::Pool;
 pub use source::{Site, SiteDevice, Source};
 pub use traces::Trace;
@@ -34,7 +36,7 @@ use crate::load::{self, Loaded};
 use std::io::BufRead;
 use std::path::Path;
 use study_base::text::{ParticipantId, QuestionId};
-use study_plan::protocol::{Protocol, Task};
+use study_plan::protocol::{Factor, Protocol, Task};
 use study_session::outcome::RatingRow;
 use study_session::outcome::ratings::Ratings;
 use study_session::store::{Derived, SessionData, StudyFolder, one_study};
@@ -345,6 +347,27 @@ pub fn analyze_table(
         results: Results::Ratings(Box::new(analyzed(&ratings, rules, progress))),
         damage: Vec::new(),
     })
+}
+
+/// [`analyze_table`] of a factorial design, whose table has a column for each factor.
+///
+/// # Errors
+/// As for [`analyze_table`], or if a cell holds another level than those of its factor.
+pub fn analyze_factorial_table(
+    path: &Path,
+    input: impl BufRead,
+    factors: &[Factor],
+    question: Option<&str>,
+    rules: &Rules,
+    progress: Option<&Progress>,
+) -> Result<Analyzed, StudyError> {
+    let name = path.display().to_string();
+    let (table, crossing) = factors::with_factors(&name, input, factors)?;
+    let rules = Rules {
+        crossing: Some(crossing),
+        ..rules.clone()
+    };
+    analyze_table(path, table.as_slice(), question, &rules, progress)
 }
 
 fn analyzed(ratings: &Ratings, rules: &Rules, progress: Option<&Progress>) -> Analysis {

@@ -51,6 +51,9 @@ pub(super) fn test_name(kind: TestKind) -> &'static str {
         }
         TestKind::BetweenSites => "analysis of variance between sites",
         TestKind::FactorialAnova => "factorial repeated-measures analysis of variance",
+        TestKind::FactorialWithin => {
+            "t tests within participants, clustered by participant, of the contrasts of the effect"
+        }
         TestKind::FactorialAnovaGreenhouseGeisser => {
             "factorial repeated-measures analysis of variance, Greenhouse–Geisser correction"
         }

@@ -131,6 +131,9 @@ pub enum TestKind {
     FactorialAnova,
     /// The same with the Greenhouse–Geisser correction.
     FactorialAnovaGreenhouseGeisser,
+    /// t of the clearest contrast of an effect within participants over all cell means, with standard
+    /// errors clustered by participant.
+    FactorialWithin,
 }
 
 impl TestKind {
@@ -162,6 +165,7 @@ impl TestKind {
             Self::Welch => "welch",
             Self::FactorialAnova => "factorial-anova",
             Self::FactorialAnovaGreenhouseGeisser => "factorial-anova-greenhouse-geisser",
+            Self::FactorialWithin => "factorial-within",
         }
     }
 }

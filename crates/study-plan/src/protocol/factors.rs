@@ -43,6 +43,17 @@ pub struct Crossing {
 }
 
 impl Crossing {
+    /// The full crossing of factors within participants: every effect is tested.
+    pub fn full(factors: Vec<Factor>, levels_of: BTreeMap<String, Vec<usize>>) -> Self {
+        let places: Vec<usize> = (0..factors.len()).collect();
+        Self {
+            effects: crossed(&places),
+            groups: Vec::new(),
+            factors,
+            levels_of,
+        }
+    }
+
     /// The name of an effect: its factors, joined by `:`.
     pub fn effect_name(&self, effect: &[usize]) -> String {
         let names: Vec<&str> = effect.iter().map(|place| self.name(*place)).collect();

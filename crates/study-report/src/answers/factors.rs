@@ -42,7 +42,7 @@ fn means(a: &Analysis, crossing: &Crossing, factor: usize) -> Option<String> {
         .filter_map(|level| {
             let at = LevelsName(vec![(name.to_owned(), level.clone())]);
             let found = tests.means.get(&at)?;
-            let ci = sentences::ci(&found.ci95, apa::two);
+            let ci = sentences::ci(found.ci95.as_ref(), apa::two);
             Some(format!("{level} {}{ci}", apa::two(found.mean.number()?)))
         })
         .collect();

@@ -3,7 +3,9 @@
 
 use super::{Canvas, Drawn, Scene, cell, drawn, head};
 use crate::chart::{Axis, Look, Mark, Panel, SMALL, Whisker, text_width};
-use study_analysis::analyze::results::{FactorialMean, FactorialTests, LevelsName, Number as _};
+use study_analysis::analyze::results::{
+    FactorialMean, FactorialTests, Interval, LevelsName, Number as _,
+};
 use study_plan::protocol::Crossing;
 
 /// Most panels, and most lines of a panel.
@@ -116,7 +118,7 @@ pub(super) fn interaction(scene: &Scene<'_>) -> Option<Drawn> {
                     continue;
                 };
                 let all = [panel.clone(), line.clone(), vec![(layout.along, level)]].concat();
-                let ci = found.ci95.ends();
+                let ci = found.ci95.as_ref().and_then(Interval::ends);
                 ends.extend(found.mean.number());
                 ends.extend(ci.iter().flat_map(|ci| [ci.0, ci.1]));
                 data.push(vec![
@@ -133,11 +135,16 @@ pub(super) fn interaction(scene: &Scene<'_>) -> Option<Drawn> {
     let of_lines = layout.lines.map_or_else(String::new, |at| {
         format!("; lines: {}", layout.crossing.name(at))
     });
-    let caption = format!(
-        "Mean {} by {name}{of_lines}. Bars are 95 % intervals of the mean over participants: they show how \
-         precise each mean is, and not whether two means of the same participants differ.",
-        scene.asked
-    );
+    let bars = match ends.len() > data.len() - 1 {
+        true => {
+            " Bars are 95 % intervals of the mean over participants: they show how precise each mean is, and not \
+                 whether two means of the same participants differ."
+        }
+        false => {
+            " Means are what a mean participant would rate, by comparisons within participants."
+        }
+    };
+    let caption = format!("Mean {} by {name}{of_lines}.{bars}", scene.asked);
     let title = format!("{} by {name}{of_lines}", scene.asked);
     Some(drawn("factors", caption, data, |c: Canvas| {
         let columns = c.pick(panels.len().min(3), 1);
@@ -167,7 +174,7 @@ pub(super) fn interaction(scene: &Scene<'_>) -> Option<Drawn> {
                     })
                     .collect();
                 let bars = (0..along.len()).filter_map(|level| {
-                    let (low, high) = found(level)?.ci95.ends()?;
+                    let (low, high) = found(level)?.ci95.as_ref()?.ends()?;
                     let at = level as f64 + aside;
                     Some(Whisker { at, low, high })
                 });

@@ -268,6 +268,19 @@ fn factors(a: &Analysis) -> Option<String> {
         1 => "",
         _ => ", and Holm's correction over the effects",
     };
+    let mut decided =
+        (a.results.evidence.factorial.iter()).flat_map(|tests| tests.effects.values());
+    if decided.any(|effect| effect.clustered.is_some()) {
+        return Some(format!(
+            "The factors were {}. Because only {} of {} rated every realization, {} tested within participants, from all \
+             cell means with participants and realizations as fixed factors, by t tests of the contrasts of the effect with standard \
+             errors clustered by participant (Pustejovsky & Tipton, 2018), Bonferroni's correction over these{correction}.",
+            apa::listing(&factors),
+            a.design.complete,
+            counted(a.design.participants, "participant", "participants"),
+            effects.to_lowercase()
+        ));
+    }
     Some(format!(
         "The factors were {}. {effects} tested by a repeated-measures analysis of variance of the participants' \
          means in each combination of levels, each effect within participants against its own interaction with \

@@ -41,6 +41,12 @@ pub(crate) fn effects(a: &Analysis) -> Table {
                 Greenhouse–Geisser correction, p (Holm) also that over the tested effects. p (ranks): aligned \
                 rank transform. η²G: generalized η².";
     let is_empty = all.is_empty();
+    let clustered = all.iter().any(|e| e.2.clustered.is_some());
+    let within = clustered.then(|| {
+        "t, df and p (within): all participants, compared within each, with standard errors clustered by participant; t is that of \
+         the clearest contrast, p is corrected over the contrasts of the effect, and p (Holm) over the effects as well."
+            .to_owned()
+    });
     Builder::new("Effects of the factors", &all)
         .apart(&|e| e.2.p_holm.is_none())
         .text(page("effect").file("effect"), &|e| e.1.clone())
@@ -54,7 +60,27 @@ pub(crate) fn effects(a: &Analysis) -> Table {
             &e.2.art_p
         })
         .field(page("η²G").file("ges"), two, |e| &e.2.ges)
-        .notes((!is_empty).then(|| note.to_owned()))
+        .field(
+            page("t (within)").file("clustered_t").when(clustered),
+            two,
+            |e| e.2.clustered.as_ref().map(|c| &c.t),
+        )
+        .field(
+            report("df").file("clustered_df").when(clustered),
+            two,
+            |e| e.2.clustered.as_ref().map(|c| &c.df),
+        )
+        .field(
+            page("p (within)").file("clustered_p").when(clustered),
+            bare_p,
+            |e| e.2.clustered.as_ref().map(|c| &c.p),
+        )
+        .notes(
+            (!is_empty)
+                .then(|| note.to_owned())
+                .into_iter()
+                .chain(within),
+        )
 }
 
 /// The means at the levels of the factors that are tested and in every combination.
@@ -82,8 +108,10 @@ pub(crate) fn means(a: &Analysis) -> Table {
         .text(report("levels").file("levels"), &|m| levels(m.0))
         .field(report("n").file("n"), whole, |m| &m.1.n)
         .field(report("mean").file("mean"), three, |m| &m.1.mean)
-        .field(report("SD").file("sd"), three, |m| &m.1.sd)
-        .ends(report("95 % CI").file("ci95"), two, &|m| m.1.ci95.ends())
+        .field(report("SD").file("sd"), three, |m| m.1.sd.as_ref())
+        .ends(report("95 % CI").file("ci95"), two, &|m| {
+            m.1.ci95.as_ref()?.ends()
+        })
         .done()
 }
 
@@ -105,7 +133,7 @@ pub(crate) fn contrasts(a: &Analysis) -> Table {
         false => levels(&name.at),
     };
     let any = all.clone().next().is_some();
-    let note = "t tests over participants. p (Holm) is corrected over the pairs of levels of a factor; of simple \
+    let note = "t tests over participants, or within them where many did not rate everything. p (Holm) is corrected over the pairs of levels of a factor; of simple \
                 effects over all of a factor in one interaction.";
     Builder::new("Differences between levels", all)
         .text(report("difference").file("contrast"), &|c| name(c.0))
@@ -119,6 +147,6 @@ pub(crate) fn contrasts(a: &Analysis) -> Table {
         .field(report("t").file("t"), two, |c| &c.1.t)
         .field(report("df").file("df"), whole, |c| &c.1.df)
         .field(report("p (Holm)").file("p_holm"), bare_p, |c| &c.1.p_holm)
-        .field(report("dz").file("dz"), two, |c| &c.1.dz)
+        .field(report("dz").file("dz"), two, |c| c.1.dz.as_ref())
         .notes(any.then(|| note.to_owned()))
 }

@@ -191,6 +191,22 @@ fn effects_with_groups_agree_with_r() {
         0.018_282_552_374_337_35,
     );
     close(&a, "factorial_mean/group=novices/n", 4.0);
+    // 4 and 5 are about equal; 4 and 6 would not be.
+    assert!(
+        a.findings
+            .iter()
+            .all(|f| f.caveats.iter().all(|c| c.code != "unequal-groups"))
+    );
+    let three = [(0, 0), (0, 1)];
+    let groups = crossing(&["novices", "experts"], &effects);
+    let uneven = analyzed(&table(&three), groups);
+    let warns = |effect: &str| {
+        let found = uneven
+            .finding(&Question::Effect(effect.to_owned()))
+            .unwrap();
+        found.caveats.iter().any(|c| c.code == "unequal-groups")
+    };
+    assert!(warns("grain:group") && warns("group") && !warns("grain"));
     // A group within a level has a mean of its own participants: P0 P2 P3 P6.
     close(
         &a,
@@ -235,10 +251,6 @@ fn what_cannot_be_analyzed_has_a_reason() {
         .collect();
     let why = reason(&table(&novices), crossing(&["novices", "experts"], &ALL));
     assert!(why.contains("of one group"), "{why}");
-    // One participant rated everything.
-    let most: Vec<(usize, usize)> = (1..9).flat_map(|s| [(s, 0), (s, 1)]).collect();
-    let why = reason(&table(&most), crossing(&[], &ALL));
-    assert!(why.contains("fewer than two"), "{why}");
     // A realization that the protocol does not know.
     let mut unknown = crossing(&[], &ALL);
     unknown.levels_of.remove("low-fine");
@@ -246,10 +258,107 @@ fn what_cannot_be_analyzed_has_a_reason() {
     assert!(why.contains("no levels"), "{why}");
 }
 
+/// Four of nine rated everything: all are compared within participants. R 4.2.2, clubSandwich 0.5.8:
+/// vcovCR(lm(cell mean ~ participant + realization), cluster = participant, type = "CR2"),
+/// Wald_test(test = "HTZ"), linear_contrast with Satterthwaite's degrees of freedom and p of t by pt.
+#[test]
+fn incomplete_designs_agree_with_r() {
+    let missing = [(0, 0), (2, 4), (3, 6), (5, 8), (8, 10)];
+    let missing: Vec<(usize, usize)> = missing
+        .iter()
+        .flat_map(|(s, i)| [(*s, *i), (*s, i + 1)])
+        .collect();
+    let a = analyzed(&table(&missing), crossing(&[], &ALL));
+    close(&a, "factorial/friction/clustered/htz_F", 186.877_797_487_38);
+    close(&a, "factorial/friction/clustered/df", 7.876_936_190_013_5);
+    close(&a, "factorial/friction/clustered/p", 9.127_262_731_717_6e-7);
+    close(
+        &a,
+        "factorial/grain/clustered/htz_F",
+        7.176_057_917_788_014_6,
+    );
+    close(&a, "factorial/grain/clustered/htz_df1", 2.0);
+    close(
+        &a,
+        "factorial/grain/clustered/htz_df2",
+        6.791_738_887_456_033_6,
+    );
+    close(
+        &a,
+        "factorial/grain/clustered/htz_p",
+        0.021_142_014_846_712_4,
+    );
+    close(
+        &a,
+        "factorial/friction:grain/clustered/htz_F",
+        6.500_877_101_836_887_4,
+    );
+    // The clearest of three contrasts each: fine against coarse.
+    close(&a, "factorial/grain/clustered/t", -3.803_803_049_654_002_1);
+    close(
+        &a,
+        "factorial/grain/clustered/p",
+        3.0 * 0.005_541_358_745_217_6,
+    );
+    close(&a, "factorial/friction:grain/clustered/n_contrasts", 3.0);
+    close(
+        &a,
+        "factorial/friction:grain/clustered/p",
+        3.0 * 0.005_548_643_815_613_2,
+    );
+    // Holm's correction over the effects by hand.
+    close(&a, "factorial/grain/p_holm", 6.0 * 0.005_541_358_745_217_6);
+    close(
+        &a,
+        "factorial/friction:grain/p_holm",
+        6.0 * 0.005_541_358_745_217_6,
+    );
+    let simple = "factorial_contrast/friction=low|high@grain=coarse";
+    close(&a, &format!("{simple}/difference"), -1.756_410_256_41);
+    close(&a, &format!("{simple}/df"), 7.307_798_787_39);
+    close(
+        &a,
+        &format!("{simple}/difference_ci95_lo"),
+        -2.207_020_892_99,
+    );
+    close(
+        &a,
+        "factorial_contrast/grain=fine|coarse/difference",
+        -0.743_589_743_59,
+    );
+    close(
+        &a,
+        "factorial_contrast/grain=fine|coarse/difference_ci95_hi",
+        -0.290_122_558_999,
+    );
+    // Means differ by what the differences are.
+    let mean = |level: &str| {
+        a.values
+            .number(&format!("factorial_mean/grain={level}/mean"))
+            .unwrap()
+    };
+    assert!((mean("fine") - mean("coarse") + 0.743_589_743_59).abs() < 1e-9);
+    let found = a.finding(&Question::Effect("grain".to_owned())).unwrap();
+    let test = found.test.as_ref().unwrap();
+    assert_eq!(
+        (test.kind, found.participants),
+        (TestKind::FactorialWithin, 9)
+    );
+    assert!(
+        found
+            .caveats
+            .iter()
+            .any(|c| c.code == "within-participants" && c.text.starts_with("4 of 9"))
+    );
+    // What the four say is beside it.
+    close(&a, "factorial/grain/df2", 6.0);
+}
+
 /// Who did not rate everything is left out, and the finding says so.
 #[test]
 fn incomplete_participants_are_named() {
-    let a = analyzed(&table(&[(8, 0), (8, 1)]), crossing(&[], &ALL));
+    let groups = crossing(&["novices", "experts"], &ALL);
+    let a = analyzed(&table(&[(8, 0), (8, 1)]), groups);
     let found = a.finding(&Question::Effect("friction".to_owned())).unwrap();
     assert_eq!(found.participants, 8);
     let caveat = found

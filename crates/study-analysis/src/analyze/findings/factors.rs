@@ -4,6 +4,7 @@ use super::{Direction, Estimate, Facts, Finding, Question, Test, TestKind};
 use crate::analyze::results::{ContrastName, FactorialEffect, LevelsName, Number as _};
 use study_base::apa;
 use study_base::text::counted;
+use study_plan::protocol::factors::GROUP;
 use study_stats::level::rejects;
 
 /// A finding for each effect that is tested; nothing in a study without factors.
@@ -47,7 +48,12 @@ pub(super) fn factors(facts: &Facts<'_>) -> Vec<Finding> {
                     ),
                 );
             }
-            ranks(facts, numbers, &mut finding);
+            if effect.contains(&crossing.factors.len()) {
+                unequal_groups(facts, &mut finding);
+            }
+            if numbers.clustered.is_none() {
+                ranks(facts, numbers, &mut finding);
+            }
         }
         found.push(finding);
     }
@@ -60,20 +66,46 @@ fn decided(facts: &Facts<'_>, question: Question, numbers: &FactorialEffect) -> 
         let why = numbers.p_holm.reason().unwrap_or("there is no test");
         return Finding::undefined(question, why, design);
     };
-    let epsilon = numbers.eps_gg.number().unwrap_or(1.0);
-    let df = [&numbers.df1, &numbers.df2].map(|df| df.number().map(|df| df * epsilon));
     let comparisons = (facts.rules.crossing.as_ref()).map_or(1, |c| c.effects.len());
     // With one contrast there is no sphericity to depart from.
-    let kind = match numbers.eps_gg.number() {
-        Some(epsilon) if epsilon < 1.0 => TestKind::FactorialAnovaGreenhouseGeisser,
-        _ => TestKind::FactorialAnova,
+    let epsilon = numbers.eps_gg.number().unwrap_or(1.0);
+    let (kind, (symbol, value), df) = match &numbers.clustered {
+        Some(own) => (
+            TestKind::FactorialWithin,
+            ("t", own.t.number()),
+            vec![own.df.number()],
+        ),
+        None => {
+            let df = [&numbers.df1, &numbers.df2].map(|df| df.number().map(|df| df * epsilon));
+            let df = df.to_vec();
+            let kind = match epsilon < 1.0 {
+                true => TestKind::FactorialAnovaGreenhouseGeisser,
+                false => TestKind::FactorialAnova,
+            };
+            (kind, ("F", numbers.f.number()), df)
+        }
     };
     let test = Test {
         comparisons,
         ..Test::single(kind, p, facts.rules.alpha)
     };
-    let test = test.with("F", numbers.f.number(), &df);
-    let mut found = Finding::decided(question, test, design);
+    let mut found = Finding::decided(question, test.with(symbol, value, &df), design);
+    let people = counted(design.participants, "participant", "participants");
+    let complete = match design.complete {
+        0 => "none".to_owned(),
+        n => n.to_string(),
+    };
+    if numbers.clustered.is_some() {
+        found.participants = design.participants;
+        found.caveat(
+            "within-participants",
+            format!(
+                "{complete} of {people} rated every realization; levels are compared within participants, by the \
+                 ratings of all, assuming that what is missing does not depend on what the rating would have been"
+            ),
+        );
+        return found;
+    }
     found.participants = design.complete;
     let ges = numbers.ges.number();
     found.effect = ges.and_then(|ges| Estimate::of("generalized eta squared", ges));
@@ -81,9 +113,7 @@ fn decided(facts: &Facts<'_>, question: Question, numbers: &FactorialEffect) -> 
         found.caveat(
             "complete-only",
             format!(
-                "{} of {} rated every realization; the others are left out of the analysis of the factors",
-                design.complete,
-                counted(design.participants, "participant", "participants")
+                "{complete} of {people} rated every realization; the others are left out of the analysis of the factors"
             ),
         );
     }
@@ -116,17 +146,42 @@ fn estimate(facts: &Facts<'_>, factor: usize, finding: &mut Finding) {
     }
 }
 
-/// Says so if the ranks disagree with the ratings.
+/// Groups whose sizes differ by this factor are unequal.
+const UNEQUAL: f64 = 1.5;
+
+/// Says so if groups are of unlike size: then the test needs ratings that vary alike in all.
+fn unequal_groups(facts: &Facts<'_>, finding: &mut Finding) {
+    let (Some(crossing), Some(tests)) = (&facts.rules.crossing, &facts.evidence.factorial) else {
+        return;
+    };
+    let of_group = |name: &&LevelsName| matches!(&name.0[..], [(factor, _)] if factor == GROUP);
+    let sizes: Vec<f64> = (tests.means.iter().filter(|(name, _)| of_group(name)))
+        .filter_map(|(_, mean)| mean.n.number())
+        .collect();
+    let least = sizes.iter().copied().fold(f64::INFINITY, f64::min);
+    let most = sizes.iter().copied().fold(0.0, f64::max);
+    if sizes.len() == crossing.groups.len() && most >= UNEQUAL * least {
+        finding.caveat(
+            "unequal-groups",
+            format!(
+                "the groups have {least} to {most} participants: if ratings vary more in a small group than in a large one, this test says yes too often"
+            ),
+        );
+    }
+}
+
+/// Says so if the ranks do not show what the ratings do. That they show more says little: with single
+/// ratings they reject too often (docs/calibration.md).
 fn ranks(facts: &Facts<'_>, numbers: &FactorialEffect, finding: &mut Finding) {
     let alpha = facts.rules.alpha;
     let (Some(p), Some(of_ranks)) = (numbers.p_gg.number(), numbers.art_p.number()) else {
         return;
     };
-    if rejects(p, alpha) != rejects(of_ranks, alpha) {
+    if rejects(p, alpha) && !rejects(of_ranks, alpha) {
         finding.caveat(
             "ranks",
             format!(
-                "the aligned ranks of the ratings say otherwise: p {} for {} of the ratings, both without correction for the number of effects",
+                "the aligned ranks of the ratings do not show it: p {} for {} of the ratings, both without correction for the number of effects",
                 apa::p_beside(of_ranks, alpha),
                 apa::p_beside(p, alpha)
             ),
