@@ -157,7 +157,7 @@ fn heartbeat(both: [Lateness; 2], told_ms: Option<f64>, priority: Priority) -> F
         None => "a device",
     };
     let says = format!(
-        "Heartbeats, every {interval_ms:.0} ms, were late by {} in 99 % and {} at most {when}, of {} in each of two stretches; {whose} with a watchdog time of {watchdog_ms:.0} ms goes limp when one is late by {limp_ms:.0} ms.",
+        "Heartbeats, every {interval_ms:.0} ms, were late by {} in 99 % and {} at most {when}, of {}; {whose} with a watchdog time of {watchdog_ms:.0} ms goes limp when one is late by {limp_ms:.0} ms.",
         ms(late.p99_ms),
         ms(late.largest_ms),
         late.n,
