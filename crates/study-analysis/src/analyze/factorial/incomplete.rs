@@ -123,7 +123,8 @@ impl<'a> Incomplete<'a> {
                 true => pairs
                     .map(|(a, b)| {
                         let mut weights = vec![0.0; size];
-                        (weights[a], weights[b]) = (1.0, -1.0);
+                        // The second less the first, as the finding's estimate.
+                        (weights[a], weights[b]) = (-1.0, 1.0);
                         weights
                     })
                     .collect(),

@@ -294,7 +294,7 @@ fn incomplete_designs_agree_with_r() {
         6.500_877_101_836_887_4,
     );
     // The clearest of three contrasts each: fine against coarse.
-    close(&a, "factorial/grain/clustered/t", -3.803_803_049_654_002_1);
+    close(&a, "factorial/grain/clustered/t", 3.803_803_049_654_002_1);
     close(
         &a,
         "factorial/grain/clustered/p",
