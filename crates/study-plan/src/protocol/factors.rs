@@ -5,7 +5,7 @@
 //! under study. Where every group of participants rates all of them, the group is a factor
 //! between participants, by the name [`GROUP`].
 
-use super::{GroupRules, ModelEntry, Protocol, Role};
+use super::{Groups, ModelEntry, Protocol, Role};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use study_base::text::{QuestionId, Untrusted};
@@ -98,16 +98,11 @@ impl Protocol {
                 Some((model.id.to_string(), levels.collect::<Option<_>>()?))
             })
             .collect();
-        let groups = self.groups.as_ref().map_or(&[][..], |groups| &groups.list);
-        let rates_all = |group: &GroupRules| {
-            let rates = |model: &String| {
-                let listed = group.models.as_ref();
-                listed.is_none_or(|own| own.iter().any(|m| m.as_str() == model))
-            };
-            levels_of.keys().all(rates)
-        };
-        let by_group = groups.iter().all(rates_all);
-        let groups: Vec<String> = (groups.iter().filter(|_| by_group))
+        let groups = self.groups.as_ref().filter(|groups| {
+            let models = levels_of.keys().map(String::as_str);
+            is_factor(groups, models)
+        });
+        let groups: Vec<String> = (groups.iter().flat_map(|groups| &groups.list))
             .map(|group| group.id.to_string())
             .collect();
         let mut names: Vec<&str> = self.factors.iter().map(|f| f.id.as_str()).collect();
@@ -122,6 +117,20 @@ impl Protocol {
             effects: stated.unwrap_or_else(|| crossed(&(0..names.len()).collect::<Vec<_>>())),
         })
     }
+}
+
+/// Whether the group of a participant is a factor: every group rates all of these realizations.
+pub(super) fn is_factor<'a>(
+    groups: &Groups,
+    models: impl Iterator<Item = &'a str> + Clone,
+) -> bool {
+    groups.list.iter().all(|group| {
+        let rates = |model: &str| {
+            let listed = group.models.as_ref();
+            listed.is_none_or(|own| own.iter().any(|m| m.as_str() == model))
+        };
+        models.clone().all(rates)
+    })
 }
 
 /// Whether a realization belongs to the crossing: one under study that repeats no other.

@@ -2,13 +2,15 @@
 
 use super::agree::{at, collision, unknown};
 use super::models::PartialModel;
-use crate::protocol::factors::{self, Factor, GROUP, MAX_COMBINATIONS, MAX_FACTORS, is_crossed};
+use crate::protocol::factors::{
+    self, Factor, GROUP, MAX_COMBINATIONS, MAX_FACTORS, is_crossed, is_factor,
+};
 use crate::protocol::keys::{Id, Key, Kind, keys};
 use crate::protocol::section::Section;
 use crate::protocol::{AnalysisRules, Groups};
 use study_base::diagnostic::Fault;
 use study_base::diagnostic::table::Document;
-use study_base::text::Untrusted;
+use study_base::text::{ModelId, Untrusted};
 
 pub(super) const FACTORS: &[Key] = keys! {
     /// The name of the factor. It becomes a column of the results.
@@ -90,7 +92,11 @@ pub(super) fn agree(
         return;
     };
     let mut names: Vec<&str> = factors.iter().map(|f| f.id.as_str()).collect();
-    names.extend(groups.map(|_| GROUP));
+    let crossed = (models.iter())
+        .filter(|m| is_crossed(m.role, m.duplicate_of.is_some()))
+        .filter_map(|m| m.id.as_ref().map(ModelId::as_str));
+    let group = groups.filter(|groups| is_factor(groups, crossed.clone()));
+    names.extend(group.map(|_| GROUP));
     if let Err(why) = factors::effects(formula, analysis.primary.as_str(), &names) {
         let fault_of = Fault::error(format!("`analysis.model` cannot be read: {why}"));
         fault("analysis", "model", fault_of);

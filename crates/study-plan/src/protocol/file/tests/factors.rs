@@ -103,6 +103,15 @@ fn groups_that_rate_everything_are_a_factor_between_participants() {
     let found = with(half);
     assert!(found.groups.is_empty());
     assert_eq!(found.effects.len(), 3);
+    // Then its effects cannot be asked for, and the formula is not ignored in silence.
+    let stated = FACTORS.replace(
+        "\"rough\" }",
+        "\"rough\", model = \"rough ~ friction * group\" }",
+    );
+    let text = |groups: &str| format!("{head}{stated}{}{parts}[groups]\n{groups}", crossed());
+    assert!(faults(&text(half)).contains("there is no factor `group`"));
+    let whole = "list = [{ id = \"n\" }, { id = \"e\" }]";
+    assert_eq!(protocol(&text(whole)).crossing().unwrap().effects.len(), 3);
 }
 
 #[test]
