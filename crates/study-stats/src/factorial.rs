@@ -29,7 +29,7 @@ mod tests;
 pub use aligned::{AlignedPair, Level, aligned_pairs, aligned_ranks};
 pub use contrasts::{
     Contrast, Pair, Weights, What, contrast, group_contrast, interaction_pairs, marginal_pairs,
-    simple_pairs,
+    product, simple_pairs,
 };
 
 use super::anova::{f_test, ratio};

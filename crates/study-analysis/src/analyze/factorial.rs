@@ -13,6 +13,7 @@ use complete::Table;
 use incomplete::Incomplete;
 use std::collections::BTreeMap;
 use study_plan::protocol::Crossing;
+use study_stats::factorial::{Pair, product};
 use study_stats::paired::holm;
 
 statistics! {
@@ -281,7 +282,7 @@ impl<'a> Layout<'a> {
         of: &dyn Fn(&[f64]) -> Option<Compared>,
     ) -> Vec<(ContrastName, FactorialContrast)> {
         let others = other.map_or_else(|| vec![Vec::new()], |other| self.combinations(&[other]));
-        let levels = self.levels(factor);
+        let (levels, sizes) = (self.levels(factor), self.crossing.sizes());
         let mut found = Vec::new();
         for at in &others {
             for first in 0..levels.len() {
@@ -291,7 +292,12 @@ impl<'a> Layout<'a> {
                         levels: [first, second].map(|level| levels[level].clone()),
                         at: self.named(at),
                     };
-                    found.push((name, of(&self.weights(factor, (first, second), at))));
+                    let pair = Pair {
+                        factor,
+                        first,
+                        second,
+                    };
+                    found.push((name, of(&product(&sizes, &[pair], at))));
                 }
             }
         }
@@ -301,24 +307,6 @@ impl<'a> Layout<'a> {
             (name, FactorialContrast::of(compared, p_holm))
         };
         tested.map(contrast).collect()
-    }
-
-    /// The mean at the first level less that at the second.
-    fn weights(
-        &self,
-        factor: usize,
-        (first, second): (usize, usize),
-        at: &[(usize, usize)],
-    ) -> Vec<f64> {
-        let mut weights = vec![0.0; self.columns.len()];
-        for (level, sign) in [(first, 1.0), (second, -1.0)] {
-            let levels: Levels = at.iter().copied().chain([(factor, level)]).collect();
-            let own = self.at(&levels);
-            for &j in &own {
-                weights[j] = sign / own.len() as f64;
-            }
-        }
-        weights
     }
 }
 

@@ -244,8 +244,16 @@ fn pairs(levels: &[usize], factor: usize) -> Vec<Pair> {
     (0..k).flat_map(of_first).collect()
 }
 
-/// The product over the factors of a difference, a level, or the mean.
-pub(super) fn product(levels: &[usize], pairs: &[Pair], at: &[(usize, usize)]) -> Vec<f64> {
+/// The weights of a contrast over the cells: the product over the factors of a difference of two levels, of
+/// one level (factor and level in `at`), or of the mean over its levels.
+///
+/// ```
+/// # use study_stats::factorial::{Pair, product};
+/// let pair = Pair { factor: 0, first: 0, second: 1 };
+/// assert_eq!(product(&[2, 2], &[pair], &[(1, 1)]), [0.0, 1.0, 0.0, -1.0]);
+/// assert_eq!(product(&[2, 2], &[pair], &[]), [0.5, 0.5, -0.5, -0.5]);
+/// ```
+pub fn product(levels: &[usize], pairs: &[Pair], at: &[(usize, usize)]) -> Vec<f64> {
     let of_factor = |factor: usize, k: usize| {
         let pair = pairs.iter().find(|pair| pair.factor == factor);
         let held = at.iter().find(|(held, _)| *held == factor);

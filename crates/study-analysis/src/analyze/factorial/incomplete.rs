@@ -6,6 +6,7 @@ use crate::analyze::adjusted::Adjusted;
 use crate::analyze::cells::Cells;
 use crate::analyze::record::{Number as _, Stat, Why};
 use study_plan::protocol::Crossing;
+use study_stats::factorial::{Pair, product};
 use study_stats::lmm::ContrastT;
 use study_stats::paired::holm;
 use study_stats::within::Clustered;
@@ -112,33 +113,25 @@ impl<'a> Incomplete<'a> {
     }
 
     /// What is 0 without an effect, by weights of the combinations: products of differences of two levels of
-    /// each of its factors, over the levels of the others.
+    /// each of its factors, the second less the first, over the levels of the others.
     fn contrasts_of(&self, effect: &[usize]) -> Vec<Vec<f64>> {
         let sizes = self.layout.crossing.sizes();
-        let mut all = vec![vec![1.0]];
-        for (factor, &size) in sizes.iter().enumerate() {
-            let pairs = (0..size).flat_map(|a| (a + 1..size).map(move |b| (a, b)));
-            let own: Vec<Vec<f64>> = match effect.contains(&factor) {
-                false => vec![vec![1.0 / size as f64; size]],
-                true => pairs
-                    .map(|(a, b)| {
-                        let mut weights = vec![0.0; size];
-                        // The second less the first, as the finding's estimate.
-                        (weights[a], weights[b]) = (-1.0, 1.0);
-                        weights
-                    })
-                    .collect(),
-            };
-            let product = |a: &Vec<f64>, b: &Vec<f64>| -> Vec<f64> {
-                a.iter()
-                    .flat_map(|x| b.iter().map(move |y| x * y))
-                    .collect()
-            };
+        let mut all: Vec<Vec<Pair>> = vec![Vec::new()];
+        for &factor in effect {
+            let size = sizes[factor];
+            let pairs = (0..size).flat_map(|second| {
+                (second + 1..size).map(move |first| Pair {
+                    factor,
+                    first,
+                    second,
+                })
+            });
             all = (all.iter())
-                .flat_map(|a| own.iter().map(|b| product(a, b)).collect::<Vec<_>>())
+                .flat_map(|start| pairs.clone().map(|pair| [&start[..], &[pair]].concat()))
                 .collect();
         }
-        all
+        let weights = |pairs: &Vec<Pair>| product(&sizes, pairs, &[]);
+        all.iter().map(weights).collect()
     }
 
     fn mean(&self, levels: &[(usize, usize)]) -> FactorialMean {

@@ -206,6 +206,14 @@ fn effects_with_groups_agree_with_r() {
             .unwrap();
         found.caveats.iter().any(|c| c.code == "unequal-groups")
     };
+    let alone = crossing(&["novices", "experts"], &[&[1, 2]]);
+    let alone = analyzed(&table(&three), alone);
+    assert!(
+        alone.findings[0]
+            .caveats
+            .iter()
+            .any(|c| c.code == "unequal-groups")
+    );
     assert!(warns("grain:group") && warns("group") && !warns("grain"));
     // A group within a level has a mean of its own participants: P0 P2 P3 P6.
     close(

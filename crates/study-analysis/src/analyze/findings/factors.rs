@@ -154,10 +154,14 @@ fn unequal_groups(facts: &Facts<'_>, finding: &mut Finding) {
     let (Some(crossing), Some(tests)) = (&facts.rules.crossing, &facts.evidence.factorial) else {
         return;
     };
-    let of_group = |name: &&LevelsName| matches!(&name.0[..], [(factor, _)] if factor == GROUP);
-    let sizes: Vec<f64> = (tests.means.iter().filter(|(name, _)| of_group(name)))
-        .filter_map(|(_, mean)| mean.n.number())
-        .collect();
+    // Of any mean of a group, whichever effects are tested.
+    let size = |group: &String| {
+        let of_group = |(factor, level): &(String, String)| factor == GROUP && level == group;
+        let mut means = tests.means.iter();
+        let (_, mean) = means.find(|(name, _)| name.0.iter().any(of_group))?;
+        mean.n.number()
+    };
+    let sizes: Vec<f64> = crossing.groups.iter().filter_map(size).collect();
     let least = sizes.iter().copied().fold(f64::INFINITY, f64::min);
     let most = sizes.iter().copied().fold(0.0, f64::max);
     if sizes.len() == crossing.groups.len() && most >= UNEQUAL * least {
