@@ -197,10 +197,8 @@ impl Clustered {
         let wald = dot(&estimates, &covariance.solve(&estimates));
         let [traces, products] = sums_of_products(&self.patterns, &parts);
         let eta = q * (q + 1.0) / (traces + products);
-        let df2 = eta - q + 1.0;
-        if !(df2.is_finite() && df2 > 0.0) {
-            return None;
-        }
+        // Exactly as many subjects as contrasts leave 0, but for rounding.
+        let df2 = finite(eta - q + 1.0).filter(|df2| *df2 > ROUNDING * q)?;
         let f = finite(df2 / (eta * q) * wald)?;
         Some(ContrastF {
             f,

@@ -272,6 +272,20 @@ fn the_series_is_the_root() {
     }
 }
 
+/// As many contrasts as subjects leave no degrees of freedom, whatever rounding makes of 0.
+#[test]
+fn as_many_contrasts_as_subjects_have_no_test() {
+    for (seed, subjects) in (0..1000).flat_map(|seed| (3..6).map(move |n| (seed, n))) {
+        let mut random = SplitMix64::new(seed);
+        let k = subjects + 1;
+        let rows: Vec<Row> = (0..subjects * k)
+            .map(|i| (i / k, i % k, random.normal()))
+            .collect();
+        let found = clustered(&rows).test(&against_first(k, 1..k));
+        assert_eq!(found, None, "seed {seed}, {subjects} subjects");
+    }
+}
+
 proptest! {
     /// In complete tables a contrast is a paired t test and several are Hotelling's T² (with one contrast t²).
     #[test]
