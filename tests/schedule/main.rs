@@ -10,5 +10,6 @@ mod guessing;
 mod parts;
 mod reproduced;
 mod requeue;
+mod search;
 mod second;
 mod uniform;

@@ -15,12 +15,14 @@ mod constant;
 mod ladder;
 mod passes;
 pub mod quest;
+pub mod search;
 pub mod staircase;
 
 pub use constant::Constant;
 pub use ladder::Ladder;
 pub use passes::Passes;
 pub use quest::{Function, Parameter, QuestPlus};
+pub use search::{Choose, Lattice, Preferred, Search, SearchRule};
 pub use staircase::{Reversal, Scale, Staircase, Stop};
 
 use serde::{Deserialize, Serialize};

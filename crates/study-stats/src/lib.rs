@@ -20,6 +20,7 @@
 //! | At which level is a stimulus felt? | [`psychometric`] |
 //! | How well are two stimuli told apart? | [`detection`] |
 //! | Which is preferred, in pairs? | [`pairs`] |
+//! | Which is preferred in a space of stimuli, and which pair tells most? | [`preference_gp`] |
 //! | How do estimated magnitudes grow? | [`magnitude`] |
 //! | Who is screened in a MUSHRA test? | [`mushra`] |
 //! | Does a test reject at its level? | [`level`] |
@@ -69,6 +70,7 @@ pub mod paired;
 pub mod pairs;
 pub mod permutation;
 pub mod power;
+pub mod preference_gp;
 pub mod proportion;
 pub mod psychometric;
 mod quadrature;

@@ -180,6 +180,20 @@ impl Cholesky {
         self.solve_lower_from(0, b);
     }
 
+    /// Replaces the rows of B by those of X of LX = B; of a definite matrix.
+    pub(crate) fn solve_lower_rows(&self, b: &mut [Vec<f64>]) {
+        for i in 0..b.len() {
+            let (solved, rest) = b.split_at_mut(i);
+            let (own, l) = (&mut rest[0], self.factor.row(i));
+            for (row, l) in solved.iter().zip(l) {
+                for (value, known) in own.iter_mut().zip(row) {
+                    *value -= l * known;
+                }
+            }
+            own.iter_mut().for_each(|value| *value /= l[i]);
+        }
+    }
+
     /// As [`Self::solve_lower`], where the elements of b before `first` are 0.
     fn solve_lower_from(&self, first: usize, b: &mut [f64]) {
         for i in first..b.len() {
@@ -249,6 +263,10 @@ mod tests {
         let sums = [0, 1, 2].map(|i| (0..3).map(|j| example().get(i, j)).sum());
         assert_eq!(factor.solve(&sums), [1.0, 1.0, 1.0]);
         assert!((factor.inverse_diagonal()[2] - 1.0 / 9.0).abs() < 1e-15);
+        // L (1, 1, 1)ᵀ and L (0, 2, 1)ᵀ.
+        let mut rows = vec![vec![1.0, 0.0], vec![3.0, 2.0], vec![6.0, 5.0]];
+        factor.solve_lower_rows(&mut rows);
+        assert_eq!(rows, [[1.0, 0.0], [1.0, 2.0], [1.0, 1.0]]);
         // L⁻¹ has the rows (1, 0, 0), (−2, 1, 0), (0, −1/3, 1/3).
         let inverse = [
             [5.0, -2.0, 0.0],

@@ -1,0 +1,62 @@
+//! The best point so far, and the pair whose comparison is expected to lead to the best one.
+
+use super::probit::{DENSITY_AT_0, cumulative, density};
+use super::{Posterior, TIE};
+
+impl Posterior {
+    /// The expected utility of the better of two points (EUBO), without the noise of the answer: with means
+    /// m_a ≥ m_b, θ the standard deviation of f_a − f_b, and t = (m_a − m_b)/θ, it is m_a + θ (φ(t) − t Φ(−t)).
+    ///
+    /// # Panics
+    /// If there is no such point.
+    pub fn expected_best(&self, a: usize, b: usize) -> f64 {
+        let (higher, apart, spread) = self.compared(a, b);
+        if spread <= 0.0 {
+            return higher;
+        }
+        let t = apart / spread;
+        higher + spread * (density(t) - t * cumulative(-t)).max(0.0)
+    }
+
+    /// The pair with the largest [`expected_best`](Self::expected_best), the lower index first; of pairs within
+    /// [`TIE`] of it, the first one in the order (0, 1), (0, 2), (1, 2), (0, 3) and so on. `None` with fewer than two
+    /// points.
+    pub fn best_pair(&self) -> Option<(usize, usize)> {
+        let most = self.pairs().fold(f64::NEG_INFINITY, |most, (a, b)| {
+            if self.bound(a, b) < most {
+                most
+            } else {
+                most.max(self.expected_best(a, b))
+            }
+        });
+        let tied = most - TIE * most.abs().max(1.0);
+        let mut pairs = self.pairs();
+        pairs.find(|(a, b)| self.bound(*a, *b) >= tied && self.expected_best(*a, *b) >= tied)
+    }
+
+    /// The point with the largest mean; of points within [`TIE`] of it, the first.
+    pub fn best_point(&self) -> usize {
+        let most = (self.mean().iter()).fold(f64::NEG_INFINITY, |most, mean| most.max(*mean));
+        let tied = most - TIE * most.abs().max(1.0);
+        (self.mean().iter())
+            .position(|mean| *mean >= tied)
+            .unwrap_or(0)
+    }
+
+    fn pairs(&self) -> impl Iterator<Item = (usize, usize)> {
+        (0..self.mean().len()).flat_map(|b| (0..b).map(move |a| (a, b)))
+    }
+
+    /// The larger mean, by how much it is larger, and the standard deviation of the difference.
+    fn compared(&self, a: usize, b: usize) -> (f64, f64, f64) {
+        let (one, two) = (self.mean()[a], self.mean()[b]);
+        let variance = self.covariance(a, a) + self.covariance(b, b) - 2.0 * self.covariance(a, b);
+        (one.max(two), (one - two).abs(), variance.max(0.0).sqrt())
+    }
+
+    /// What [`expected_best`](Self::expected_best) cannot exceed, even rounded: φ(t) − t Φ(−t) is largest at 0.
+    fn bound(&self, a: usize, b: usize) -> f64 {
+        let (higher, _, spread) = self.compared(a, b);
+        higher + spread * DENSITY_AT_0 + 1e-12 * (1.0 + higher.abs() + spread)
+    }
+}
