@@ -77,7 +77,7 @@ enum Command {
     Trajectory(trajectory::Args),
     /// Move the probe along a trajectory and record the response
     Record(record::Args),
-    /// Turn measurements of another instrument into a recording
+    /// Read measurements of another instrument, or results of another program
     Import(import::Args),
     /// Identify realizations from a recording: model files and their VAF
     Identify(Box<identify::Args>),

@@ -53,6 +53,7 @@ rendering: protocol outcome wire
 analyze: protocol procedure outcome stats
 power: protocol procedure outcome analyze stats
 export: protocol outcome analyze
+import: outcome analyze
 preregister: protocol outcome analyze
 check: load model power protocol safe_play stats wire
 load: archive family identify model preregister protocol recording safe_play schedule store wire
@@ -74,7 +75,7 @@ tui: runner page session outcome protocol
 plain: runner page session outcome protocol tui
 screen: runner page session protocol
 front: runner page session protocol
-cli: analyze archive check device doctor export front identify load model outcome plain plant power procedure protocol rater recording rehearsal rendering report runner schedule screen session stats store study trajectory tui wire
+cli: analyze archive check device doctor export front identify import load model outcome plain plant power procedure protocol rater recording rehearsal rendering report runner schedule screen session stats store study trajectory tui wire
 main: cli
 certificate: predict
 predict: real

@@ -1,4 +1,6 @@
-//! `study import`: measurements of other instruments as recordings.
+//! `study import`: measurements of other instruments as recordings, results of other programs as tables.
+
+mod table;
 
 use super::trajectory::{refuse_to_overwrite, write_file};
 use super::{Console, Failure};
@@ -6,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use study_base::hex::sha256;
 use study_base::text::counted;
-use study_haptics::recording::force_curve::{self, Source, Stated, USUAL_RATE_HZ};
+use study_haptics::recording::force_curve::{self as curve, Source, Stated, USUAL_RATE_HZ};
 
 /// A longer press is likelier a time in ms, s.
 const LONG_S: f64 = 1800.0;
@@ -23,6 +25,8 @@ enum What {
     /// Displacement and force of a slow press and release: the files of a force tester, or columns force and displacement
     #[command(name = "force-curve")]
     ForceCurve(Box<ForceCurve>),
+    /// Ratings, trials or comparisons of PsychoPy, jsPsych, OpenSesame or a spreadsheet, as a table that study analyze reads
+    Table(Box<table::Args>),
 }
 
 #[derive(Debug, clap::Args)]
@@ -77,20 +81,27 @@ fn refuse_to_replace_an_input(files: &[PathBuf], out: &Path) -> Result<(), Failu
             "{} is one of the measurements, which would be lost",
             file.display()
         ))
-        .hint("write the recording to another file; nothing was written")),
+        .hint("write to another file; nothing was written")),
         None => Ok(()),
     }
 }
 
-/// Reads the files and writes the recording.
+/// Runs a subcommand of `study import`.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
-    let What::ForceCurve(args) = &args.what;
+    match &args.what {
+        What::ForceCurve(args) => force_curve(args, console),
+        What::Table(args) => table::run(args, console),
+    }
+}
+
+/// Reads the files and writes the recording.
+fn force_curve(args: &ForceCurve, console: &mut Console) -> Result<(), Failure> {
     refuse_to_overwrite(Some(&args.out), args.force)?;
     refuse_to_replace_an_input(&args.files, &args.out)?;
     let mut curves = Vec::new();
     for path in &args.files {
         let bytes = fs::read(path).map_err(|e| Failure::file(path, &e))?;
-        let curve = force_curve::read(&String::from_utf8_lossy(&bytes))
+        let curve = curve::read(&String::from_utf8_lossy(&bytes))
             .map_err(|e| Failure::input(format!("{}: {e}", path.display())))?;
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let (rows, layout) = (curve.x_mm.len(), curve.layout.as_str());
@@ -126,7 +137,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             sha256,
         })
         .collect();
-    for doubt in force_curve::unlike(&sources) {
+    for doubt in curve::unlike(&sources) {
         console.say(format!("warning: {doubt}"));
     }
     let stated = Stated {
@@ -136,7 +147,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         license: args.license.as_deref(),
         rate_hz: args.rate,
     };
-    let recording = force_curve::join(&sources, stated);
+    let recording = curve::join(&sources, stated);
     write_file(&args.out, |sink| sink.write_all(&recording))?;
     let number = counted(sources.len(), "curve", "curves");
     console.say(format!("wrote {number} to {}", args.out.display()));

@@ -35,6 +35,7 @@ pub(crate) use part_data::{asked, sessions_of};
 pub use preferences::{Choice, Preference, preferences};
 pub use scales::{MagnitudeRow, MushraRoles, MushraRow, magnitude, mushra};
 pub use study::parts;
-pub use table::{TableError, TableKind, analyze_table};
+pub(crate) use table::{PARTICIPANT, correct_column};
+pub use table::{TableError, TableKind, analyze_table, read_table};
 pub use tracks::{TrackData, TrackTrial, quest_plus, staircase, track_order};
 pub use trials::{Asked, TrialCount, TrialSettings, discrimination};

@@ -86,7 +86,7 @@ pub enum TableError {
     },
     /// Columns that are not separated by commas.
     #[error(
-        "{name}: the columns are separated by {separator}; a table has commas, and decimal points"
+        "{name}: the columns are separated by {separator}; a table has commas, and decimal points: `study import table` makes one"
     )]
     Separator {
         /// The file.
@@ -133,8 +133,35 @@ pub fn analyze_table(
     Ok((results, rows.records.len()))
 }
 
+/// Reads a CSV without analyzing it.
+///
+/// # Errors
+/// [`TableError`] of the first fault.
+pub fn read_table(name: &str, input: impl BufRead, kind: TableKind) -> Result<(), TableError> {
+    let rows = Rows::read(name, input, kind)?;
+    match kind {
+        TableKind::Trials(asked) => rows.trials(asked).map(|_| ()),
+        TableKind::Pairs => rows.pairs().map(|_| ()),
+        TableKind::Magnitude => rows.estimates().map(|_| ()),
+        TableKind::Mushra => rows.ratings().map(|_| ()),
+    }
+}
+
+/// The column that says whether an answer is correct: `correct`, or that of a keyboard or
+/// mouse of PsychoPy, such as `key_resp.corr`, if there is one of them.
+pub(crate) fn correct_column(header: &[String]) -> Option<usize> {
+    let of_component = || {
+        let mut all = header.iter().enumerate();
+        let (at, _) = all.find(|(_, name)| name.ends_with(".corr"))?;
+        all.all(|(_, name)| !name.ends_with(".corr")).then_some(at)
+    };
+    let named = header.iter().position(|name| name == "correct");
+    named.or_else(of_component)
+}
+
 /// Columns of the participant, in the order in which they are looked for.
-const PARTICIPANT: [&str; 4] = ["participant", "subject", "participant_id", "subject_id"];
+pub(crate) const PARTICIPANT: [&str; 4] =
+    ["participant", "subject", "participant_id", "subject_id"];
 
 struct Rows<'a> {
     name: &'a str,
@@ -183,17 +210,6 @@ impl<'a> Rows<'a> {
 
     fn column(&self, column: &str) -> Option<usize> {
         self.header.iter().position(|h| h == column)
-    }
-
-    /// The column that says whether an answer is correct: `correct`, or that of a keyboard or
-    /// mouse of PsychoPy, such as `key_resp.corr`, if there is one of them.
-    fn correct(&self) -> Option<usize> {
-        let of_component = || {
-            let mut all = self.header.iter().enumerate();
-            let (at, _) = all.find(|(_, name)| name.ends_with(".corr"))?;
-            all.all(|(_, name)| !name.ends_with(".corr")).then_some(at)
-        };
-        self.column("correct").or_else(of_component)
     }
 
     fn required(&self, column: &'static str) -> Result<usize, TableError> {
@@ -283,11 +299,10 @@ impl<'a> Rows<'a> {
         let positive = self.column("positive");
         let trials = self.column("trials");
         // jsPsych calls the answer its response; beside `correct` it is a key.
-        let says = target.is_some() && self.correct().is_none();
+        let says = target.is_some() && correct_column(&self.header).is_none();
         let answer = answer.or_else(|| self.column("response").filter(|_| says));
-        let correct = self
-            .correct()
-            .filter(|_| answer.is_none() && positive.is_none());
+        let correct =
+            correct_column(&self.header).filter(|_| answer.is_none() && positive.is_none());
         // Whoever is right has said "no" in a catch trial, and "smaller" below the standard.
         let by_target = matches!(
             asked,

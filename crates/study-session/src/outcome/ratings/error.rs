@@ -16,7 +16,7 @@ pub enum RatingsError {
     /// Its columns are not separated by commas.
     #[error(
         "{name}: the columns are separated by `{}`; save it with commas between the columns and \
-         points in the numbers",
+         points in the numbers, or read it with `study import table`",
         Untrusted(&.separator.to_string())
     )]
     Separator { name: String, separator: char },

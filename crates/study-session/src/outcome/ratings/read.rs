@@ -487,7 +487,7 @@ mod tests {
         assert_eq!(
             message("subject;model;repetition;rating;vaf\nS1;A;1;4,5;0,5\n"),
             "r.csv: the columns are separated by `;`; save it with commas between the columns \
-             and points in the numbers"
+             and points in the numbers, or read it with `study import table`"
         );
         let latin = [HEAD.as_bytes(), b"S1,A,1,4,0.5\nM\xfcller,A,1,4,0.5\n"].concat();
         assert_eq!(
