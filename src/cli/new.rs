@@ -5,7 +5,7 @@ use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use study_analysis::load;
-use study_base::text::Untrusted;
+use study_base::text::{Untrusted, counted};
 use study_plan::protocol::file;
 
 /// The files of a new study: a commented protocol and three of the paper's realizations.
@@ -143,9 +143,9 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let shown = dir.display().to_string();
     let shown = Untrusted(&shown);
     console.out(format!(
-        "wrote {shown}: {} and {} files beside it\nnext: study check {shown}; study run {shown} --pilot\n",
+        "wrote {shown}: {} and {} beside it\nnext: study check {shown}; study run {shown} --pilot\n",
         load::FILE_NAME,
-        files.len() - 1
+        counted(files.len() - 1, "file", "files")
     ))
 }
 

@@ -37,7 +37,6 @@ mod tui_keys;
 mod tui_pictures;
 mod tui_terminal;
 mod turning;
-mod tutorial;
 mod unsaved;
 mod views;
 #[path = "../support/world.rs"]
