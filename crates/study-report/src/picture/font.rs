@@ -5,7 +5,7 @@ use study_base::text::Untrusted;
 use ttf_parser::{Face, GlyphId, OutlineBuilder};
 use unicode_width::UnicodeWidthChar as _;
 
-pub(super) const DATA: &[u8] = include_bytes!("../../../../assets/LiberationSans-Regular.ttf");
+pub(super) const DATA: &[u8] = include_bytes!("../../assets/LiberationSans-Regular.ttf");
 
 /// The glyph of characters that the font lacks: a box.
 const MISSING: GlyphId = GlyphId(0);
