@@ -10,11 +10,13 @@
 //! | Do groups of subjects differ, or does a difference depend on the group? | [`between`] (equal variances), [`between::welch`] (variances of their own) |
 //! | Do the ratings follow a given order? | [`friedman::page`] |
 //! | The same where not everybody rated everything, within subjects | [`within`] (equal variances), [`within::Clustered`] (errors correlated within subjects) |
+//! | How probable is it that one realization is above another, on an ordered scale? | [`ordinal_hierarchy`] |
 //! | Which pairs differ? Are they equivalent? | [`paired`] |
 //! | Are the ratings correlated with a covariate? | [`correlation`], [`permutation`] (exact p), [`bootstrap`] (interval), [`bayes`] |
 //! | What is the slope on a covariate? | [`regression`], [`two_way_slope`] (beside two fixed factors), [`lmm`] (random effects) |
 //! | Do the raters agree? | [`agreement`], [`disagreement`] (interaction of subject and realization) |
 //! | Does a rating depend on the one before? | [`carry_over`] |
+//! | Does an answer depend on the trial before? | [`sequential`] |
 //! | How large an effect would be found? How many subjects and realizations does it take? | [`power`] |
 //! | How large is a share of trials? | [`proportion`] |
 //! | At which level is a stimulus felt? | [`psychometric`] |
@@ -66,6 +68,7 @@ pub mod lmm;
 pub mod magnitude;
 mod matrix;
 pub mod mushra;
+pub mod ordinal_hierarchy;
 pub mod paired;
 pub mod pairs;
 pub mod permutation;
@@ -78,6 +81,7 @@ pub mod questionnaire;
 pub mod random;
 pub mod rank;
 pub mod regression;
+pub mod sequential;
 pub mod two_way_slope;
 pub mod within;
 

@@ -204,6 +204,17 @@ impl Within {
         })
     }
 
+    /// The same with the means of some realizations moved, by their positions. Their precision stays; there is no `effect`.
+    #[must_use]
+    pub fn moved(&self, by: &[f64]) -> Self {
+        Self {
+            means: sums(&self.means, by),
+            effects: sums(&self.effects, by),
+            effect: None,
+            ..self.clone()
+        }
+    }
+
     /// How unlike the design makes the precision of the differences between linked realizations, of those at
     /// some positions: the largest variance over the smallest, if a cell of n ratings has the variance 1 + 1/n. 1 in a
     /// balanced design.
@@ -263,6 +274,11 @@ impl Within {
             (0..k).map(|l| half[(i, l)] * self.unit[(l, j)]).sum()
         })
     }
+}
+
+/// The sums of numbers, one by one.
+fn sums(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a + b).collect()
 }
 
 /// Variance of the difference of two effects.

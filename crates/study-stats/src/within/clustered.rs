@@ -14,7 +14,7 @@ mod differences;
 
 pub use differences::Differences;
 
-use super::{Within, WithinError};
+use super::{Within, WithinError, sums};
 use crate::distribution::{f_upper, t_quantile, t_two_sided};
 use crate::finite;
 use crate::lmm::{CellSummary, ContrastF, ContrastT};
@@ -137,6 +137,15 @@ impl Clustered {
             effects: within.effects,
             unit: within.unit,
         })
+    }
+
+    /// The same with the means of some realizations moved, by their positions. Their precision stays.
+    #[must_use]
+    pub fn moved(&self, by: &[f64]) -> Self {
+        Self {
+            effects: sums(&self.effects, by),
+            ..self.clone()
+        }
     }
 
     /// The t test of one contrast of the realizations: weights in the order of `realizations` that sum to 0 in every set, with

@@ -272,6 +272,39 @@ fn the_series_is_the_root() {
     }
 }
 
+/// Ratings that are all higher by the same for one realization give the same as its mean moved by that.
+#[test]
+fn a_moved_mean_is_that_of_moved_ratings() {
+    let mut random = SplitMix64::new(5);
+    let all: Vec<Row> = (0..12 * 5)
+        .map(|i| (i / 5, i % 5, random.normal()))
+        .collect();
+    let rows: Vec<Row> = (all.into_iter()).filter(|_| random.below(5) > 0).collect();
+    let by = [0.0, 0.7, 0.0, -1.3, 0.2];
+    let higher: Vec<Row> = rows.iter().map(|&(s, j, y)| (s, j, y + by[j])).collect();
+    let contrast = centered(&[1.0, 2.0, 0.0, -1.0, 4.0]);
+    let [found, expected] = [clustered(&rows).moved(&by), clustered(&higher)];
+    let [t, f] = [
+        [found.contrast(&contrast), expected.contrast(&contrast)].map(|t| t.unwrap().t.unwrap()),
+        [found.differences(), expected.differences()].map(|d| d.unwrap().f),
+    ];
+    near(t[0], t[1], "t");
+    near(f[0], f[1], "F");
+    let vaf: Vec<Option<f64>> = (0..5).map(|j| Some(f64::from(j).sqrt())).collect();
+    let [found, expected] = [
+        Within::of(&cells(&rows)).unwrap().moved(&by),
+        Within::of(&cells(&higher)).unwrap(),
+    ];
+    near(
+        found.trend(&vaf).unwrap().t.unwrap(),
+        expected.trend(&vaf).unwrap().t.unwrap(),
+        "trend",
+    );
+    for (found, expected) in found.means.iter().zip(&expected.means) {
+        near(*found, *expected, "mean");
+    }
+}
+
 /// As many contrasts as subjects leave no degrees of freedom, whatever rounding makes of 0.
 #[test]
 fn as_many_contrasts_as_subjects_have_no_test() {
