@@ -2,13 +2,19 @@
 //! with one.
 //!
 //! `cargo bench --bench factors -- --studies 10000 --power 2000` simulates this many studies
-//! without an effect in each design, and so many with one. The seed is fixed: the same numbers
+//! without an effect in each design, and so many with one; `--missing 2000` so many with missing cells, each of which takes the whole
+//! analysis. The seed is fixed: the same numbers
 //! of studies print the same tables for any number of threads. docs/calibration.md has the
 //! results.
 #![allow(clippy::print_stdout)]
 
 use rayon::prelude::*;
+use std::fmt::Write as _;
+use study_analysis::analyze::{Question, Rules, all_findings};
+use study_analysis::study::factor;
 use study_base::rng::Stream;
+use study_plan::protocol::Crossing;
+use study_session::outcome::ratings::Ratings;
 use study_stats::factorial::{Effect, Factorial, Term, aligned_ranks, analysis};
 use study_stats::level::rejects;
 use study_stats::paired::holm;
@@ -242,6 +248,56 @@ fn power(design: &Design, term: &Term, participants: usize, studies: u32) -> [f6
     shares(studies, of_study)
 }
 
+/// Shares of studies in which `study analyze` finds any effect, and in which one has no test, if every fifth cell is missing at random.
+fn null_with_missing(
+    design: &Design,
+    errors: Errors,
+    participants: usize,
+    studies: u32,
+) -> [f64; 2] {
+    let factors = (design.levels.iter().enumerate()).map(|(i, levels)| {
+        let levels: Vec<String> = (0..*levels).map(|level| format!("l{level}")).collect();
+        factor(&format!("f{i}={}", levels.join(","))).expect("a factor")
+    });
+    let cells: usize = design.levels.iter().product();
+    let levels_of = (0..cells).map(|cell| {
+        let digit =
+            |i: usize| cell / design.levels[i + 1..].iter().product::<usize>() % design.levels[i];
+        let levels = (0..design.levels.len()).map(digit).collect();
+        (format!("m{cell}"), levels)
+    });
+    let rules = Rules {
+        crossing: Some(Crossing::full(factors.collect(), levels_of.collect())),
+        ..Rules::default()
+    };
+    let of_study = |number: u32| {
+        let rows = study(design, errors, participants, None, number);
+        let place = [
+            design.name,
+            errors.name(),
+            &participants.to_string(),
+            &number.to_string(),
+        ];
+        let mut lost = Stream::new(2012, &[&["factors", "missing"], &place[..]].concat());
+        let mut csv = "subject,model,rating\n".to_owned();
+        for (p, row) in rows.iter().enumerate() {
+            for (cell, rating) in row.iter().enumerate() {
+                if lost.below(5) > 0 {
+                    let _ = writeln!(csv, "P{p:02},m{cell},{rating}");
+                }
+            }
+        }
+        let ratings = Ratings::read_csv("study.csv", csv.as_bytes(), None).expect("a table");
+        let (findings, _) = all_findings(&ratings, &rules);
+        let effects = || (findings.iter()).filter(|f| matches!(f.question, Question::Effect(_)));
+        [
+            effects().any(|f| f.is_yes()),
+            effects().any(|f| f.reason().is_some()),
+        ]
+    };
+    shares(studies, of_study)
+}
+
 fn shares<const N: usize>(studies: u32, of: impl Fn(u32) -> [bool; N] + Sync) -> [f64; N] {
     let count = (0..studies)
         .into_par_iter()
@@ -293,6 +349,21 @@ fn main() {
                 errors.name(),
                 cells.join(" | ")
             );
+        }
+    }
+    let of_analysis = argument("--missing", 2000);
+    println!(
+        "\n**No effect: every fifth cell missing, as `study analyze` decides / no test** ({of_analysis} studies each)\n"
+    );
+    head("design | errors");
+    for design in DESIGNS.iter().filter(|d| d.second.is_none()) {
+        for errors in [Errors::Normal, Errors::NotSpherical, Errors::Ratings] {
+            let cell = |n: usize| {
+                let [any, none] = null_with_missing(design, errors, n, of_analysis);
+                format!("{any:.4} / {none:.3}")
+            };
+            let cells = PARTICIPANTS.map(cell).join(" | ");
+            println!("| {} | {} | {cells} |", design.name, errors.name());
         }
     }
     println!(

@@ -97,11 +97,11 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     };
     let loaded = load::load(path)?;
     let plan = assume::plan(&loaded.protocol, &args.assume, console)?;
-    if args.closed && plan.part.is_some() {
-        return Err(
-            Failure::usage("--closed: a part of pairs or tracks has no closed form")
-                .hint("leave it out; --studies sets how many are simulated"),
-        );
+    if args.closed && plan.settings.part.is_some() {
+        return Err(Failure::usage(
+            "--closed: pairs, tracks and effects of factors have no closed form",
+        )
+        .hint("leave it out; --studies sets how many are simulated"));
     }
     let page = Page {
         width: console.width,

@@ -106,3 +106,64 @@ fn a_table_has_factors_where_they_are_named() {
     assert_eq!(code, 2);
     assert!(err.contains("such as friction=low,high"), "{err}");
 }
+
+/// Power of the effects of the template: each effect has its row, sizes can be stated, and what is not tested is refused.
+#[test]
+fn the_power_of_effects_is_simulated() {
+    let home = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| study(arguments, home.path());
+    assert_eq!(run(&["new", "x", "--kind", "factorial"]).0, 0);
+    let asked = [
+        "power",
+        "x",
+        "--effect",
+        "friction=1.5,detent:friction=0",
+        "--participants",
+        "4,24",
+        "--studies",
+        "100",
+        "--json",
+    ];
+    let (code, out, err) = run(&asked);
+    assert_eq!(code, 0, "{err}");
+    let document: serde_json::Value = serde_json::from_str(&out).unwrap();
+    let power = |participants: u64, effect: &str| {
+        let cells = document["cells"].as_array().unwrap();
+        let cell = cells.iter().find(|c| c["participants"] == participants);
+        cell.unwrap()["tests"][effect]["power"].as_f64().unwrap()
+    };
+    assert!(
+        power(24, "friction") > 0.95 && power(4, "friction") < 0.9,
+        "{out}"
+    );
+    for nothing in ["detent", "friction:detent"] {
+        assert!(power(24, nothing) < 0.15, "{nothing}: {out}");
+    }
+    let fewest = &document["smallest"][0];
+    let participants = fewest["participants"].as_u64().unwrap();
+    assert!(
+        fewest["target"] == 0.8 && [12, 24].contains(&participants),
+        "{fewest}"
+    );
+    let (code, out, err) = run(&["power", "x", "--studies", "20", "--participants", "6"]);
+    assert_eq!(code, 0, "{err}");
+    for told in [
+        "friction:detent",
+        "effect friction = 0.5",
+        "Effects of friction (low, high) × detent",
+    ] {
+        assert!(out.contains(told), "{told}: {out}");
+    }
+    let (code, _, err) = run(&["power", "x", "--effect", "grain=1"]);
+    assert_eq!(code, 1, "{err}");
+    assert!(
+        err.contains("no effect `grain` is tested; there are friction, detent, friction:detent"),
+        "{err}"
+    );
+    let (code, _, err) = run(&["power", "x", "--slope", "0.4"]);
+    assert_eq!(code, 1, "{err}");
+    assert!(
+        err.contains("`--slope` does not apply to effects of factors"),
+        "{err}"
+    );
+}

@@ -16,6 +16,8 @@
 mod decide;
 mod draw;
 mod expected;
+mod factors;
+mod factors_plan;
 mod part_plan;
 mod parts;
 mod pilot;
@@ -24,6 +26,7 @@ mod simulate;
 mod tally;
 
 pub use expected::{Floor, Reach, Smallest, candidates, closed, design, floor, reach, smallest};
+pub use factors::FactorsWorld;
 pub use parts::{PairsWorld, PartWorld, TrackWorld, TracksWorld, Truth};
 pub use pilot::{Parameters, Pilot, PilotError};
 pub use plan::{LeftOut, Overrides, Pace, Plan, PlanError};
@@ -87,6 +90,17 @@ pub enum Scale {
     },
 }
 
+impl Scale {
+    /// Whether its residual is standard logistic.
+    pub fn is_logit(&self) -> bool {
+        let link = match self {
+            Self::Ordinal { link, .. } => Some(*link),
+            Self::Continuous | Self::Rounded(..) => None,
+        };
+        link == Some(Link::Logit)
+    }
+}
+
 /// What is assumed of the world.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Assumptions {
@@ -116,7 +130,7 @@ pub struct Assumptions {
 pub struct Settings {
     /// The assumptions.
     pub assumptions: Assumptions,
-    /// The part of pairs or tracks that is simulated; `None`: ratings.
+    /// The part of pairs or tracks, or the effects of factors, that are simulated; `None`: ratings, for VAF.
     pub part: Option<PartWorld>,
     /// The pilot whose uncertainty each study draws from, in place of the assumed slope
     /// and standard deviations.
@@ -154,11 +168,20 @@ impl Settings {
         }
     }
 
+    /// The name of a test by its place: that of the test or, of an effect of factors, that of the effect.
+    pub fn test_name(&self, at: usize) -> String {
+        let effect = match &self.part {
+            Some(PartWorld::Factors(world)) => world.names().into_iter().nth(at),
+            _ => None,
+        };
+        effect.unwrap_or_else(|| self.tests.get(at).map_or("", |t| t.as_str()).to_owned())
+    }
+
     /// Studies of a chunk.
     pub fn chunk(&self) -> u64 {
         match self.part {
             Some(PartWorld::Tracks(_)) => CHUNK_OF_TRACKS,
-            None | Some(PartWorld::Pairs(_)) => CHUNK,
+            None | Some(PartWorld::Factors(_) | PartWorld::Pairs(_)) => CHUNK,
         }
     }
 

@@ -95,7 +95,7 @@ impl Report {
     /// of pairs or tracks, what is simulated.
     pub fn ceiling_sentence(&self) -> String {
         let (plan, settings) = (&self.plan, &self.plan.settings);
-        if plan.part.is_some() {
+        if settings.part.is_some() {
             return part::summary(self);
         }
         let q = plan.own.realizations;
@@ -138,7 +138,7 @@ impl Report {
                 plan.defaults.join(", ")
             ));
         }
-        match plan.part {
+        match settings.part {
             Some(_) => found.extend(part::warnings(self)),
             None => self.warnings_of_ratings(&mut found),
         }
@@ -169,14 +169,15 @@ impl Report {
             ));
         }
         for result in &self.results {
-            for test in result.tests.iter().filter(|t| t.undefined_share() > 0.01) {
+            let tests = result.tests.iter().enumerate();
+            for (at, test) in tests.filter(|(_, t)| t.undefined_share() > 0.01) {
                 let among = test.power_if_defined().map_or(String::new(), |p| {
                     format!("; among the others the power is {}", apa::share(p, 3))
                 });
                 found.push(format!(
                     "{}: {} is undefined in {} of the studies{among}",
                     design(&result.cell),
-                    test.test.as_str(),
+                    settings.test_name(at),
                     percent(test.undefined_share()),
                 ));
             }
@@ -334,9 +335,6 @@ fn reached(reach: &Reach) -> String {
 }
 
 /// The test that decides.
-fn deciding(plan: &Plan) -> &'static str {
-    plan.settings
-        .tests
-        .first()
-        .map_or("", |t: &Test| t.as_str())
+fn deciding(plan: &Plan) -> String {
+    plan.settings.test_name(0)
 }

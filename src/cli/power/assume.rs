@@ -8,7 +8,7 @@ use study_analysis::load;
 use study_analysis::power::{Link, Overrides, Pilot, Plan, PlanError, Test, Vaf};
 use study_base::text::PartId;
 use study_plan::protocol::Protocol;
-use study_plan::protocol::power::{PowerPlan, PowerScale, PowerTrack};
+use study_plan::protocol::power::{PowerPlan, PowerScale, PowerTrack, effect as effect_and_size};
 use study_session::outcome::ratings::Ratings;
 use study_session::store::{self, Derived};
 
@@ -50,6 +50,9 @@ pub(super) struct Assume {
     /// The part of pairs or tracks (default: the one with the primary question)
     #[arg(long, value_name = "PART")]
     part: Option<PartId>,
+    /// Effects of factors and their sizes in points: friction=0.5,friction:detent=0.3
+    #[arg(long, value_name = "EFFECT=POINTS", value_delimiter = ',', value_parser = effect)]
+    effect: Vec<(String, f64)>,
     /// Pairs: share of "no difference" between two that are alike
     #[arg(long, value_name = "SHARE", value_parser = share)]
     ties: Option<f64>,
@@ -78,7 +81,8 @@ pub(super) struct Assume {
     #[arg(long, value_name = "P,…", value_delimiter = ',', value_parser = target)]
     targets: Vec<f64>,
     /// verdict, pearson, permutation, crossed, friedman, clmm, equivalence, reference-equivalence; of
-    /// pairs preferred, preference-vaf; of tracks thresholds, told-apart; the first one decides
+    /// pairs preferred, preference-vaf; of tracks thresholds, told-apart; of factors effect; the first
+    /// one decides
     #[arg(long, value_name = "TEST,…", value_delimiter = ',', value_parser = test)]
     tests: Vec<Test>,
     /// Seed of the simulated studies (default: that of the study)
@@ -224,6 +228,10 @@ fn scale(text: &str) -> Result<PowerScale, FlagError> {
     Ok(PowerScale::Ordinal { link, thresholds })
 }
 
+fn effect(text: &str) -> Result<(String, f64), FlagError> {
+    effect_and_size(text).map_err(FlagError)
+}
+
 fn vaf(text: &str) -> Result<Vaf, FlagError> {
     let all = [Vaf::Listed, Vaf::Spread, Vaf::Drawn];
     let found = all.into_iter().find(|v| v.as_str() == text);
@@ -234,7 +242,7 @@ fn test(text: &str) -> Result<Test, FlagError> {
     let found = Test::ALL.into_iter().find(|t| t.as_str() == text);
     found.ok_or(FlagError(
         "write verdict, pearson, permutation, crossed, friedman, clmm, equivalence, \
-         reference-equivalence, preferred, preference-vaf, thresholds or told-apart",
+         reference-equivalence, preferred, preference-vaf, thresholds, told-apart or effect",
     ))
 }
 
@@ -273,6 +281,7 @@ pub(super) fn plan(
         dropout: given.dropout,
         missing: given.missing,
         reference: given.reference,
+        effects: given.effect.clone(),
         ties: given.ties,
         track: PowerTrack {
             threshold: track(Tracked::Threshold),
@@ -303,9 +312,6 @@ pub(super) fn plan(
     };
     Plan::of(protocol, &overrides).map_err(|error| {
         let hint = match error {
-            PlanError::Factors(_) => {
-                "plan the least interesting effect as a paired t test, with a program such as G*Power or Superpower"
-            }
             PlanError::FewRealizations(_) => "add realizations with a VAF to [[models]]",
             PlanError::NoMargin(_) => "equivalence_margin states which difference is negligible",
             PlanError::NoPilot => "add --from RESULTS, or thresholds: logit:-2,-1,…",

@@ -119,7 +119,11 @@ impl<'a> Judge<'a> {
                     crossed.and_then(|c| self.is_equivalent(x, c.estimate, c.se, c.df))
                 }
                 Test::ReferenceEquivalence => self.is_as_the_reference(study),
-                Test::Preferred | Test::PreferenceVaf | Test::Thresholds | Test::ToldApart => None,
+                Test::Preferred
+                | Test::PreferenceVaf
+                | Test::Thresholds
+                | Test::ToldApart
+                | Test::Effect => None,
             };
             tests.push(decided.ok_or(UNDEFINED));
         }
@@ -195,9 +199,11 @@ impl<'a> Judge<'a> {
                     (decided, NOT_FITTED)
                 }
                 Test::ReferenceEquivalence => (self.is_as_the_reference(study), UNDEFINED),
-                Test::Preferred | Test::PreferenceVaf | Test::Thresholds | Test::ToldApart => {
-                    (None, UNDEFINED)
-                }
+                Test::Preferred
+                | Test::PreferenceVaf
+                | Test::Thresholds
+                | Test::ToldApart
+                | Test::Effect => (None, UNDEFINED),
             };
             tests.push(decided.ok_or(why));
         }

@@ -172,7 +172,7 @@ impl Drawn {
 }
 
 /// From repetition to repetition.
-fn residual(world: &Assumptions, draws: &mut Draws) -> f64 {
+pub(super) fn residual(world: &Assumptions, draws: &mut Draws) -> f64 {
     match &world.scale {
         Scale::Ordinal {
             link: Link::Logit, ..
@@ -188,7 +188,7 @@ pub(super) fn logistic(draws: &mut Draws) -> f64 {
     (u / (1.0 - u)).ln()
 }
 
-fn rating(latent: f64, scale: &Scale) -> f64 {
+pub(super) fn rating(latent: f64, scale: &Scale) -> f64 {
     match scale {
         Scale::Continuous => latent,
         // A half is rounded down, as a threshold at it would.

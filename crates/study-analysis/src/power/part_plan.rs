@@ -1,5 +1,6 @@
 //! From a part of pairs or tracks to settings: defaults, then `[power]`, then flags.
 
+use super::factors_plan;
 use super::parts::{PairsWorld, PartWorld, TrackWorld, TracksWorld, Truth};
 use super::plan::{Defaults, LeftOut, numbers, slope, targets, tests};
 use super::{Assumptions, Cell, Overrides, Pace, Plan, PlanError, Scale, Settings, Test, Vaf};
@@ -49,38 +50,68 @@ impl Plan {
     /// If the two contradict each other, or too few realizations have a VAF.
     pub fn of(protocol: &Protocol, flags: &Overrides) -> Result<Self, PlanError> {
         let part = meant(protocol, flags.part.as_ref())?;
-        let (what, pairs, tracks) = match part.map(|part| &part.task) {
-            Some(Task::Pairs(_)) => ("pairs", true, false),
-            Some(Task::Discrimination { .. }) => ("tracks", false, true),
-            _ => ("ratings", false, false),
+        let crossing = match part {
+            None => factors_plan::meant(protocol, flags),
+            Some(_) => None,
         };
-        if let Some(flag) = unused(&flags.plan, pairs, tracks) {
-            return Err(PlanError::Unused(flag, what));
+        let meant = match part.map(|part| &part.task) {
+            Some(Task::Pairs(_)) => Meant::Pairs,
+            Some(Task::Discrimination { .. }) => Meant::Tracks,
+            _ if crossing.is_some() => Meant::Effects,
+            _ => Meant::Ratings,
+        };
+        if let Some(flag) = unused(&flags.plan, meant) {
+            return Err(PlanError::Unused(flag, meant.name()));
         }
-        match part {
-            Some(part) => plan(protocol, flags, part),
-            None => Self::of_ratings(protocol, flags),
+        match (part, crossing) {
+            (Some(part), _) => plan(protocol, flags, part),
+            (None, Some(crossing)) => factors_plan::plan(protocol, flags, crossing),
+            (None, None) => Self::of_ratings(protocol, flags),
         }
     }
 }
 
-/// A flag that was given and is not one of pairs, of tracks, or else of ratings.
-fn unused(over: &PowerPlan, pairs: bool, tracks: bool) -> Option<&'static str> {
-    let ratings = !pairs && !tracks;
+/// What is simulated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Meant {
+    Ratings,
+    Effects,
+    Pairs,
+    Tracks,
+}
+
+impl Meant {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Ratings => "ratings",
+            Self::Effects => "effects of factors",
+            Self::Pairs => "pairs",
+            Self::Tracks => "tracks",
+        }
+    }
+}
+
+/// A flag that was given and is not one of what is meant.
+fn unused(over: &PowerPlan, meant: Meant) -> Option<&'static str> {
+    let is = |all: &[Meant]| all.contains(&meant);
+    let ratings = is(&[Meant::Ratings]);
+    let numbers = is(&[Meant::Ratings, Meant::Effects]);
+    let (pairs, tracks) = (is(&[Meant::Pairs]), is(&[Meant::Tracks]));
     let sd = &over.sd;
     let flags = [
-        ("slope", over.slope.is_some(), !tracks),
-        ("rho", over.rho.is_some(), !tracks),
+        ("slope", over.slope.is_some(), ratings || pairs),
+        ("rho", over.rho.is_some(), ratings || pairs),
         ("smallest", over.smallest.is_some(), ratings),
-        ("mean", over.mean.is_some(), ratings),
-        ("scale", over.scale.is_some(), ratings),
+        ("mean", over.mean.is_some(), numbers),
+        ("scale", over.scale.is_some(), numbers),
         ("vaf", over.vaf.is_some(), ratings),
         ("reference", over.reference.is_some(), ratings),
+        ("effect", !over.effects.is_empty(), is(&[Meant::Effects])),
         ("ties", over.ties.is_some(), pairs),
         ("track", over.track != PowerTrack::default(), tracks),
         ("sd participant", sd.participant.is_some(), !pairs),
         ("sd realization", sd.realization.is_some(), !tracks),
-        ("sd residual", sd.residual.is_some(), ratings),
+        ("sd residual", sd.residual.is_some(), numbers),
         ("sd slope", sd.slope.is_some(), ratings),
     ];
     let found = flags.into_iter().find(|(_, given, used)| *given && !used);
@@ -138,7 +169,7 @@ fn plan(protocol: &Protocol, flags: &Overrides, part: &Part) -> Result<Plan, Pla
         return Err(PlanError::MissingOfTracks);
     }
     let studies = match world {
-        PartWorld::Pairs(_) => STUDIES_OF_PAIRS,
+        PartWorld::Factors(_) | PartWorld::Pairs(_) => STUDIES_OF_PAIRS,
         PartWorld::Tracks(_) if tests.is_empty() => STUDIES_WITHOUT_TEST,
         PartWorld::Tracks(_) => STUDIES_OF_TRACKS,
     };
@@ -184,6 +215,7 @@ fn of_part(
     part: &PartId,
 ) -> Result<Vec<Test>, PlanError> {
     let possible = match world {
+        PartWorld::Factors(_) => vec![Test::Effect],
         PartWorld::Pairs(pairs) => {
             let mut known: Vec<f64> = pairs.vaf.iter().copied().flatten().collect();
             known.sort_by(f64::total_cmp);

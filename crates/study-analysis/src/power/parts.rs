@@ -11,6 +11,7 @@
 
 use super::decide::{Outcome, UNDEFINED};
 use super::draw::standardized;
+use super::factors::{FactorsJudge, FactorsWorld};
 use super::{Cell, STREAM, Settings, Test};
 use crate::analyze::psychophysics::{
     Asked, Choice, PartFinding, Preference, TrialCount, TrialSettings, decided,
@@ -27,9 +28,11 @@ use study_stats::distribution::normal_cdf;
 use study_stats::permutation::Decision;
 use study_stats::psychometric::{Curve, Level};
 
-/// A part that is no rating, and what is assumed of it.
+/// A part that is no rating, or ratings of a factorial study, and what is assumed of it.
 #[derive(Debug, Clone, PartialEq)]
 pub enum PartWorld {
+    /// Ratings, for the effects of factors.
+    Factors(FactorsWorld),
     /// Comparisons of realizations.
     Pairs(PairsWorld),
     /// Tracks of levels, or of two realizations.
@@ -97,6 +100,7 @@ pub(super) struct PartJudge<'a> {
 
 /// What all studies of a cell share.
 enum Prepared<'a> {
+    Factors(FactorsJudge<'a>),
     Pairs {
         world: &'a PairsWorld,
         /// Standardized VAF, 0 where there is none.
@@ -115,6 +119,9 @@ enum Prepared<'a> {
 impl<'a> PartJudge<'a> {
     pub(super) fn new(settings: &'a Settings, part: &'a PartWorld, cell: &Cell) -> Self {
         let task = match part {
+            PartWorld::Factors(world) => {
+                Prepared::Factors(FactorsJudge::new(settings, world, cell))
+            }
             PartWorld::Pairs(world) => {
                 let known: Vec<f64> = world.vaf.iter().copied().flatten().collect();
                 let mut standard = standardized(&known).0.into_iter();
@@ -157,6 +164,7 @@ impl<'a> PartJudge<'a> {
         let number = k.to_string();
         let stream = |of: &str| Stream::new(self.settings.seed, &[STREAM, &self.text, &number, of]);
         match &self.task {
+            Prepared::Factors(judge) => judge.decide(k),
             Prepared::Pairs {
                 world,
                 x,

@@ -2,9 +2,9 @@
 
 use super::{Assumptions, Cell, Pilot, Scale, Settings, Test, Vaf};
 use crate::analyze::ALPHA;
-use study_base::text::{PartId, QuestionId};
+use study_base::text::{PartId, QuestionId, Untrusted};
 use study_plan::protocol::parts::Task;
-use study_plan::protocol::power::{PowerLink, PowerPlan, PowerScale};
+use study_plan::protocol::power::{PowerPlan, PowerScale};
 use study_plan::protocol::{Protocol, Role, check};
 use study_stats::power::covariate::Spread;
 use thiserror::Error;
@@ -27,11 +27,15 @@ pub enum PlanError {
     /// Too few realizations with a VAF.
     #[error("{0} tested realizations have a VAF, but a correlation over them takes three")]
     FewRealizations(usize),
-    /// A factorial study without VAF.
-    #[error(
-        "the power of effects of [[factors]] is not computed, only that of VAF, and {0} tested realizations have one"
-    )]
-    Factors(usize),
+    /// An effect that is not tested.
+    #[error("no effect `{name}` is tested; there are {1}", name = Untrusted(.0))]
+    NoEffect(String, String),
+    /// A pilot of another question.
+    #[error("a pilot has estimates for VAF, not for the effects of factors: state them")]
+    PilotOfFactors,
+    /// A number that the factors fix.
+    #[error("the number of realizations is that of the factors' levels")]
+    FixedByFactors,
     /// No number and no part of pairs or tracks.
     #[error("`{0}` is no rating, and no part of pairs or tracks asks it")]
     NoRatings(QuestionId),
@@ -54,7 +58,7 @@ pub enum PlanError {
     #[error("`{0}` is no test of part `{1}`")]
     NotOfPart(&'static str, PartId),
     /// A test of a part for ratings.
-    #[error("`{0}` is no test of ratings, but of a part of pairs or tracks")]
+    #[error("`{0}` is no test of the relation with VAF, but of pairs, tracks or factors")]
     NotOfRatings(&'static str),
     /// A flag that changes nothing.
     #[error("`--{0}` does not apply to {1}: leave it out")]
@@ -199,7 +203,7 @@ pub struct Pace {
 }
 
 impl Pace {
-    fn of(protocol: &Protocol, tested: usize) -> Self {
+    pub(super) fn of(protocol: &Protocol, tested: usize) -> Self {
         let repetitions = protocol.design.repetitions;
         let presented = protocol.scheduled_models().count();
         let mut longer = protocol.clone();
@@ -238,9 +242,6 @@ impl Plan {
         if asked.is_some_and(|q| !q.kind.scale().is_number()) {
             return Err(PlanError::NoRatings(primary.clone()));
         }
-        if listed.len() < 3 && !protocol.factors.is_empty() {
-            return Err(PlanError::Factors(listed.len()));
-        }
         if listed.len() < 3 {
             return Err(PlanError::FewRealizations(listed.len()));
         }
@@ -253,13 +254,7 @@ impl Plan {
             }
             _ => scale(protocol, asked)?,
         };
-        let logit = matches!(
-            scale,
-            Scale::Ordinal {
-                link: PowerLink::Logit,
-                ..
-            }
-        );
+        let logit = scale.is_logit();
         if logit && pilot.is_some_and(|p| p.estimate.scale.is_none()) {
             return Err(PlanError::PilotLogit);
         }
@@ -282,14 +277,7 @@ impl Plan {
         };
         let slope = slope(&stated, spread.realization)?;
         let slope = defaults.or("slope", slope, SLOPE);
-        let middle = match &scale {
-            Scale::Ordinal { thresholds, .. } => {
-                thresholds.iter().sum::<f64>() / thresholds.len().max(1) as f64
-            }
-            _ => (protocol.primary().and_then(|q| q.kind.scale().ends()))
-                .map_or(0.0, |(low, high)| f64::midpoint(low, high)),
-        };
-        let mean = defaults.or("mean", stated.mean, middle);
+        let mean = defaults.or("mean", stated.mean, middle(protocol, &scale));
         let own = Cell {
             realizations: listed.len(),
             repetitions: repetitions as usize,
@@ -420,7 +408,7 @@ impl Plan {
     pub fn cells(&self) -> Vec<Cell> {
         let mut cells = self.grid.clone();
         cells.push(self.own);
-        if self.part.is_some() {
+        if self.settings.part.is_some() {
             // No closed form says where the smallest design is.
             cells.sort_unstable();
             cells.dedup();
@@ -499,7 +487,19 @@ pub(super) fn targets(stated: &PowerPlan) -> Vec<f64> {
     targets
 }
 
-fn scale(protocol: &Protocol, given: Option<&PowerScale>) -> Result<Scale, PlanError> {
+/// The middle of a scale, on which a mean is.
+pub(super) fn middle(protocol: &Protocol, scale: &Scale) -> f64 {
+    match scale {
+        Scale::Ordinal { thresholds, .. } => {
+            thresholds.iter().sum::<f64>() / thresholds.len().max(1) as f64
+        }
+        _ => (protocol.primary().and_then(|q| q.kind.scale().ends()))
+            .map_or(0.0, |(low, high)| f64::midpoint(low, high)),
+    }
+}
+
+/// How numbers become ratings of the primary question.
+pub(super) fn scale(protocol: &Protocol, given: Option<&PowerScale>) -> Result<Scale, PlanError> {
     let levels = protocol.primary().and_then(|q| q.kind.scale().levels());
     match (given, levels) {
         (None | Some(PowerScale::Rounded), Some((from, to))) => Ok(Scale::Rounded(from, to)),

@@ -32,12 +32,14 @@ words! {
         Thresholds = "thresholds",
         /// Of a part of tracks: the two realizations of every track are told apart.
         ToldApart = "told-apart",
+        /// Of a factorial study: each effect that is tested, with Holm's correction over all.
+        Effect = "effect",
     }
 }
 
 impl PowerTest {
     /// All of them.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Verdict,
         Self::Pearson,
         Self::Permutation,
@@ -50,13 +52,18 @@ impl PowerTest {
         Self::PreferenceVaf,
         Self::Thresholds,
         Self::ToldApart,
+        Self::Effect,
     ];
 
     /// Whether it is one of ratings, and not of another part.
     pub fn is_of_ratings(self) -> bool {
         !matches!(
             self,
-            Self::Preferred | Self::PreferenceVaf | Self::Thresholds | Self::ToldApart
+            Self::Preferred
+                | Self::PreferenceVaf
+                | Self::Thresholds
+                | Self::ToldApart
+                | Self::Effect
         )
     }
 }
@@ -165,6 +172,8 @@ pub struct PowerPlan {
     /// The true mean of the hidden reference minus that of the realization with the highest
     /// VAF.
     pub reference: Option<f64>,
+    /// Effects of a factorial study and their sizes, in rating points.
+    pub effects: Vec<(String, f64)>,
     /// Share of "no difference" between two realizations that are alike.
     pub ties: Option<f64>,
     /// Participants on tracks.
@@ -179,6 +188,28 @@ pub struct PowerPlan {
     pub realizations: Vec<u32>,
     /// Numbers of repetitions to compare.
     pub repetitions: Vec<u32>,
+}
+
+/// Reads an effect and its size: `friction=0.5`, `friction:detent=0.5`.
+///
+/// # Errors
+/// What is expected, in words.
+///
+/// ```
+/// # use study_plan::protocol::power::effect;
+/// assert_eq!(effect("friction:detent = 0.5"), Ok(("friction:detent".to_owned(), 0.5)));
+/// assert!(effect("friction").is_err());
+/// ```
+pub fn effect(text: &str) -> Result<(String, f64), &'static str> {
+    const EXPECTED: &str =
+        "write an effect and its size in rating points: friction=0.5 or friction:detent=0.5";
+    let (name, size) = text.split_once('=').ok_or(EXPECTED)?;
+    let size: f64 = size.trim().parse().map_err(|_| EXPECTED)?;
+    let name = name.trim();
+    match size.is_finite() && !name.is_empty() {
+        true => Ok((name.to_owned(), size)),
+        false => Err(EXPECTED),
+    }
 }
 
 impl PowerPlan {
@@ -220,6 +251,10 @@ impl PowerPlan {
             dropout: self.dropout.or(earlier.dropout),
             missing: self.missing.or(earlier.missing),
             reference: self.reference.or(earlier.reference),
+            effects: match self.effects.is_empty() {
+                true => earlier.effects.clone(),
+                false => self.effects,
+            },
             ties: self.ties.or(earlier.ties),
             track: PowerTrack {
                 threshold: self.track.threshold.or(track.threshold),

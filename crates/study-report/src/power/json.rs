@@ -8,7 +8,7 @@ use study_stats::power::detectable_correlation;
 /// The document. Equal results give equal bytes, whatever the threads and shards.
 pub fn document(report: &Report) -> Value {
     let (plan, settings) = (&report.plan, &report.plan.settings);
-    let of_part = plan.part.is_some();
+    let of_part = plan.settings.part.is_some();
     let own = floor(&settings.vaf(plan.own.realizations), settings.alpha).filter(|_| !of_part);
     let smallest = match of_part {
         true => part::smallest_values(report),
@@ -50,7 +50,7 @@ pub fn own_design(report: &Report) -> Value {
 }
 
 fn assumptions(report: &Report) -> Value {
-    if report.plan.part.is_some() {
+    if report.plan.settings.part.is_some() {
         return part::assumptions(report);
     }
     let (plan, settings) = (&report.plan, &report.plan.settings);
@@ -110,7 +110,7 @@ fn cell(report: &Report, of: &Cell) -> Value {
     let settings = &report.plan.settings;
     let mut tests = serde_json::Map::new();
     let result = report.result(of);
-    for test in result.iter().flat_map(|r| &r.tests) {
+    for (at, test) in result.iter().flat_map(|r| &r.tests).enumerate() {
         let value = json!({
             "rejected": test.rejected,
             "studies": test.studies,
@@ -123,7 +123,7 @@ fn cell(report: &Report, of: &Cell) -> Value {
             "undefined": test.undefined,
             "power_if_defined": test.power_if_defined(),
         });
-        tests.insert(test.test.as_str().to_owned(), value);
+        tests.insert(settings.test_name(at), value);
     }
     let smallest = settings.assumptions.smallest.and_then(|slope| {
         let design = study_analysis::power::design(settings, of);
@@ -180,7 +180,7 @@ fn smallest(report: &Report) -> Vec<Value> {
 
 fn sensitivity(report: &Report) -> Vec<Value> {
     let (plan, settings) = (&report.plan, &report.plan.settings);
-    if plan.part.is_some() {
+    if plan.settings.part.is_some() {
         return Vec::new();
     }
     let design = study_analysis::power::design(settings, &plan.own);

@@ -10,7 +10,7 @@ use study_stats::power::detectable_correlation;
 
 /// What is known at once: the sentence, and what is assumed.
 pub fn head(report: &Report, page: Page) -> String {
-    if report.plan.part.is_some() {
+    if report.plan.settings.part.is_some() {
         return super::part::head(report, page);
     }
     let (width, paint) = (page.width.clamp(60, 100), Paint(page.color));
@@ -40,7 +40,7 @@ pub fn head(report: &Report, page: Page) -> String {
 
 /// The table, the smallest designs, this design, and warnings.
 pub fn results(report: &Report, page: Page) -> String {
-    if report.plan.part.is_some() {
+    if report.plan.settings.part.is_some() {
         return super::part::results(report, page);
     }
     let (width, paint) = (page.width.clamp(60, 100), Paint(page.color));
@@ -182,7 +182,7 @@ fn smallest(report: &Report, width: usize, paint: Paint) -> String {
 /// The smallest effects that the study's own design finds.
 pub(crate) fn sensitivity_sentences(report: &Report) -> Vec<String> {
     let (plan, settings) = (&report.plan, &report.plan.settings);
-    if plan.part.is_some() {
+    if plan.settings.part.is_some() {
         return Vec::new();
     }
     let world = closed_design(settings, &plan.own);

@@ -7,7 +7,7 @@ use study_analysis::power::Vaf;
 /// What was assumed and found, in sentences. Its words are the program's and the protocol's
 /// numbers.
 pub fn paragraph(report: &Report) -> String {
-    if report.plan.part.is_some() {
+    if report.plan.settings.part.is_some() {
         return super::part::paragraph(report);
     }
     let (plan, settings) = (&report.plan, &report.plan.settings);

@@ -1,16 +1,18 @@
-//! The power of a part of pairs or tracks: page, document and paragraph. There is no closed
+//! The power of a part of pairs or tracks, and of the effects of factors: page, document and paragraph. There is no closed
 //! form, so that the designs are those of the grid.
 
-use super::{Report, bar, percent};
+use super::{Report, bar, name_of, percent};
 use crate::apa;
 use crate::text::Page;
 use crate::text::layout::{Paint, wrap};
 use serde_json::{Value, json};
 use study_analysis::power::{Cell, PartWorld, Test, TestResult, Truth};
 use study_base::text::{Untrusted, counted};
+use study_plan::protocol::Factor;
 use study_stats::power::detectable_correlation;
 
-/// The fewest participants of the grid with a target power of the first test.
+/// The fewest participants of the grid with a target power of the first test; of factors, of every effect that is
+/// not 0.
 struct Fewest {
     target: f64,
     repetitions: usize,
@@ -36,6 +38,19 @@ pub(super) fn summary(report: &Report) -> String {
     let own = &report.plan.own;
     match world(report) {
         None => String::new(),
+        Some(PartWorld::Factors(world)) => {
+            let factor = |f: &Factor| format!("{} ({})", f.id, f.levels.join(", "));
+            let mut all: Vec<String> = world.crossing.factors.iter().map(factor).collect();
+            if !world.crossing.groups.is_empty() {
+                all.push(format!("group ({})", world.crossing.groups.join(", ")));
+            }
+            format!(
+                "Effects of {}: {} realizations, {} each.",
+                all.join(" × "),
+                own.realizations,
+                counted(own.repetitions, "rating", "ratings")
+            )
+        }
         Some(PartWorld::Pairs(pairs)) => {
             let mut text = format!(
                 "Part {}: {} of {} realizations, {} each.",
@@ -77,6 +92,22 @@ fn assumed(report: &Report) -> String {
     let number = |x: f64| apa::number(x, 2);
     match world(report) {
         None => String::new(),
+        Some(PartWorld::Factors(world)) => {
+            let names = world.names();
+            let size = |(name, size): (&String, &f64)| format!("{name} {}", number(*size));
+            let sizes: Vec<String> = names.iter().zip(&world.sizes).map(size).collect();
+            let s = &a.spread;
+            format!(
+                "effects {} points; mean {}; SD of participants {}, realizations {}, interaction {}, residual {}; ratings {}",
+                sizes.join(", "),
+                number(a.mean),
+                number(s.subject),
+                number(s.realization),
+                number(s.interaction),
+                number(s.residual),
+                name_of(&a.scale)
+            )
+        }
         Some(PartWorld::Pairs(pairs)) => format!(
             "slope {} per SD of VAF, SD of realizations {}, of participants' tastes {} (logits){}",
             number(a.slope),
@@ -134,10 +165,10 @@ pub(super) fn results(report: &Report, page: Page) -> String {
     let plan = &report.plan;
     let mut out = String::new();
     let share = |x: f64| apa::share(x, 3);
-    for (at, test) in plan.settings.tests.iter().enumerate() {
+    for at in 0..plan.settings.tests.len() {
         let head = format!(
             "\n{:<24} {:>5} {:>8} {:>6} {:>13}\n",
-            test.as_str(),
+            Untrusted(&plan.settings.test_name(at)).to_string(),
             "reps",
             "partic.",
             "power",
@@ -220,7 +251,14 @@ fn smallest(report: &Report) -> Vec<Fewest> {
     repetitions.dedup();
     let of = |target: f64, repetitions: usize| {
         let first = |cell: &Cell| {
-            let test = report.result(cell)?.tests.first()?;
+            let tests = &report.result(cell)?.tests;
+            let test = match world(report) {
+                Some(PartWorld::Factors(world)) => (tests.iter().zip(&world.sizes))
+                    .filter(|(_, size)| **size != 0.0)
+                    .map(|(test, _)| test)
+                    .min_by(|a, b| a.power.total_cmp(&b.power))?,
+                _ => tests.first()?,
+            };
             (test.power >= target).then(|| (cell.participants, test.clone()))
         };
         let own = shown.iter().filter(|c| c.repetitions == repetitions);
@@ -270,6 +308,14 @@ pub(super) fn warnings(report: &Report) -> Vec<String> {
                     .to_owned(),
             );
         }
+        Some(PartWorld::Factors(world)) => {
+            if world.sizes.iter().all(|size| *size == 0.0) {
+                found.push(
+                    "no effect is assumed: this is how often the tests say yes without one"
+                        .to_owned(),
+                );
+            }
+        }
         Some(PartWorld::Tracks(_)) | None => {}
     }
     found
@@ -279,22 +325,25 @@ pub(super) fn warnings(report: &Report) -> Vec<String> {
 pub(super) fn paragraph(report: &Report) -> String {
     let settings = &report.plan.settings;
     let mut text = format!(
-        "Power was determined with study {} for {} in part {}. Assumed were {}; {} dropout, {} missing \
+        "Power was determined with study {} for {}{}. Assumed were {}; {} dropout, {} missing \
          trials.",
         env!("CARGO_PKG_VERSION"),
         counted(report.plan.own.participants, "participant", "participants"),
-        id(report),
+        match &report.plan.part {
+            Some(part) => format!(" in part {part}"),
+            None => String::new(),
+        },
         assumed(report),
         percent(settings.assumptions.dropout),
         percent(settings.assumptions.missing),
     );
     let own = report.result(&report.plan.own);
-    for test in own.iter().flat_map(|r| &r.tests) {
+    for (at, test) in own.iter().flat_map(|r| &r.tests).enumerate() {
         text += &format!(
             " In {} simulated studies (seed {}), `{}` at α = {} was a yes in {} (95 % CI {} to {}).",
             test.studies,
             settings.seed,
-            test.test.as_str(),
+            settings.test_name(at),
             apa::share(settings.alpha, 3),
             apa::share(test.power, 3),
             apa::share(test.interval.0, 3),
@@ -312,7 +361,7 @@ pub(super) fn assumptions(report: &Report) -> Value {
         "dropout": a.dropout,
         "missing": a.missing,
         "alpha": settings.alpha,
-        "tests": settings.tests.iter().map(|t| t.as_str()).collect::<Vec<_>>(),
+        "tests": (0..settings.tests.len()).map(|at| settings.test_name(at)).collect::<Vec<_>>(),
         "targets": plan.targets,
         "studies": settings.studies,
         "within": plan.within,
@@ -321,6 +370,18 @@ pub(super) fn assumptions(report: &Report) -> Value {
     });
     match world(report) {
         None => {}
+        Some(PartWorld::Factors(world)) => {
+            value["mean"] = json!(a.mean);
+            value["sd"] = json!({
+                "participant": a.spread.subject, "realization": a.spread.realization,
+                "interaction": a.spread.interaction, "residual": a.spread.residual,
+            });
+            value["scale"] = json!(name_of(&a.scale));
+            let sizes = world.names().into_iter().zip(&world.sizes);
+            value["effects"] = sizes
+                .map(|(name, size)| json!({ "effect": name, "size": size }))
+                .collect();
+        }
         Some(PartWorld::Pairs(pairs)) => {
             value["slope"] = json!(a.slope);
             value["sd"] =

@@ -2,11 +2,12 @@
 
 use crate::protocol::keys::{Key, Kind, Word, Words, keys};
 use crate::protocol::power::{
-    PowerLink, PowerPlan, PowerScale, PowerSpread, PowerTest, PowerTrack, PowerVaf,
+    PowerLink, PowerPlan, PowerScale, PowerSpread, PowerTest, PowerTrack, PowerVaf, effect,
 };
 use crate::protocol::section::Section;
 use std::ops::Bound;
 use study_base::diagnostic::Fault;
+use study_base::text::Untrusted;
 
 const SHARE: Kind = Kind::Number((Bound::Included(0.0), Bound::Excluded(1.0)), "");
 
@@ -17,7 +18,7 @@ pub(super) const POWER: &[Key] = keys! {
     "targets": Kind::NumberList, "[0.8, 0.9]";
     /// The tests whose power is simulated: `verdict`, `pearson`, `permutation`, `crossed`,
     /// `friedman`, `clmm`, `equivalence`, `reference-equivalence`; of pairs `preferred`,
-    /// `preference-vaf`; of tracks `thresholds`, `told-apart`. The first one decides about
+    /// `preference-vaf`; of tracks `thresholds`, `told-apart`; of a factorial study `effect`. The first one decides about
     /// designs. Without it: the verdicts of the analysis.
     "tests": Kind::Texts(1), r#"["verdict", "crossed"]"#;
     /// Rating points per standard deviation of VAF (with the number of realizations as the
@@ -46,6 +47,10 @@ pub(super) const POWER: &[Key] = keys! {
     /// The true mean of the hidden reference minus that of the realization with the highest
     /// VAF, for `reference-equivalence`. Without it 0: the two are alike.
     "reference": Kind::ANY_NUMBER, "0.2";
+    /// Of a factorial study: effects and their sizes, in rating points. That of a factor is the difference of the means
+    /// at its last and first level, with those between in even steps; that of an interaction is by how much this difference changes from the first to the last level of
+    /// the other factor (of more factors likewise). Effects that are not named have the size 0. Without it: 0.5 for every effect that is tested.
+    "effects": Kind::Texts(1), r#"["friction=0.5", "friction:detent=0.5"]"#;
     /// Pairs: the share of "no difference" between two realizations that are alike. Without
     /// it 0.2, if it is an answer.
     "ties": SHARE, "0.25";
@@ -142,6 +147,7 @@ pub(super) fn read(mut section: Section<'_, '_>) -> Option<PowerPlan> {
         dropout: section.number("dropout"),
         missing: section.number("missing"),
         reference: section.number("reference"),
+        effects: effects(&mut section),
         ties: section.number("ties"),
         within: section.number("within"),
         max_session_min: section.number("max_session_min"),
@@ -173,6 +179,24 @@ pub(super) fn read(mut section: Section<'_, '_>) -> Option<PowerPlan> {
         plan.repetitions = grid.wholes("repetitions");
     }
     Some(plan)
+}
+
+fn effects(section: &mut Section<'_, '_>) -> Vec<(String, f64)> {
+    let mut found: Vec<(String, f64)> = Vec::new();
+    for (value, text) in section.texts("effects") {
+        match effect(&text) {
+            Ok((name, _)) if found.iter().any(|other| other.0 == name) => {
+                let what = format!("the effect `{}` is there twice", Untrusted(&name));
+                value.fault(Fault::error(what));
+            }
+            Ok(one) => found.push(one),
+            Err(expected) => {
+                let what = format!("`{}` is no effect with a size", Untrusted(&text));
+                value.fault(Fault::error(what).hint(expected));
+            }
+        }
+    }
+    found
 }
 
 fn scale(section: &mut Section<'_, '_>) -> Option<PowerScale> {
