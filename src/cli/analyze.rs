@@ -10,7 +10,7 @@ use std::fs::{self, File};
 use std::io::{self, BufReader};
 use std::path::{Path, PathBuf};
 use study_analysis::analyze::psychophysics::PartAnalysis;
-use study_analysis::analyze::{Better, Include, Progress, Rules};
+use study_analysis::analyze::{Better, Include, OrdinalEffort, Progress, Rules};
 use study_analysis::study::{
     Analyzed, Options, Pool, Results, Study, analyze_factorial_table, analyze_table, check_factors,
     factor,
@@ -75,6 +75,9 @@ pub(super) struct Args {
     /// Also include these sessions
     #[arg(long, value_name = "WHO", value_delimiter = ',')]
     include: Vec<Who>,
+    /// Also compute posterior probabilities by an ordinal hierarchical model: a second opinion that decides nothing (seconds to minutes)
+    #[arg(long, conflicts_with_all = ["pool", "task", "possible"])]
+    posterior: bool,
     /// Print the comments by realization
     #[arg(long, conflicts_with = "json")]
     comments: bool,
@@ -235,6 +238,7 @@ fn of_csv(path: &Path, args: &Args, console: &mut Console) -> Result<(), Failure
         include: args.include(),
         scale: args.scale,
         better: args.direction.into(),
+        posterior: args.effort(),
         ..Rules::default()
     };
     check_factors(&args.factors).map_err(Failure::usage)?;
@@ -258,10 +262,15 @@ impl Args {
         }
     }
 
+    fn effort(&self) -> Option<OrdinalEffort> {
+        self.posterior.then_some(OrdinalEffort::ANALYSIS)
+    }
+
     fn options<'a>(&'a self, progress: Option<&'a Progress>) -> Options<'a> {
         Options {
             question: self.question.as_deref(),
             include: self.include(),
+            posterior: self.effort(),
             progress,
         }
     }

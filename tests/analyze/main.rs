@@ -11,12 +11,14 @@ mod golden;
 mod import;
 #[path = "../support/json_schema.rs"]
 mod json_schema;
+mod missing;
 mod mixed;
 mod nist;
 mod odd;
 mod parts;
 mod pool;
 mod possible;
+mod posterior;
 mod properties;
 mod psychophysics;
 mod questionnaires;

@@ -30,11 +30,13 @@ mod identifiers;
 mod influence;
 mod keys;
 mod memory;
+mod missing;
 mod mixed;
 mod order;
 mod ordinal;
 mod overflow;
 mod pairs;
+mod posterior;
 pub mod psychophysics;
 mod question;
 mod range;
@@ -75,6 +77,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use study_plan::protocol::{Crossing, Protocol, Role, Unfinished};
 pub use study_session::outcome::ratings::Felt;
 use study_session::outcome::ratings::{Practice, Ratings};
+pub use study_stats::ordinal_hierarchy::OrdinalEffort;
 
 /// The rules of the analysis, fixed before the data were seen.
 #[derive(Debug, Clone, PartialEq)]
@@ -110,6 +113,8 @@ pub struct Rules {
     pub better: Better,
     /// The factors of the realizations; `None` in a study without.
     pub crossing: Option<Crossing>,
+    /// The draws of the ordinal hierarchical model, which takes seconds and decides nothing; `None`: it is left out.
+    pub posterior: Option<OrdinalEffort>,
 }
 
 impl Default for Rules {
@@ -130,6 +135,7 @@ impl Default for Rules {
             construct: None,
             better: Better::default(),
             crossing: None,
+            posterior: None,
         }
     }
 }
@@ -164,6 +170,7 @@ impl Rules {
             construct: protocol.analysis.construct.clone().filter(|_| primary),
             better: Better::default(),
             crossing: protocol.crossing(),
+            posterior: None,
         }
     }
 }
@@ -338,6 +345,7 @@ pub fn analyze_with_progress(ratings: &Ratings, rules: &Rules, progress: &Progre
         let all = statistics(&Cells::of(&all), rules, progress);
         results.before_exclusion = Some(Box::new(all.before_exclusion()));
     }
+    results.posterior = (rules.posterior).map(|effort| posterior::posterior(&cells, rules, effort));
     let design = Design::of(&cells);
     let (findings, pairs) = findings::findings(&cells, design, rules, &results.evidence);
     results.finding = findings::numbers(&findings);
@@ -466,6 +474,7 @@ fn statistics(cells: &Cells<'_>, rules: &Rules, progress: &Progress) -> Results 
         ends,
         residuals,
         finding: BTreeMap::new(),
+        posterior: None,
         before_exclusion: None,
     }
 }
@@ -512,6 +521,7 @@ fn evidence(
         disagreement: disagreement::disagreement(cells),
         covariates: memory::memory(cells),
         influence: influence::influence(cells, adjusted),
+        missing: missing::missing(cells, adjusted, rules),
         variance: headline::components(cells),
         lmm_variance: None,
     }

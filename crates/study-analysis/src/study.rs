@@ -30,7 +30,8 @@ pub use traces::Trace;
 
 use crate::analyze::psychophysics::{PartAnalysis, StudyData, parts};
 use crate::analyze::{
-    self, Analysis, Deviation, Include, Progress, Rules, Warning, analyze_with_progress,
+    self, Analysis, Deviation, Include, OrdinalEffort, Progress, Rules, Warning,
+    analyze_with_progress,
 };
 use crate::load::{self, Loaded};
 use std::io::BufRead;
@@ -48,6 +49,8 @@ pub struct Options<'a> {
     pub question: Option<&'a str>,
     /// Which sessions are included besides those of participants.
     pub include: Include,
+    /// The draws of the ordinal hierarchical model; `None`: it is left out.
+    pub posterior: Option<OrdinalEffort>,
     /// Where the analysis says how far it is.
     pub progress: Option<&'a Progress>,
 }
@@ -234,6 +237,7 @@ impl Study {
         let protocol = &self.loaded.protocol;
         let rules = Rules {
             deviations: self.deviations()?,
+            posterior: options.posterior,
             ..Rules::of(protocol, question.as_str(), options.include)
         };
         let mut analysis = analyzed(&self.ratings(question), &rules, options.progress);

@@ -4,11 +4,13 @@
 mod conditional;
 mod factors;
 mod pairs;
+mod posterior;
 mod sites;
 mod target;
 mod vaf;
 
 pub(super) use conditional::conditional;
+pub(super) use posterior::share;
 
 use super::{apa, sentences, wording};
 use study_analysis::analyze::results::Number;

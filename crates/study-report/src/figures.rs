@@ -15,6 +15,7 @@ mod strips;
 mod subjects;
 mod traces;
 mod vaf;
+mod weber;
 
 pub use parts::{PREFIX as PARTS_PREFIX, of_part};
 

@@ -4,11 +4,13 @@ mod exclusions;
 pub(crate) mod factors;
 mod pairs;
 pub(crate) mod parts;
+mod posterior;
 mod rendering;
 mod subjects;
 
 pub(crate) use exclusions::{all_with_and_without, excluded, rules, with_and_without};
 pub(crate) use pairs::{against_references, pairs, posthoc, repeats};
+pub(crate) use posterior::posterior;
 pub(crate) use rendering::{is_judged, rendered, rendered_by_participant};
 pub(crate) use subjects::subjects;
 
@@ -123,6 +125,18 @@ pub(crate) fn realizations<'a>(a: &'a Analysis, gap: &str) -> Table {
         table = table.number(name, whole, &|(_, d)| list(d)?.get(bin).copied());
     }
     table.notes(about_realizations(a))
+}
+
+/// Presentations without a rating, by realization.
+pub(crate) fn missing(a: &Analysis) -> Table {
+    let missing = a.results.evidence.missing.as_ref();
+    let rows = missing.into_iter().flat_map(|m| &m.realization);
+    Builder::new("Missing ratings", rows)
+        .text(report("realization"), &|(name, _)| name.as_str().to_owned())
+        .field(report("presentations"), whole, |(_, of)| &of.n)
+        .field(report("without a rating"), whole, |(_, of)| &of.missing)
+        .field(report("share"), percent, |(_, of)| &of.share)
+        .done()
 }
 
 /// What the columns of the realizations are.

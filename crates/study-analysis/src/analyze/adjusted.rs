@@ -177,7 +177,7 @@ impl WithinClustered {
     /// ε and p by which differences are decided: as in complete tables those of Greenhouse and Geisser, where there are not more participants
     /// than realizations those of Huynh and Feldt.
     pub(super) fn deciding(&self, design: Design) -> (&Stat, &Stat) {
-        match design.participants > design.realizations {
+        match design.corrects_by_greenhouse_geisser() {
             true => (&self.eps_gg, &self.p_gg),
             false => (&self.eps_hf, &self.p_hf),
         }

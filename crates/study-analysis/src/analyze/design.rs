@@ -50,6 +50,12 @@ impl Design {
         left_out as f64 <= MAX_LEFT_OUT * self.participants as f64
     }
 
+    /// Whether differences between more than two realizations are corrected as Greenhouse and Geisser do. With no more participants than
+    /// realizations Huynh and Feldt's correction decides.
+    pub(super) fn corrects_by_greenhouse_geisser(self) -> bool {
+        self.participants > self.realizations
+    }
+
     /// The participants on whom a test of differences rests.
     pub fn analyzed(self) -> usize {
         if self.uses_complete() {

@@ -7,6 +7,7 @@
 
 mod differ;
 mod factors;
+mod missing;
 mod others;
 mod pairs;
 mod sites;
@@ -382,6 +383,7 @@ pub(super) fn findings(
     others::disagreement_as_caveat(&mut found);
     found.extend(others::repeats(&facts));
     found.extend(sites::sites(&facts));
+    missing::with_missing_moved(&facts, &mut found);
     let mut pairs = facts.pairs;
     told_apart::withdraw(cells, evidence, &mut found, &mut pairs);
     (found, pairs)

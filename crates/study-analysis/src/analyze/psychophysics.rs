@@ -19,6 +19,7 @@ mod preferences;
 mod questionnaires;
 pub mod results;
 mod scales;
+mod sequential;
 mod standards;
 mod study;
 mod table;

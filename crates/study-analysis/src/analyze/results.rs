@@ -21,6 +21,7 @@ pub use super::headline::{
 };
 pub use super::influence::Influence;
 pub use super::memory::{Covariates, Line, LogMemory, Quadratic};
+pub use super::missing::{AllMoved, MissingOf, MissingRatings, Moved};
 pub use super::mixed::{
     Coefficients, Likelihood, LmmCrossed, LmmModel, LmmVaf, LmmVafCrossed, LmmVafSlope,
     LmmVariance, MarginalMean, Mixed, SlopeVariance,
@@ -31,6 +32,9 @@ pub use super::ordinal::{
     ThresholdName,
 };
 pub use super::pairs::{PairEquivalence, PairTest, PairTests};
+pub use super::posterior::{
+    PosteriorModel, PosteriorPair, PosteriorRealization, PosteriorSlope, Probability,
+};
 pub use super::question::FindingNumbers;
 use super::question::Question;
 use super::record::statistics;
@@ -85,6 +89,8 @@ statistics! {
         covariates: Covariates as "covariate",
         /// how much of it hangs on one realization or one participant
         influence: Influence,
+        /// missing ratings; absent if there are none
+        missing: Option<MissingRatings>,
         /// components of the variance of the ratings
         variance: Variance,
         /// the same by a mixed model, for an effect size
@@ -153,6 +159,8 @@ statistics! {
         ends: BTreeMap<RealizationName, Ends>,
         /// what participants and realizations leave unexplained
         residuals: Residuals,
+        /// a second opinion, if it is asked for
+        posterior: Option<PosteriorModel> as "ordinal_posterior",
         /// the answers to the questions of the report
         finding: BTreeMap<Question, FindingNumbers>,
         /// if a rule excluded anything

@@ -7,7 +7,7 @@ use super::deviation::PreregisteredRule;
 use super::exclude::Applied;
 use super::findings::{Finding, Question, Verdict};
 use super::results::{
-    Ends, Evidence, Number as _, RealizationName, Results, Screened, Screening, Stat,
+    Ends, Evidence, MissingOf, Number as _, RealizationName, Results, Screened, Screening, Stat,
 };
 use super::select::Counts;
 use super::subjects::MAX_LISTED;
@@ -15,6 +15,7 @@ use super::warning::Warning;
 use std::collections::BTreeMap;
 use study_base::apa;
 use study_base::text::counted;
+use study_stats::level::rejects;
 use study_stats::permutation::{DRAWS, MAX_EXACT};
 
 /// A weaker correlation is not driven by anything.
@@ -90,6 +91,7 @@ pub(super) fn warnings(
     excluded(&mut warn, exclusions, changed, results);
     headline(&mut warn, &results.evidence, findings);
     design(&mut warn, cells, results);
+    missing(&mut warn, &results.evidence, rules.alpha);
     raters(&mut warn, cells, &results.screening);
     ends(&mut warn, cells, &results.ends);
     found
@@ -312,6 +314,57 @@ fn design(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, result
     }
     if r.model.contains(&None) {
         warn("no-model", "some ratings have no realization".to_owned());
+    }
+}
+
+/// Ratings that are not missing at random.
+fn missing(warn: &mut impl FnMut(&'static str, String), evidence: &Evidence, alpha: f64) {
+    let Some(missing) = &evidence.missing else {
+        return;
+    };
+    let random =
+        "verdicts take missing ratings as missing at random, given participant and realization";
+    let shown = |p: &Stat| p.number().filter(|p| rejects(*p, alpha));
+    if let Some(p) = shown(&missing.realizations_p) {
+        let share = |(name, of): (&'_ RealizationName, &MissingOf)| {
+            Some((name.as_str().to_owned(), of.share.number()?))
+        };
+        let mut shares: Vec<(String, f64)> = missing.realization.iter().filter_map(share).collect();
+        shares.sort_by(|a, b| a.1.total_cmp(&b.1));
+        if let (Some(least), Some(most)) = (shares.first(), shares.last()) {
+            warn(
+                "missing-by-realization",
+                format!(
+                    "ratings are missing unequally: {} of {} and {} of {} (p {}); {random}",
+                    apa::percent(least.1),
+                    least.0,
+                    apa::percent(most.1),
+                    most.0,
+                    apa::p(p)
+                ),
+            );
+        }
+    }
+    if let Some((slope, p)) = missing.level_slope.number().zip(shown(&missing.level_p)) {
+        let level = if slope < 0.0 { "lower" } else { "higher" };
+        warn(
+            "missing-by-level",
+            format!(
+                "more ratings are missing of realizations that are rated {level} (p {}); {random}",
+                apa::p(p)
+            ),
+        );
+    }
+    if let Some((r, p)) = missing.severity_r.number().zip(shown(&missing.severity_p)) {
+        let level = if r < 0.0 { "lower" } else { "higher" };
+        warn(
+            "missing-by-participant",
+            format!(
+                "participants who rate {level} miss more ratings (r = {}, p {}); realizations are compared within participants",
+                apa::r(r),
+                apa::p(p)
+            ),
+        );
     }
 }
 

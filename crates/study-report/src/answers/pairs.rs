@@ -1,6 +1,6 @@
 //! Pairs of realizations: the two best-rated, and all that differ.
 
-use super::Answer;
+use super::{Answer, posterior};
 use crate::{apa, sentences};
 use study_analysis::analyze::results::Number as _;
 use study_analysis::analyze::{Analysis, MAX_PAIRED, Question, Test};
@@ -20,6 +20,8 @@ pub(super) fn best_two(a: &Analysis) -> Option<Answer> {
             sentences::estimate(&e, apa::two)
         ));
     }
+    answer.main.extend(posterior::best(a));
+    answer.main.extend(posterior::missing(a));
     Some(answer)
 }
 

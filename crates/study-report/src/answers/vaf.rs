@@ -1,6 +1,6 @@
 //! VAF, the forgetting factor and other covariates as predictors of the mean rating.
 
-use super::Answer;
+use super::{Answer, posterior};
 use crate::{apa, sentences};
 use study_analysis::analyze::results::Number as _;
 use study_analysis::analyze::{Analysis, Question};
@@ -35,6 +35,7 @@ pub(super) fn predicts(a: &Analysis) -> Option<Answer> {
     }));
     answer.main.extend(caveats);
     answer.main.extend(crossed(a));
+    answer.main.extend(posterior::vaf(a));
     answer.more.extend(ordinal(a));
     if let Some((spearman, rho)) =
         (correlation.spearman.as_ref()).and_then(|s| Some((s, s.rho.number()?)))

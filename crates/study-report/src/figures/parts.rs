@@ -1,6 +1,7 @@
 //! The figures of a part that is no rating: psychometric functions with their data, tracks
 //! with their reversals, preferences, thresholds and sensitivities of the participants.
 
+use super::weber::webers_law;
 use super::{Canvas, Drawn, MAX_DRAWN, cell, drawn, head, rows_height};
 use crate::apa::digits;
 use crate::chart::{Axis, Color, Dash, Figure, Look, Mark, PALETTE, Panel, Shape, Whisker};
@@ -28,6 +29,7 @@ pub fn of_part(number: usize, part: &PartAnalysis) -> Vec<Drawn> {
     let all = [
         psychometric(&name("psychometric"), part),
         thresholds(&name("thresholds"), part),
+        webers_law(&name("webers-law"), part),
         tracks(&name("tracks"), part),
         sensitivities(&name("sensitivities"), part),
         preferences(&name("preferences"), part),

@@ -60,10 +60,12 @@ pub(super) fn section(a: &Analysis) -> Markup {
         tables::factors::means(a),
         tables::factors::contrasts(a),
         tables::realizations(a, ""),
+        tables::missing(a),
         tables::pairs(a),
     ];
     all.extend(tables::against_references(a));
     all.extend([
+        tables::posterior(a),
         tables::repeats(a),
         tables::variance(a),
         tables::agreement(a),

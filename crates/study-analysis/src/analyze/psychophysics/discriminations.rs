@@ -3,7 +3,7 @@
 use super::again::again;
 use super::detection::Sensitivity;
 use super::over_participants::{Measured, Threshold, Told, mixed, sensitivities};
-use super::part_data::{Found, LevelData, PartData, StudyData, chosen, groups, sessions_of};
+use super::part_data::{Found, LevelData, PartData, StudyData, groups, sessions_of, trial};
 use super::population::{ConditionFit, PopulationCell, population};
 use super::results::PartResults;
 use super::standards::{AboveStandard, webers_law};
@@ -291,28 +291,6 @@ fn levels(
         levels: pooled(&levels),
         spacing,
         core,
-    })
-}
-
-fn trial(part: &Part, asked: Asked, row: &RatingRow, condition: &str) -> Option<TrialCount> {
-    let correct = row.correct?;
-    let given = chosen(part, row)?;
-    let words = asked.answers();
-    let given = words.iter().position(|word| *word == given)?;
-    // Of two answers, the one that was not given is correct if the given one is wrong. Of
-    // three it is not known from the row, and not needed: only right or wrong counts.
-    let target = match (correct, words.len()) {
-        (true, _) => Some(given),
-        (false, 2) => Some(1 - given),
-        (false, _) => None,
-    };
-    Some(TrialCount {
-        participant: row.participant.as_str().to_owned(),
-        condition: condition.to_owned(),
-        level: row.level,
-        target,
-        positive: f64::from(u8::from(correct)),
-        trials: 1.0,
     })
 }
 

@@ -4,6 +4,7 @@ use super::findings::PartFinding;
 use super::over_participants::Measured;
 use super::results::PartResults;
 use super::tracks::TrackData;
+use super::trials::{Asked, TrialCount};
 use crate::analyze::exclude::Applied;
 use crate::analyze::findings::Pair;
 use crate::analyze::record::Field as _;
@@ -154,6 +155,34 @@ pub(super) fn chosen<'a>(part: &Part, row: &'a RatingRow) -> Option<&'a str> {
         Answer::Choice(chosen) => chosen.first().map(String::as_str),
         _ => None,
     }
+}
+
+/// A trial of a track that was right or wrong, in a condition.
+pub(super) fn trial(
+    part: &Part,
+    asked: Asked,
+    row: &RatingRow,
+    condition: &str,
+) -> Option<TrialCount> {
+    let correct = row.correct?;
+    let given = chosen(part, row)?;
+    let words = asked.answers();
+    let given = words.iter().position(|word| *word == given)?;
+    // Of two answers, the one that was not given is correct if the given one is wrong. Of
+    // three it is not known from the row, and not needed: only right or wrong counts.
+    let target = match (correct, words.len()) {
+        (true, _) => Some(given),
+        (false, 2) => Some(1 - given),
+        (false, _) => None,
+    };
+    Some(TrialCount {
+        participant: row.participant.as_str().to_owned(),
+        condition: condition.to_owned(),
+        level: row.level,
+        target,
+        positive: f64::from(u8::from(correct)),
+        trials: 1.0,
+    })
 }
 
 /// The question that a part is about: the first, which is its own, but of ratings the

@@ -15,6 +15,7 @@ pub use super::preferences::{Ability, AbilityDifference, OrderEffect, Preference
 pub use super::scales::{
     GeometricMean, Magnitudes, MeanExponent, Mushra, OwnExponent, PowerLaw, Rated, Screened,
 };
+pub use super::sequential::{SequentialEffect, SequentialResult};
 pub use super::standards::{AboveStandard, WebersLaw};
 pub use super::tracks::{
     EasyTrials, MarginalResult, QuestPlusResult, StaircaseResult, TrackResult,
@@ -71,6 +72,8 @@ statistics! {
         magnitude: Option<Magnitudes>,
         /// ratings beside a reference
         mushra: Option<Mushra>,
+        /// whether answers depend on the trial before
+        sequential: Option<SequentialResult>,
         /// groups and sessions
         again: Again as "",
     }

@@ -10,11 +10,13 @@ use super::findings::{
 use super::of_scales::{of_magnitudes, of_mushra};
 use super::over_participants::Measured;
 use super::part_data::{
-    Found, Intervals, PartAnalysis, PartData, StudyData, asked, chosen, groups, sessions_of,
+    Found, Intervals, PartAnalysis, PartData, StudyData, asked, chosen, groups, sessions_of, trial,
 };
 use super::preferences::{Choice, Preference, Preferences, in_both_orders, preferences};
 use super::questionnaires::of_questionnaires;
 use super::results::PartResults;
+use super::sequential::{self, sequential_effects};
+use super::trials::Asked;
 use crate::analyze::Rules;
 use crate::analyze::exclude;
 use crate::analyze::findings::Pair;
@@ -30,6 +32,7 @@ use study_plan::protocol::{Answer, Role};
 use study_session::outcome::ratings::Origin;
 use study_session::outcome::{RatingRow, Status};
 use study_stats::describe::{is_constant, mean};
+use study_stats::sequential::Answered;
 
 /// The analyses of all parts that are not ratings, of questionnaires, and of what ratings say of
 /// groups and sessions. Which participants count is decided as
@@ -155,9 +158,53 @@ fn of_part_task(
             let protocol = study.protocol;
             let tracks: Vec<&TrackRules> =
                 tracks.iter().filter_map(|id| protocol.track(id)).collect();
-            of_tracks(study, part, &tracks, rows)
+            let mut found = of_tracks(study, part, &tracks, rows)?;
+            if let Some((asked, people)) = in_order(part, &tracks, rows) {
+                let result = sequential_effects(&people);
+                let warned = (result.as_ref()).and_then(|result| {
+                    sequential::warning(asked.answers()[0], result, rules.alpha)
+                });
+                found.warnings.extend(warned);
+                found.results.over.sequential = result;
+            }
+            Some(found)
         }
     }
+}
+
+/// The trials of each participant in their order, by session. `None` unless the tracks are answered by the same two words of
+/// which one is right.
+fn in_order(
+    part: &Part,
+    tracks: &[&TrackRules],
+    rows: &[&RatingRow],
+) -> Option<(Asked, Vec<Vec<Vec<Answered>>>)> {
+    let method = tracks.first()?.method;
+    let name = method.as_str();
+    let asked = Asked::NAMES.iter().find(|n| n.1 == name)?.0;
+    if asked.answers().len() != 2 || tracks.iter().any(|t| t.method != method) {
+        return None;
+    }
+    let mut trials: Vec<(&str, u32, u32, Answered)> = (rows.iter())
+        .filter_map(|row| {
+            let trial = trial(part, asked, row, "")?;
+            let first_is_right = trial.target? == 0;
+            let answered = Answered {
+                first: first_is_right == (trial.positive > 0.5),
+                first_is_right,
+                strength: trial.level.unwrap_or(0.0),
+            };
+            Some((row.participant.as_str(), row.session, row.trial, answered))
+        })
+        .collect();
+    trials.sort_by_key(|(who, session, trial, _)| (*who, *session, *trial));
+    let of_one = trials.chunk_by(|a, b| a.0 == b.0).map(|own| {
+        let sessions = own.chunk_by(|a, b| a.1 == b.1);
+        sessions
+            .map(|one| one.iter().map(|t| t.3).collect())
+            .collect()
+    });
+    Some((asked, of_one.collect()))
 }
 
 /// What a rating part says of groups and sessions, in a study that has them. All else about
