@@ -54,6 +54,9 @@ fn page() -> String {
                 let _ = writeln!(out, "\n## `[[{}]]`\n\n{}", key.name, key.effect);
                 alternatives(&mut out, variants);
                 nested(&mut out, key.name, variants.common);
+                for shape in variants.shapes {
+                    nested(&mut out, key.name, shape.keys);
+                }
             }
             _ => panic!("{}", key.name),
         }

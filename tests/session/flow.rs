@@ -15,6 +15,7 @@ mod random;
 mod resume;
 mod rig;
 mod saving;
+mod search;
 mod studies;
 mod unasked;
 mod whole;

@@ -32,6 +32,7 @@ pub mod rules;
 pub mod scale;
 pub mod schema;
 mod section;
+pub mod spaces;
 
 pub use answer::{Answer, Given, Refusal};
 pub use control::{Control, Pick};
@@ -49,6 +50,7 @@ pub use questionnaires::{Inventory, Questionnaire};
 pub use relative::Relative;
 pub use rules::Exclusion;
 pub use scale::Scale;
+pub use spaces::{Axis, SearchTask, SpaceRules};
 
 use keys::words;
 use serde::Serialize;
@@ -104,6 +106,9 @@ pub struct Protocol {
     /// `[[families]]`
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub families: Vec<FamilyRules>,
+    /// `[[spaces]]`
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub spaces: Vec<SpaceRules>,
     /// `[[tracks]]`
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub tracks: Vec<TrackRules>,

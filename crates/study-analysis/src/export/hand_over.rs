@@ -294,6 +294,7 @@ fn settings(
             Task::Mushra(_) => "mushra",
             Task::Pairs(_) => "pairs",
             Task::Discrimination { .. } => "tracks",
+            Task::Search(_) => "search",
         };
         put(&format!("{kind} {}", part.id), question);
         for session in sessions_of(protocol, part).into_iter().flatten() {
@@ -319,7 +320,7 @@ fn settings(
                     put(&format!("ratios {}", part.id), "true");
                 }
             }
-            Task::Rating(_) | Task::Mushra(_) => {}
+            Task::Rating(_) | Task::Mushra(_) | Task::Search(_) => {}
         }
     }
     for (path, sum) in sums {

@@ -182,6 +182,8 @@ impl Made<'_> {
                     }
                 }
             }
+            // It has no test.
+            Task::Search(_) => {}
         }
     }
 

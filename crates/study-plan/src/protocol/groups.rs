@@ -129,7 +129,7 @@ impl Protocol {
                         let stays = |m: &ModelId| models.contains(m) || hidden(m);
                         task.presentations.models.retain(stays);
                     }
-                    Task::Discrimination { .. } => {}
+                    Task::Discrimination { .. } | Task::Search(_) => {}
                 }
             }
         }

@@ -20,6 +20,7 @@ mod attempt_log;
 mod facts;
 mod interval_log;
 mod rows;
+mod search;
 mod tracks;
 mod trial;
 
@@ -60,7 +61,7 @@ pub struct History {
     goes_on: bool,
     /// Tracks whose other planned trials do not take place.
     ended_tracks: BTreeSet<PartId>,
-    /// Completed trials of tracks, in the order in which the tracks were told.
+    /// Completed trials of tracks and searches, in the order in which these were told.
     told: Vec<(u32, u32)>,
     /// Numbers of closed trials after which a break began.
     pub breaks: BTreeSet<u32>,
@@ -415,7 +416,7 @@ impl History {
                 number,
             });
         }
-        if self.planned(trial).is_some_and(|t| t.track().is_some()) {
+        if self.planned(trial).is_some_and(Trial::follows_from_answers) {
             self.told.push((trial, attempt));
         }
         self.queue.retain(|t| *t != trial);

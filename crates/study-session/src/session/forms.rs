@@ -225,7 +225,10 @@ impl Session {
             .answer(FormId::Trial { trial, attempt }, question)?;
         match &planned.stimuli {
             Stimuli::Track { intervals, .. } => track.is_correct(intervals, answer),
-            Stimuli::One { .. } | Stimuli::Rated { .. } | Stimuli::Pair { .. } => None,
+            Stimuli::One { .. }
+            | Stimuli::Rated { .. }
+            | Stimuli::Pair { .. }
+            | Stimuli::Search { .. } => None,
         }
     }
 
