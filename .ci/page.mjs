@@ -4,7 +4,7 @@
 //   node .ci/page.mjs STUDY MODULES [PICTURES]
 //
 // STUDY is the program, MODULES a folder in which `npm install puppeteer-core axe-core`
-// was run, PICTURES a folder for pictures of every page at five sizes.
+// was run, PICTURES a folder for pictures of every page at six sizes.
 import { spawn } from "node:child_process";
 import { cpSync, existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
@@ -16,7 +16,7 @@ const require = createRequire(join(modules, "x.js"));
 const puppeteer = require("puppeteer-core");
 const axe = require("axe-core");
 const chromium = process.env.CHROMIUM ?? ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"].find(existsSync);
-const SIZES = [[375, 667], [667, 375], [768, 1024], [1280, 800], [800, 1280]];
+const SIZES = [[320, 568], [375, 667], [667, 375], [768, 1024], [1280, 800], [800, 1280]];
 const RULES = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"];
 
 const TEXTS = {
@@ -106,9 +106,9 @@ id = "firm"
 kind = "slider"
 prompt = ${s(p[3])}
 from = 0
-to = 1
-step = 0.05
-labels = { 0 = ${s(l[2])}, 1 = ${s(l[3])} }
+to = 100
+step = 5
+labels = { 0 = ${s(l[2])}, 20 = ${s(l[4])}, 40 = ${s(l[5])}, 60 = ${s(l[6])}, 80 = ${s(l[7])}, 100 = ${s(l[3])} }
 [[questions]]
 id = "pleasant"
 kind = "rating"
@@ -147,6 +147,12 @@ async function check(page, name) {
       const targets = [...document.querySelectorAll("button, .box, textarea, input[type=text], input[type=range]")].filter(shown);
       const bad = targets.filter((n) => { const r = n.getBoundingClientRect(); return r.width < 44 || r.height < 44; });
       const wide = document.documentElement.scrollWidth > innerWidth ? ["the page is wider than the screen"] : [];
+      // No label is printed over another one, and no box of a scale is beyond the edge.
+      const boxes = [...document.querySelectorAll(".box")].filter(shown).filter((n) => { const r = n.getBoundingClientRect(); return r.left < 0 || r.right > innerWidth; });
+      if (boxes.length) wide.push(`${boxes.length} boxes are off the screen`);
+      const ticks = [...document.querySelectorAll(".ticks span, .ends span")].filter(shown).map((n) => n.getBoundingClientRect());
+      const over = (a, b) => a.left < b.right - 1 && b.left < a.right - 1 && a.top < b.bottom - 1 && b.top < a.bottom - 1;
+      if (ticks.some((a, n) => ticks.slice(n + 1).some((b) => a.width && b.width && over(a, b)))) wide.push("labels overprint");
       return bad.map((n) => `${n.outerHTML.slice(0, 80)} ${n.getBoundingClientRect().width}×${n.getBoundingClientRect().height}`).concat(wide);
     });
     for (const what of small) found(`${name} at ${width}×${height}: ${what}`);

@@ -9,6 +9,7 @@ mod analyze;
 mod check;
 mod command_line;
 mod completions;
+mod correct;
 mod device;
 mod device_selection;
 mod doctor;
@@ -69,6 +70,8 @@ enum Command {
     Status(status::Args),
     /// Change the state of a participant
     Participant(participant::Args),
+    /// Correct an answer or a mistyped id after a session; both values are kept
+    Correct(correct::Args),
     /// Change the wording or the analysis of a running study
     Amend(amend::Args),
     /// Verify all journals and the files derived from them
@@ -121,6 +124,7 @@ pub fn run(cli: Cli, console: &mut Console) -> Result<(), Failure> {
         Command::Schedule(args) => schedule::run(&args, console),
         Command::Status(args) => status::run(&args, console),
         Command::Participant(args) => participant::run(&args, console),
+        Command::Correct(args) => correct::run(&args, console),
         Command::Amend(args) => amend::run(&args, console),
         Command::Verify(args) => verify::run(&args, console),
         Command::Trajectory(args) => trajectory::run(&args, console),

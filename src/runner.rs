@@ -10,9 +10,11 @@
 
 pub mod beside;
 pub mod clock;
+mod judging;
 mod loading;
 pub mod rehearsal;
 pub mod saver;
+mod standstill;
 
 use clock::Clock;
 use loading::Slot;
@@ -23,17 +25,15 @@ use std::sync::Arc;
 use std::time::Duration;
 use study_base::limits::Limits;
 use study_base::text::{ModelId, PartId, ParticipantId};
-use study_device::{Device, Report, Stimulus, manual, rendering_of};
+use study_device::{Device, Report, Stimulus, manual};
 use study_haptics::identify::delivery::Delivery;
 use study_haptics::model::Realization;
 use study_haptics::safe_play;
 use study_plan::protocol::fingerprint::Fingerprints;
 use study_plan::protocol::{DeviceKind, FileOrders, ModelEntry, Protocol, Trial};
-use study_session::outcome::{Channel, Event, Fidelity, Playback, Sample, Verdict};
-use study_session::rendering::{Played, judge};
+use study_session::outcome::{Channel, Event, Sample};
 use study_session::session::{Effect, Ending, Input, Screen, Session, Unsaved, View, input::Claim};
 use study_session::store::{ClaimRequest, Copies, Plan, Receipt, SeatKind, StudyFolder};
-use study_wire::servo::ServoSettings;
 
 /// Longest wait for an input while nothing else is expected: clocks on the screen move.
 const IDLE: Duration = Duration::from_millis(100);
@@ -140,6 +140,8 @@ pub struct Runner {
     slot: Option<Slot>,
     /// When the session is told that the table is loaded.
     loaded_due: Option<Duration>,
+    /// When the last turn of the loop began.
+    turned: Duration,
     /// When the device last reported about the current playback.
     last_report: Option<Duration>,
     /// The code on the physical sample of each realization.
@@ -177,6 +179,7 @@ impl Runner {
             load_began: Duration::ZERO,
             slot: None,
             loaded_due: None,
+            turned: Duration::ZERO,
             last_report: None,
             codes,
             limits,
@@ -214,6 +217,7 @@ impl Runner {
     /// One turn: feeds the inputs, polls device and saver, ticks. `Some` when the session
     /// has ended.
     pub fn step(&mut self, inputs: Vec<Input>) -> Option<Ended> {
+        self.notice_standstill();
         for input in inputs {
             self.feed(input);
         }
@@ -455,51 +459,6 @@ impl Runner {
             let what = format!("the device has sent nothing for {} s", SILENCE.as_secs());
             self.feed(Input::PlaybackLost(what));
         }
-    }
-
-    /// Whether the force of the playback that has just ended was that of its table.
-    fn judge(&self, playback: &Playback) -> Fidelity {
-        let (protocol, device) = (&self.setup.protocol, self.setup.device.identity());
-        let Some(model) = self.session.playing_model() else {
-            return Fidelity::default();
-        };
-        if !self.has_telemetry {
-            return Fidelity::unverified("the device reports no samples");
-        }
-        let Some(table) = self.setup.models.get(model) else {
-            return Fidelity::unverified("the realization has no table");
-        };
-        let limits = self.limits.get(model).copied();
-        let limits = limits.unwrap_or(protocol.device.limits);
-        let limits = limits.capped_at(device.limits);
-        let others: Vec<_> = (self.setup.models.iter())
-            .filter(|(id, _)| *id != model)
-            .map(|(id, table)| (id.clone(), rendering_of(table)))
-            .collect();
-        let played = Played {
-            model,
-            what: rendering_of(table),
-            servo: ServoSettings {
-                force_n: limits.force_n.get(),
-                ..device.servo.unwrap_or_default()
-            },
-            servo_told: device.servo.is_some(),
-            samples: &self.samples,
-            numbered: device.numbered,
-            lost: playback.samples_lost,
-            time_ratio: playback.time_ratio,
-            host_late_s: playback.host_late_ms.map(|[_, most]| 1e-3 * most),
-            others: &others,
-        };
-        let mut fidelity = judge(&played, &protocol.device.rendering);
-        let delivery = self.setup.deliveries.get(model);
-        fidelity.delivered_vaf = delivery
-            .filter(|_| matches!(fidelity.verdict, Verdict::Ok | Verdict::Flag))
-            .and_then(|own| own.vaf(fidelity.felt_gain()?, 1e-3 * fidelity.rendered_delay_ms?));
-        if self.only_flags {
-            fidelity.only_flag("the study was begun with an earlier release");
-        }
-        fidelity
     }
 
     fn poll_saver(&mut self) {

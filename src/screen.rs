@@ -7,6 +7,7 @@
 mod access;
 mod board;
 mod code;
+mod connections;
 mod http;
 mod server;
 
@@ -131,7 +132,14 @@ impl Own for Screen {
     }
 
     fn notice(&self) -> Option<String> {
-        let silent = self.board.silent_for()?;
-        (silent > SILENCE).then(|| "the participant's page has no connection".to_owned())
+        let silent = self.board.silent_for().is_some_and(|s| s > SILENCE);
+        if silent {
+            return Some("the participant's page has no connection".to_owned());
+        }
+        // A line that seldom changes: a power of ten.
+        let refused = 10_u64.pow(self.server.refused_now()?.checked_ilog10()?);
+        Some(format!(
+            "others on the network call the participant's page: {refused} requests and more were refused"
+        ))
     }
 }

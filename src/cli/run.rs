@@ -33,7 +33,7 @@ use study_session::store::{
 pub(super) struct Args {
     /// A protocol.toml or the folder that contains it [default: the working folder]
     protocol: Option<PathBuf>,
-    /// Pseudonym of the participant; asked on the first screen if omitted
+    /// Pseudonym of the participant; with --operator, the session begins without the first screen
     #[arg(long, value_name = "ID", add = super::completions::participants())]
     participant: Option<String>,
     /// Initials or code of the operator; asked on the first screen if omitted
@@ -237,7 +237,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             args.rows.as_ref(),
             &Plan::of(&protocol, args.group.clone(), at.wall),
         ))),
-        auto_identify: false,
+        auto_identify: args.participant.is_some() && args.operator.is_some(),
     };
     let study = setup.study.clone();
     let mut runner = Runner::new(setup, config);

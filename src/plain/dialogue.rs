@@ -2,6 +2,7 @@
 
 use super::answers;
 use super::pages::{self, Page};
+use crate::tui::keys;
 use study_base::text::{QuestionId, Untrusted, sentence};
 use study_plan::protocol::phrases::{Phrase, Words};
 use study_plan::protocol::{Answer, Given, Question};
@@ -266,7 +267,7 @@ impl Dialogue {
             "/remark" => remark(Author::Experimenter),
             "/says" => remark(Author::Participant),
             "/correct" if view.correctable.is_empty() => {
-                say("There is no earlier answer to correct.")
+                say(view.words.get(Phrase::NothingToCorrect))
             }
             "/correct" => {
                 let items = view.correctable.clone();
@@ -274,16 +275,14 @@ impl Dialogue {
                     .zip(&items)
                     .map(|(n, item)| listed(n, item, &view.words))
                     .collect();
-                lines.push(
-                    "Type the number of the answer to correct. Enter alone: none.".to_owned(),
-                );
+                lines.push(view.words.get(Phrase::WhichCorrect).to_owned());
                 self.asking = Some(Asking::Which(items));
                 Err(lines)
             }
             "/decline" => match (self.asking.take(), &view.screen) {
                 (Some(Asking::NewAnswer(item)), _) => {
                     self.asking = Some(Asking::Why(item, None));
-                    say("Type the reason, then press Enter.")
+                    say(view.words.get(Phrase::PlainWhy))
                 }
                 (_, Screen::Form { questions, .. }) => {
                     let reason = text()?;
@@ -357,9 +356,9 @@ impl Dialogue {
                 ),
                 _ => say("Type b, c or d."),
             },
-            Screen::Consent { .. } => match key.as_str() {
-                "y" | "yes" => Ok(vec![Input::Consent(true)]),
-                "n" | "no" => {
+            Screen::Consent { .. } => match yes_or_no(&key, &view.words) {
+                Some(true) => Ok(vec![Input::Consent(true)]),
+                Some(false) => {
                     self.asking = Some(Asking::Refuse);
                     let (words, n) = (&view.words, &"n");
                     let again = words.fill(Phrase::PlainType, &[("key", n)]);
@@ -369,7 +368,7 @@ impl Dialogue {
                         words.get(Phrase::RefuseSure)
                     ))
                 }
-                _ => say(view.words.get(Phrase::ChooseYesOrNo)),
+                None => say(view.words.get(Phrase::ChooseYesOrNo)),
             },
             Screen::Stopped { can_rate } => match key.as_str() {
                 "" => Ok(vec![Input::PlayAgain]),
@@ -437,27 +436,27 @@ impl Dialogue {
     fn asked(&mut self, asking: Asking, line: &str, view: &View) -> Reply {
         let typed = line.trim();
         match asking {
-            Asking::Refuse => match typed.to_lowercase().as_str() {
-                "n" | "no" => Ok(vec![Input::Consent(false)]),
-                _ => {
+            Asking::Refuse => match yes_or_no(&typed.to_lowercase(), &view.words) {
+                Some(false) => Ok(vec![Input::Consent(false)]),
+                Some(true) | None => {
                     self.repeat();
                     Ok(Vec::new())
                 }
             },
-            Asking::Sure(inputs) => match typed.to_lowercase().as_str() {
-                "y" | "yes" => Ok(inputs),
-                "n" | "no" => {
+            Asking::Sure(inputs) => match yes_or_no(&typed.to_lowercase(), &view.words) {
+                Some(true) => Ok(inputs),
+                Some(false) => {
                     self.repeat();
                     Ok(Vec::new())
                 }
-                _ => {
+                None => {
                     self.asking = Some(Asking::Sure(inputs));
                     say(view.words.get(Phrase::PlainYesNo))
                 }
             },
             _ if typed.is_empty() => {
                 self.repeat();
-                say("Nothing is corrected.")
+                say(view.words.get(Phrase::NothingCorrected))
             }
             Asking::Which(mut items) => {
                 let number = typed.parse::<usize>().ok().and_then(|n| n.checked_sub(1));
@@ -466,25 +465,26 @@ impl Dialogue {
                         let item = Box::new(items.swap_remove(n));
                         let (mut lines, prompt) = answers::ask(&item.question, &view.words);
                         lines.insert(0, listed(n + 1, &item, &view.words));
-                        lines.push(format!("{prompt} Type /decline to decline it."));
+                        let decline = view.words.get(Phrase::PlainDeclineIt);
+                        lines.push(format!("{prompt} {decline}"));
                         self.asking = Some(Asking::NewAnswer(item));
                         Err(lines)
                     }
                     None => {
                         self.asking = Some(Asking::Which(items));
-                        say("Type a number of the list.")
+                        say(view.words.get(Phrase::WhichOfList))
                     }
                 }
             }
             Asking::NewAnswer(item) => match read(&item.question, line, &view.words) {
                 Ok(Some(answer)) if answer == item.answer => {
                     self.repeat();
-                    say("That is already the answer.")
+                    say(view.words.get(Phrase::AlreadyAnswer))
                 }
                 Ok(answer) => {
                     let empty = || Answer::Text(String::new());
                     self.asking = Some(Asking::Why(item, Some(answer.unwrap_or_else(empty))));
-                    say("Type the reason for the correction, then press Enter.")
+                    say(view.words.get(Phrase::PlainWhy))
                 }
                 Err(what) => {
                     self.asking = Some(Asking::NewAnswer(item));
@@ -506,6 +506,23 @@ impl Dialogue {
                 }])
             }
         }
+    }
+}
+
+/// What a line in small letters says: the letters and words of every study, or those of its
+/// language.
+fn yes_or_no(line: &str, words: &Words) -> Option<bool> {
+    let own = |phrase| words.get(phrase).to_lowercase();
+    let mut letters = line.chars();
+    let letter = letters.next().filter(|_| letters.next().is_none());
+    match line {
+        "y" | "yes" => Some(true),
+        "n" | "no" => Some(false),
+        _ if line == own(Phrase::Yes) => Some(true),
+        _ if line == own(Phrase::Refuse) => Some(false),
+        _ => letter
+            .is_some_and(|c| keys::is_yes(keys::Key::Char(c), words))
+            .then_some(true),
     }
 }
 

@@ -8,6 +8,8 @@ const BYTES: usize = 16;
 const CLIENT: (f64, f64) = (50.0, 200.0);
 /// Requests a second of everybody else together, and how many at once.
 const STRANGERS: (f64, f64) = (20.0, 60.0);
+/// How long after a request too many the page counts as besieged.
+const SIEGE: Duration = Duration::from_secs(10);
 
 /// A secret of 128 bits, as hexadecimal digits.
 ///
@@ -24,20 +26,28 @@ pub fn secret() -> Result<String, super::ScreenError> {
 pub(super) struct Access {
     /// `None` once it is used.
     token: Option<String>,
-    cookie: String,
+    /// Name and value.
+    cookie: (String, String),
     hosts: Vec<String>,
     client: Bucket,
     strangers: Bucket,
+    /// Requests of strangers beyond their limit, and when the last one came.
+    refused: u64,
+    besieged: Option<Duration>,
 }
 
 impl Access {
-    pub(super) fn new(token: String, cookie: String, hosts: Vec<String>) -> Self {
+    /// `cookie` is its name, which no other server of this computer has, and its value:
+    /// browsers keep cookies by host, not by port.
+    pub(super) fn new(token: String, cookie: (String, String), hosts: Vec<String>) -> Self {
         Self {
             token: Some(token),
             cookie,
             hosts,
             client: Bucket::full(CLIENT),
             strangers: Bucket::full(STRANGERS),
+            refused: 0,
+            besieged: None,
         }
     }
 
@@ -56,14 +66,16 @@ impl Access {
     /// Whether a `Cookie` header has the cookie.
     pub(super) fn knows_cookie(&self, header: &str) -> bool {
         let pairs = header.split(';').filter_map(|pair| pair.split_once('='));
-        let mut values = pairs.filter(|(name, _)| name.trim() == "study");
-        values.any(|(_, value)| is_same(value.trim(), &self.cookie))
+        let (own, secret) = &self.cookie;
+        let mut values = pairs.filter(|(name, _)| name.trim() == own);
+        values.any(|(_, value)| is_same(value.trim(), secret))
     }
 
-    /// Exchanges the token for the cookie, once.
-    pub(super) fn redeem(&mut self, given: &str) -> Option<&str> {
+    /// Exchanges the token for the cookie, `name=value`, once.
+    pub(super) fn redeem(&mut self, given: &str) -> Option<String> {
         self.token.take_if(|token| is_same(given, token))?;
-        Some(&self.cookie)
+        let (name, secret) = &self.cookie;
+        Some(format!("{name}={secret}"))
     }
 
     /// Whether the token was used.
@@ -73,10 +85,26 @@ impl Access {
 
     /// Whether one more request is within the limits at this time.
     pub(super) fn permits(&mut self, client: bool, at: Duration) -> bool {
-        match client {
-            true => self.client.take(at),
-            false => self.strangers.take(at),
+        if client {
+            return self.client.take(at);
         }
+        let permitted = self.strangers.take(at);
+        if !permitted {
+            self.refused += 1;
+            self.besieged = Some(at);
+        }
+        permitted
+    }
+
+    /// Requests of strangers beyond their limit.
+    pub(super) fn refused(&self) -> u64 {
+        self.refused
+    }
+
+    /// Whether one came a short time before this one.
+    pub(super) fn is_besieged(&self, at: Duration) -> bool {
+        self.besieged
+            .is_some_and(|last| at.saturating_sub(last) < SIEGE)
     }
 }
 
@@ -124,7 +152,7 @@ mod tests {
     fn access() -> Access {
         Access::new(
             "t0".to_owned(),
-            "c0".to_owned(),
+            ("study-80".to_owned(), "c0".to_owned()),
             vec!["127.0.0.1:80".to_owned()],
         )
     }
@@ -136,7 +164,7 @@ mod tests {
         assert_eq!(access.redeem(""), None);
         assert_eq!(access.redeem("t0 "), None);
         assert!(!access.is_open());
-        assert_eq!(access.redeem("t0"), Some("c0"));
+        assert_eq!(access.redeem("t0").as_deref(), Some("study-80=c0"));
         assert_eq!(access.redeem("t0"), None);
         assert!(access.is_open());
     }
@@ -144,8 +172,16 @@ mod tests {
     #[test]
     fn cookies_hosts_and_origins_are_compared_whole() {
         let access = access();
-        assert!(access.knows_cookie("a=b; study=c0"));
-        for wrong in ["", "study=", "study=c", "study=c00", "xstudy=c0", "study"] {
+        assert!(access.knows_cookie("a=b; study-81=c1; study-80=c0"));
+        for wrong in [
+            "",
+            "study-80=",
+            "study-80=c",
+            "study-80=c00",
+            "xstudy-80=c0",
+            "study-81=c0",
+            "study-80",
+        ] {
             assert!(!access.knows_cookie(wrong), "{wrong}");
         }
         assert!(access.knows_host("127.0.0.1:80"));
@@ -161,7 +197,8 @@ mod tests {
         let mut access = access();
         let at = Duration::from_secs(5);
         let passed = (0..1000).filter(|_| access.permits(false, at)).count();
-        assert_eq!(passed, 60);
+        assert_eq!((passed, access.refused()), (60, 940));
+        assert!(access.is_besieged(at + SIEGE / 2) && !access.is_besieged(at + SIEGE));
         assert!(access.permits(true, at));
         assert!(!access.permits(false, at));
         assert!(access.permits(false, at + Duration::from_millis(51)));

@@ -12,6 +12,9 @@ const MOST_BODY: usize = 64 * 1024;
 pub(super) const ARRIVAL: Duration = Duration::from_secs(5);
 /// How long a response may take to leave.
 const DEPARTURE: Duration = Duration::from_secs(5);
+/// How long a browser keeps the cookie, s: longer than a session, and not for ever, since each
+/// run has one of its own.
+const COOKIE_S: u32 = 12 * 3600;
 /// How much of a refused request is read, so that the other side sees the refusal.
 const DRAINED: usize = 1024 * 1024;
 
@@ -34,6 +37,7 @@ pub(super) struct Request {
 pub(super) struct Response {
     pub(super) status: u16,
     pub(super) content_type: &'static str,
+    /// Name and value of a cookie.
     pub(super) cookie: Option<String>,
     pub(super) body: Vec<u8>,
 }
@@ -78,7 +82,7 @@ impl Response {
         }
         if let Some(cookie) = &self.cookie {
             head.push_str(&format!(
-                "Set-Cookie: study={cookie}; Path=/; HttpOnly; SameSite=Strict\r\n"
+                "Set-Cookie: {cookie}; Path=/; Max-Age={COOKIE_S}; HttpOnly; SameSite=Strict\r\n"
             ));
         }
         head.push_str("\r\n");
@@ -110,11 +114,11 @@ fn reason(status: u16) -> &'static str {
     }
 }
 
-/// Reads one request.
+/// Reads one request. Its head is looked at before its body has arrived.
 ///
 /// # Errors
 /// The status to refuse it with.
-pub(super) fn read(stream: &mut TcpStream) -> Result<Request, u16> {
+pub(super) fn read(stream: &mut TcpStream, look: impl FnOnce(&Request)) -> Result<Request, u16> {
     let until = Instant::now() + ARRIVAL;
     let mut bytes = Vec::new();
     let end = loop {
@@ -131,6 +135,7 @@ pub(super) fn read(stream: &mut TcpStream) -> Result<Request, u16> {
     if length > MOST_BODY {
         return Err(413);
     }
+    look(&request);
     let mut body = bytes.split_off(end + 4);
     while body.len() < length {
         more(stream, &mut body, until)?;

@@ -2,20 +2,17 @@
 
 use super::access::{Access, secret};
 use super::board::Board;
+use super::connections::Connections;
 use super::http::{self, Request, Response};
 use super::{Address, ScreenError};
 use maud::{DOCTYPE, html};
 use std::io;
-use std::net::{IpAddr, Shutdown, SocketAddr, TcpListener, TcpStream};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use study_plan::protocol::phrases::{Phrase, Words, is_right_to_left};
 use study_session::page::reply::{Outcome, Sent};
 
-/// How many connections are served at a time. One more ends the oldest whose request has
-/// not arrived.
-const CONNECTIONS: usize = 24;
 /// How long a request waits for another page.
 const WATCH: Duration = Duration::from_secs(15);
 /// How long a reply waits until it is saved.
@@ -40,15 +37,7 @@ struct Shared {
     /// The document, which holds nothing of the session.
     document: String,
     begun: Instant,
-    open: Mutex<Vec<Connection>>,
-}
-
-/// A connection that is served.
-#[derive(Debug)]
-struct Connection {
-    id: u64,
-    stream: TcpStream,
-    arrived: Arc<AtomicBool>,
+    open: Mutex<Connections>,
 }
 
 impl Server {
@@ -68,7 +57,11 @@ impl Server {
         let link = format!("http://{address}/#{token}");
         let shared = Arc::new(Shared {
             board,
-            access: Mutex::new(Access::new(token, secret()?, hosts(address))),
+            access: Mutex::new(Access::new(
+                token,
+                (format!("study-{}", address.port()), secret()?),
+                hosts(address),
+            )),
             document: document(lang, words),
             begun: Instant::now(),
             open: Mutex::default(),
@@ -93,6 +86,14 @@ impl Server {
     /// Whether a browser has opened the link.
     pub(super) fn is_open(&self) -> bool {
         self.shared.access().is_open()
+    }
+
+    /// How many requests of others than the participant's browser were refused because they
+    /// were too many, while they go on.
+    pub(super) fn refused_now(&self) -> Option<u64> {
+        let access = self.shared.access();
+        let besieged = access.is_besieged(self.shared.begun.elapsed());
+        besieged.then(|| access.refused())
     }
 }
 
@@ -162,19 +163,19 @@ fn accept(listener: &TcpListener, shared: &Arc<Shared>) {
             std::thread::sleep(Duration::from_millis(50));
             continue;
         };
-        let Some(arrived) = shared.admit(id, &stream) else {
+        if shared.connections().admit(id, &stream).is_err() {
             continue;
-        };
+        }
         let of_thread = shared.clone();
         let spawned = std::thread::Builder::new()
             .name("page-request".to_owned())
             .stack_size(STACK)
             .spawn(move || {
-                of_thread.serve(stream, &arrived);
-                of_thread.connections().retain(|c| c.id != id);
+                of_thread.serve(id, stream);
+                of_thread.connections().forget(id);
             });
         if spawned.is_err() {
-            shared.connections().retain(|c| c.id != id);
+            shared.connections().forget(id);
         }
     }
 }
@@ -184,53 +185,55 @@ impl Shared {
         self.access.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn connections(&self) -> MutexGuard<'_, Vec<Connection>> {
+    fn connections(&self) -> MutexGuard<'_, Connections> {
         self.open.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Makes room for a connection; `None` if there is none.
-    fn admit(&self, id: u64, stream: &TcpStream) -> Option<Arc<AtomicBool>> {
-        let mut open = self.connections();
-        if open.len() >= CONNECTIONS {
-            let slow = |c: &Connection| !c.arrived.load(Ordering::SeqCst);
-            let oldest = open.iter().position(slow)?;
-            let _ = open.remove(oldest).stream.shutdown(Shutdown::Both);
-        }
-        let arrived = Arc::new(AtomicBool::new(false));
-        open.push(Connection {
-            id,
-            stream: stream.try_clone().ok()?,
-            arrived: arrived.clone(),
-        });
-        Some(arrived)
-    }
-
-    fn serve(&self, mut stream: TcpStream, arrived: &AtomicBool) {
+    fn serve(&self, id: u64, mut stream: TcpStream) {
         // Only a response that leaves late is the consequence.
         let _ = stream.set_nodelay(true);
-        let request = http::read(&mut stream);
-        arrived.store(true, Ordering::SeqCst);
-        let (response, refused) = match request {
-            Ok(request) => (self.answer(&request), false),
-            Err(status) => (Response::empty(status), true),
-        };
-        // A browser that is gone asks again.
-        if response.send(&mut stream).is_ok() && refused {
-            http::drain(&mut stream);
+        let request = http::read(&mut stream, |head| self.recognize(id, head));
+        match request {
+            // A browser that is gone asks again.
+            Ok(request) => {
+                let _ = self.answer(id, &request).send(&mut stream);
+            }
+            // No browser sends this. It is told so as long as strangers have requests left.
+            Err(status) => {
+                self.connections().is_refused(id);
+                let heard = self.access().permits(false, self.begun.elapsed());
+                if heard && Response::empty(status).send(&mut stream).is_ok() {
+                    http::drain(&mut stream);
+                }
+            }
         }
     }
 
-    fn answer(&self, request: &Request) -> Response {
+    /// Keeps a place for a request of the participant's browser.
+    fn recognize(&self, id: u64, head: &Request) {
+        let access = self.access();
+        let known = access.knows_host(&head.host) && access.knows_cookie(&head.cookie);
+        drop(access);
+        if known {
+            self.connections().is_browsers(id);
+        }
+    }
+
+    fn answer(&self, id: u64, request: &Request) -> Response {
         let known = {
             let mut access = self.access();
-            if !access.knows_host(&request.host) {
-                return Response::empty(421);
-            }
-            let known = access.knows_cookie(&request.cookie);
+            let named = access.knows_host(&request.host);
+            let known = named && access.knows_cookie(&request.cookie);
             // A stop is never held up.
             let stops = known && request.path == "/reply" && request.body.len() < 256;
             if !stops && !access.permits(known, self.begun.elapsed()) {
                 return Response::empty(429);
+            }
+            if !named {
+                return Response::empty(421);
+            }
+            if known && !self.connections().is_browsers(id) && !stops {
+                return Response::empty(503);
             }
             known
         };
@@ -267,7 +270,7 @@ impl Shared {
         let token = serde_json::from_slice::<String>(&request.body).unwrap_or_default();
         match self.access().redeem(&token) {
             Some(cookie) => Response {
-                cookie: Some(cookie.to_owned()),
+                cookie: Some(cookie),
                 ..Response::empty(200)
             },
             None => Response::empty(403),

@@ -5,6 +5,7 @@
 //! Esc: an unnecessary stop of the device is harmless, a missed one is not.
 
 use crossterm::event::{KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
+use study_plan::protocol::phrases::{Phrase, Words};
 use study_session::page::Does;
 
 /// A key press.
@@ -86,6 +87,20 @@ pub fn of(does: Does) -> &'static str {
         Does::Quit => "F10",
         Does::Stop => "Esc",
     }
+}
+
+/// Whether a key says yes: `y`, or the first letter of the word in the language of the study,
+/// unless that is the one of no.
+pub fn is_yes(key: Key, words: &Words) -> bool {
+    let Key::Char(typed) = key else {
+        return false;
+    };
+    let typed = typed.to_ascii_lowercase();
+    let own = words.get(Phrase::Yes).chars().next();
+    let own = own
+        .map(|c| c.to_ascii_lowercase())
+        .filter(|c| c.is_ascii_lowercase());
+    typed == 'y' || (typed != 'n' && own == Some(typed))
 }
 
 /// The key of an event; `None` for releases and for keys without a function.

@@ -2,7 +2,8 @@
 //!
 //! A key that was pressed before a page appeared does not act on it, nor does an Enter so
 //! soon after that nobody can have seen the page. An Enter right after another one does not
-//! advance: the key is held, or was pressed twice. Nor does one that comes with the key
+//! advance: the key is held, or was pressed twice. The wait is not begun again by whoever is
+//! impatient, only by a key that is held. Nor does an Enter advance that comes with the key
 //! before: both were pasted. In a dialog every key counts. Keys that stop, leave or open a
 //! dialog always count.
 
@@ -10,9 +11,13 @@ use super::keys::{self, Key};
 use crossterm::event::{Event, KeyEventKind};
 use std::time::{Duration, Instant};
 
-/// Time without Enter before the next one advances. Most keyboards begin to repeat a held
+/// Time after an Enter before another one advances. Most keyboards begin to repeat a held
 /// key sooner, and repeat it much faster.
 pub const QUIET: Duration = Duration::from_millis(700);
+
+/// An Enter that comes sooner after the last one is that of a held key: few people press a key
+/// five times a second, and keyboards repeat it ten to thirty times.
+pub const REPEATED: Duration = Duration::from_millis(200);
 
 /// Time that a page has to be on the screen before an Enter can be meant for it, unless
 /// another key came before. Simple reactions to what is seen take 180 ms or more (Luce 1986,
@@ -30,13 +35,16 @@ pub struct Pace {
     shown: Instant,
     /// Whether a key was meant for it.
     used: bool,
-    /// The last Enter, if no other key came after it.
+    /// The Enter whose [`QUIET`] time passes or was the last to pass, if no other key came
+    /// after it.
     entered: Option<Instant>,
+    /// The last Enter, if no other key came after it.
+    last: Option<Instant>,
     /// The last other key, meant for the page or not.
     pressed: Option<Instant>,
     /// Whether the page asks for lines of text only, which may be pasted.
     of_lines: bool,
-    /// [`QUIET`] and [`SEEN`] are divided by this.
+    /// [`QUIET`], [`REPEATED`] and [`SEEN`] are divided by this.
     times: u32,
 }
 
@@ -47,6 +55,7 @@ impl Pace {
             shown,
             used: false,
             entered: None,
+            last: None,
             pressed: None,
             of_lines: false,
             times: 1,
@@ -69,10 +78,12 @@ impl Pace {
 
     /// Whether an Enter at a moment would not advance.
     pub fn waits(&self, at: Instant) -> bool {
-        let since = |before: Instant| at.saturating_duration_since(before);
-        let (seen, quiet) = (SEEN / self.times, QUIET / self.times);
-        let unseen = !self.used && since(self.shown) < seen;
-        unseen || self.entered.is_some_and(|before| since(before) < quiet)
+        let unseen = !self.used && self.is_within(SEEN, Some(self.shown), at);
+        unseen || self.is_within(QUIET, self.entered, at) || self.is_within(REPEATED, self.last, at)
+    }
+
+    fn is_within(&self, time: Duration, after: Option<Instant>, at: Instant) -> bool {
+        after.is_some_and(|after| at.saturating_duration_since(after) < time / self.times)
     }
 
     /// Whether an Enter at a moment comes with the key before it.
@@ -92,14 +103,17 @@ impl Pace {
         if key == Some(Key::Enter) {
             let repeated = matches!(event, Event::Key(key) if key.kind == KeyEventKind::Repeat);
             let waits = repeated || self.pasted(at) || self.waits(at);
-            self.entered = Some(at);
+            if !self.is_within(QUIET, self.entered, at) {
+                self.entered = Some(at);
+            }
+            self.last = Some(at);
             return dialog || (on_time && !waits);
         }
         if key.is_some() {
             self.pressed = Some(at);
         }
         if key.is_some() && on_time {
-            self.entered = None;
+            (self.entered, self.last) = (None, None);
             self.used = true;
         }
         on_time
@@ -157,6 +171,17 @@ mod tests {
         let expected = [true, false, false, false, false, false, true];
         assert_eq!(accepted(KeyCode::Enter, &held, false), expected);
         assert_eq!(accepted(KeyCode::Enter, &quick, true), [true; 4]);
+    }
+
+    /// Whoever presses again and again goes on, if not with every press.
+    #[test]
+    fn who_is_impatient_does_not_stay_for_ever() {
+        for (every_ms, most) in [(500, 2), (350, 3), (250, 4)] {
+            let times: Vec<u64> = (0..40).map(|n| 250 + n * every_ms).collect();
+            let counted = accepted(KeyCode::Enter, &times, false);
+            let ignored = counted.split(|counts| *counts).map(<[bool]>::len).max();
+            assert!(ignored < Some(most), "every {every_ms} ms: {counted:?}");
+        }
     }
 
     #[test]

@@ -92,6 +92,32 @@ impl Channel {
         }
     }
 
+    /// Feels the first realization and is closed at its rating.
+    fn leave_a_rating(self, folder: &Path, protocol: &Path) {
+        let path = protocol.to_str().unwrap();
+        match self {
+            Self::Terminal => {
+                let run = ["run", path, "--operator", "lw"];
+                let mut terminal = Terminal::start(&run, folder, 24, 80);
+                play_until(&mut terminal, "P01", "Tab: comment");
+                terminal.signal("KILL");
+            }
+            Self::Plain => {
+                let mut lines = Lines::start(folder, &["run", path, "--plain"], None);
+                lines.play(Some("Type a number from 1 to 7"));
+                lines.child.kill().unwrap();
+                lines.child.wait().unwrap();
+            }
+            Self::Page => {
+                let mut session = Session::opened(folder, protocol, &[]);
+                let asks = |page: &Value| page["questions"][0]["id"] == "realism";
+                session.browser.play("a rating", asks);
+                session.child.kill().unwrap();
+                session.child.wait().unwrap();
+            }
+        }
+    }
+
     /// Begins or resumes a session and plays to the end.
     fn end(self, folder: &Path, protocol: &Path, more: &[&str]) {
         let run = [&["run", protocol.to_str().unwrap()][..], more].concat();
@@ -122,7 +148,7 @@ fn session(begin: Channel, end: Channel) -> (Vec<Value>, Vec<String>) {
             "repetitions = 3",
             "repetitions = 1\nbreaks = { every = 2, at_least_s = 1 }",
         ),
-        ("[trial]\n", "[trial]\nexposure = { replays = 1 }\n"),
+        ("min_s = 2 }", "min_s = 2, replays = 1 }"),
     ];
     changed_protocol("turn-signal", &protocol, &changes);
     begin.begin(folder.path(), &protocol);
@@ -191,6 +217,38 @@ fn begun_on_the_page_and_ended_by_keys() {
 #[test]
 fn begun_on_the_page_and_ended_in_lines() {
     same_journal(Channel::Page, Channel::Plain);
+}
+
+/// A rating page is closed, and the session resumed later than the protocol allows.
+#[test]
+fn what_was_felt_too_long_ago_is_felt_again_on_every_channel() {
+    for channel in EVERY {
+        let folder = tempfile::tempdir().unwrap();
+        let protocol = folder.path().join("paper");
+        let changes = [
+            PATIENT,
+            ("repetitions = 3", "repetitions = 1"),
+            ("[session]\n", "[session]\nlongest_pause_s = 1\n"),
+        ];
+        changed_protocol("turn-signal", &protocol, &changes);
+        channel.leave_a_rating(folder.path(), &protocol);
+        std::thread::sleep(std::time::Duration::from_millis(1500));
+        channel.end(folder.path(), &protocol, &[]);
+        let (code, out, err) = study(&["verify", "results"], folder.path());
+        assert_eq!(code, 0, "{channel:?}: {out}{err}");
+        let events = events(folder.path());
+        let again = events.iter().find(|e| e["event"] == "attempt_failed");
+        let again = again.unwrap_or_else(|| panic!("{channel:?}: rated from memory"));
+        assert_eq!(again["failure"], "interrupted", "{channel:?}");
+        assert!(
+            again["paused_s"].as_f64() > Some(1.0),
+            "{channel:?}: {again}"
+        );
+        let ratings = folder.path().join("results/turn-signal/ratings.csv");
+        let ratings = std::fs::read_to_string(ratings).unwrap();
+        assert!(ratings.contains("felt_again_after_s"), "{ratings}");
+        assert_eq!(crate::screen::rated(&ratings), 5, "{ratings}");
+    }
 }
 
 /// Plays a protocol by keys, in lines and on the page, each in a folder of its own. The

@@ -11,7 +11,7 @@ use study::runner::{Operator, OperatorError, Runner, Setup};
 use study_analysis::load::load;
 use study_device::virtual_device::{Options, VirtualDevice};
 use study_plan::protocol::{DeviceKind, Exposure};
-use study_session::outcome::{Channel, Event};
+use study_session::outcome::{Channel, Event, Failure};
 use study_session::session::{Config, Input, Screen, View};
 use study_session::store::{Frozen, SeatKind, StudyFolder};
 
@@ -54,17 +54,12 @@ impl Operator for Patient {
     }
 }
 
-#[test]
-fn a_fixed_exposure_is_exact_to_twenty_milliseconds() {
+/// The events of a session in which everything is felt for this long.
+fn session(exposure: Exposure, clock: VirtualClock, operator: &mut dyn Operator) -> Vec<Event> {
     let mut loaded = load(Path::new(&repository("protocols/turn-signal"))).unwrap();
-    loaded.protocol.trial.exposure = Exposure {
-        min_s: FELT_S,
-        max_s: Some(FELT_S),
-        replays: 0,
-    };
+    loaded.protocol.trial.exposure = exposure;
     loaded.protocol.intake.clear();
     loaded.protocol.setup.clear();
-    let clock = VirtualClock::starting_at(first_day());
     let frozen = Frozen {
         protocol: &loaded.protocol,
         files: &loaded.files,
@@ -89,7 +84,7 @@ fn a_fixed_exposure_is_exact_to_twenty_milliseconds() {
         device_kind: DeviceKind::Simulated,
         device: Box::new(VirtualDevice::new(options)),
         device_check: None,
-        clock: Box::new(clock.clone()),
+        clock: Box::new(clock),
         threaded: false,
     };
     let config = Config {
@@ -98,20 +93,40 @@ fn a_fixed_exposure_is_exact_to_twenty_milliseconds() {
         auto_identify: true,
         ..Config::default()
     };
+    let ended = Runner::new(setup, config).run(operator);
+    assert_eq!(ended.unsaved, None);
+    let mut sessions = study.sessions().unwrap();
+    let entries = std::mem::take(&mut sessions[0].entries);
+    entries.into_iter().map(|entry| entry.event).collect()
+}
+
+fn exactly(felt_s: f64) -> Exposure {
+    Exposure {
+        min_s: felt_s,
+        max_s: Some(felt_s),
+        replays: 0,
+    }
+}
+
+/// How long each playback lasted, s.
+fn felt_s(events: &[Event]) -> Vec<f64> {
+    let felt = events.iter().filter_map(|event| match event {
+        Event::PlaybackEnded { playback, .. } => Some(playback.exploration_s),
+        _ => None,
+    });
+    felt.collect()
+}
+
+#[test]
+fn a_fixed_exposure_is_exact_to_twenty_milliseconds() {
+    let clock = VirtualClock::starting_at(first_day());
     let mut operator = Patient {
-        clock,
+        clock: clock.clone(),
         left_s: Vec::new(),
         rated: 0,
     };
-    let ended = Runner::new(setup, config).run(&mut operator);
-    assert_eq!(ended.unsaved, None);
-    let sessions = study.sessions().unwrap();
-    let felt: Vec<f64> = (sessions[0].entries.iter())
-        .filter_map(|entry| match &entry.event {
-            Event::PlaybackEnded { playback, .. } => Some(playback.exploration_s),
-            _ => None,
-        })
-        .collect();
+    let events = session(exactly(FELT_S), clock, &mut operator);
+    let felt = felt_s(&events);
     assert_eq!(felt.len(), 4);
     for felt_s in felt {
         assert!((felt_s - FELT_S).abs() <= 0.020, "{felt_s}");
@@ -120,10 +135,61 @@ fn a_fixed_exposure_is_exact_to_twenty_milliseconds() {
     let first = operator.left_s[0];
     assert!((FELT_S - 0.1..=FELT_S).contains(&first), "{first}");
     assert!(operator.left_s.iter().any(|left| *left < 0.021));
-    let journal = sessions[0].entries.iter().map(|entry| &entry.event);
-    let mut answers = journal.filter_map(|event| match event {
+    let mut answers = events.iter().filter_map(|event| match event {
         Event::Answered { channel, .. } => Some(*channel),
         _ => None,
     });
     assert!(answers.all(|channel| channel == Some(Channel::Terminal)));
+}
+
+/// Somebody closes the lid of the computer during the first playback.
+struct Sleeper {
+    patient: Patient,
+    slept: bool,
+}
+
+impl Operator for Sleeper {
+    fn next(&mut self, view: &View, timeout: Duration) -> Result<Vec<Input>, OperatorError> {
+        if matches!(view.screen, Screen::Playing { .. }) && !self.slept {
+            self.slept = true;
+            self.patient.clock.advance(Duration::from_secs(20));
+            // What is pressed on waking up must not end the playback as if nothing had been.
+            return Ok(vec![Input::Advance]);
+        }
+        self.patient.next(view, timeout)
+    }
+}
+
+#[test]
+fn a_playback_in_which_the_computer_stood_still_does_not_count() {
+    let clock = VirtualClock::starting_at(first_day());
+    let mut operator = Sleeper {
+        patient: Patient {
+            clock: clock.clone(),
+            left_s: Vec::new(),
+            rated: 0,
+        },
+        slept: false,
+    };
+    let events = session(exactly(0.3), clock, &mut operator);
+    let longest = felt_s(&events).into_iter().fold(0.0, f64::max);
+    assert!(longest <= 0.32, "{longest} s");
+    let failed: Vec<&Event> = (events.iter())
+        .filter(|event| matches!(event, Event::AttemptFailed { .. }))
+        .collect();
+    let [
+        Event::AttemptFailed {
+            trial: 1,
+            attempt: 1,
+            failure: Failure::Interrupted,
+            detail,
+            queue,
+            ..
+        },
+    ] = &failed[..]
+    else {
+        panic!("{failed:?}");
+    };
+    assert!(detail.contains("stood still for 20.0 s"), "{detail}");
+    assert_eq!(queue[0], 1, "it comes next");
 }

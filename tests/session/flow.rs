@@ -12,6 +12,7 @@ mod part_rig;
 mod parts;
 mod pauses;
 mod random;
+mod refused;
 mod resume;
 mod rig;
 mod saving;

@@ -254,3 +254,115 @@ fn no_language_makes_a_page_cut_more_than_english() {
         }
     }
 }
+
+/// The banner and the progress stand side by side, also where words are long.
+#[test]
+fn the_first_line_has_room_for_the_banner_and_the_progress() {
+    for lang in languages() {
+        let words = Arc::new(Words::new(Some(lang), &BTreeMap::new()));
+        for (name, mut view) in questions_of_a_pilot(&words) {
+            if let Screen::Form { page, pages, .. } = &mut view.screen {
+                (*page, *pages) = (12, 24);
+            }
+            view.progress = Some(study_session::session::view::Progress {
+                practice: false,
+                current: 107,
+                total: Some(240),
+                block: None,
+            });
+            for columns in [80, 120] {
+                let mut surface = Surface::new(ColorDepth::None);
+                let shown = picture(&crate::views::drawn(&mut surface, &view, columns, 24));
+                let first = shown.lines().next().unwrap();
+                let content = study_session::page::page(&view);
+                let banner = content.banner.as_ref().unwrap();
+                let short = banner.split(" — ").next().unwrap();
+                let sheet = &content.sheet.as_ref().unwrap().words;
+                let progress = &content.progress.as_ref().unwrap().words;
+                let after = format!("{sheet} · {progress}");
+                let compact = |text: &str| text.replace(' ', "");
+                for part in [short, &after] {
+                    assert!(
+                        compact(first).contains(&compact(part)),
+                        "{lang} {name} {columns}: {first}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// What is said of answers is in the language of the study, also when they are corrected; a
+/// break says nothing of a device, which may be none.
+#[test]
+fn corrections_and_breaks_are_in_every_language() {
+    let english = Words::default();
+    for lang in languages().filter(|lang| *lang != "en") {
+        let words = Arc::new(Words::new(Some(lang), &BTreeMap::new()));
+        let mut view = view(form(vec![realism()]));
+        view.words = words.clone();
+        let keys = [
+            KeyCode::F(3),
+            KeyCode::Enter,
+            KeyCode::Char('2'),
+            KeyCode::Enter,
+        ];
+        for n in 1..=keys.len() {
+            let shown = page(&view, &keys[..n]);
+            for phrase in [
+                Phrase::CorrectTitle,
+                Phrase::NewAnswer,
+                Phrase::BothKept,
+                Phrase::NothingToCorrect,
+            ] {
+                assert!(!shown.contains(english.get(phrase)), "{lang} {n}\n{shown}");
+            }
+            if n == keys.len() {
+                // Nothing is cut.
+                let slip = format!("{}.", words.get(Phrase::Slip));
+                let compact = |text: &str| text.replace(' ', "");
+                assert!(compact(&shown).contains(&compact(&slip)), "{lang}\n{shown}");
+            }
+            if n == 1 {
+                assert!(
+                    shown.contains(words.get(Phrase::CorrectTitle)),
+                    "{lang}\n{shown}"
+                );
+            }
+        }
+        let text = words.get(Phrase::BreakText);
+        for device in ["Gerät", "l'appareil", "dispositivo", "装置", "الجهاز"] {
+            assert!(!text.contains(device), "{lang}: {text}");
+        }
+    }
+}
+
+/// Yes may be said by the letter of the language as well.
+#[test]
+fn yes_is_the_letter_that_a_language_has_for_it() {
+    use study::tui::keys::{Key, is_yes};
+    for (lang, letters) in [
+        ("de", "yjYJ"),
+        ("fr", "yo"),
+        ("es", "ys"),
+        ("ar", "y"),
+        ("en", "yY"),
+    ] {
+        let words = Words::new(Some(lang), &BTreeMap::new());
+        let yes: String = ('A'..='z')
+            .filter(|c| is_yes(Key::Char(*c), &words))
+            .collect();
+        let mut yes: Vec<char> = yes.chars().filter(|c| c.is_ascii_lowercase()).collect();
+        let mut expected: Vec<char> = letters.to_lowercase().chars().collect();
+        yes.sort_unstable();
+        expected.sort_unstable();
+        expected.dedup();
+        assert_eq!(yes, expected, "{lang}");
+        // A study may have words of its own.
+        let own = BTreeMap::from([("yes".to_owned(), "nah".to_owned())]);
+        assert!(
+            !is_yes(Key::Char('n'), &Words::new(Some(lang), &own)),
+            "{lang}"
+        );
+    }
+}

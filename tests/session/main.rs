@@ -39,5 +39,6 @@ mod tui_terminal;
 mod turning;
 mod unsaved;
 mod views;
+mod who;
 #[path = "../support/world.rs"]
 mod world;

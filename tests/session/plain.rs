@@ -418,7 +418,7 @@ fn lines_can_remark_correct_stop_pause_quit_and_resume() {
     let results = folder.path().join("results/turn-signal");
     let ratings = fs::read_to_string(results.join("ratings.csv")).unwrap();
     assert_eq!(ratings.lines().count(), 6, "{ratings}");
-    assert_eq!(ratings.matches(",ok,").count(), 5, "{ratings}");
+    assert_eq!(crate::screen::rated(&ratings), 5, "{ratings}");
     let attempts = fs::read_to_string(results.join("attempts.csv")).unwrap();
     for by in [
         ",experimenter,motor hums,",

@@ -225,8 +225,8 @@ fn study_json_notices_its_own_damage_and_needs_no_checksum() {
         matches!(refused, Err(StoreError::Damaged { .. })),
         "{refused:?}"
     );
-    // As an earlier release wrote it.
-    let (before, _) = text.split_once(",\n  \"sha256\"").unwrap();
+    // As an earlier release wrote it, which marked wrong playbacks only.
+    let (before, _) = text.split_once(",\n  \"judges_rendering\"").unwrap();
     replace(&disk, &path, format!("{before}\n}}\n").as_bytes());
     assert_eq!(problems(&disk), Vec::<String>::new());
     let kept = Kept::new();

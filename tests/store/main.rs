@@ -2,6 +2,7 @@
 
 mod chains;
 mod commands;
+mod corrected;
 mod crash;
 #[path = "../support/designs.rs"]
 mod designs;
@@ -18,6 +19,7 @@ mod processes;
 mod saver;
 #[path = "../support/mod.rs"]
 mod support;
+mod verified;
 #[path = "../support/world.rs"]
 mod world;
 mod wrong_kinds;

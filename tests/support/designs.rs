@@ -38,6 +38,7 @@ pub(crate) fn design(models: usize, repetitions: u32, order: Order) -> Protocol 
         session: SessionRules {
             entry: Entry::Participant,
             resume_within_h: 4.0,
+            longest_pause_s: LONGEST_PAUSE_S,
         },
         device: DeviceRules {
             kind: DeviceKind::Simulated,

@@ -221,6 +221,7 @@ pub fn failed(trial: u32, attempt: u32, queue: &[u32]) -> Event {
         detail: "knocked".to_owned(),
         queue: queue.to_vec(),
         constraint_broken: false,
+        paused_s: None,
     }
 }
 
@@ -252,6 +253,7 @@ pub fn session(id: &str, number: u32, seat: Seat) -> Vec<Event> {
         trial,
         attempt,
         response_s: 2.5,
+        paused_s: None,
     };
     play(&mut events, 1, 1, 1, "B");
     events.push(failed(1, 1, &[2, 3, 1]));

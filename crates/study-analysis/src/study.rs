@@ -164,6 +164,9 @@ impl Study {
         let only_parts = !parts.is_empty() && options.question.is_none() && !is_rated(protocol);
         warn_of_changes(protocol, &changed, only_parts, &mut parts);
         if only_parts {
+            if let Some(first) = parts.first_mut() {
+                first.warnings.extend(self.clock_jumps());
+            }
             let source = Source {
                 preregistration: preregistered::of_parts(self, &parts)?,
                 ..self.source()
@@ -188,11 +191,26 @@ impl Study {
             text: format!("{text} (see `study verify`)"),
         });
         // Before all other warnings.
+        let warnings = warnings.chain(self.clock_jumps());
         analysis.warnings.splice(0..0, warnings);
         Ok(Analyzed {
             source,
             results: Results::Ratings(Box::new(analysis)),
             damage,
+        })
+    }
+
+    /// That dates are wrong, if the clock of a computer jumped during a session.
+    fn clock_jumps(&self) -> Option<Warning> {
+        let jumped = self.sessions.iter().filter(|s| !s.clock_jumps().is_empty());
+        let names: Vec<&str> = jumped.map(|s| s.participant.as_str()).collect();
+        (!names.is_empty()).then(|| Warning {
+            code: "clock-jumped",
+            text: format!(
+                "the clock of the computer jumped during sessions of {}: their dates and gaps are wrong, \
+                 durations are not (see `study verify`)",
+                names.join(", ")
+            ),
         })
     }
 

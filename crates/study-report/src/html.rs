@@ -67,6 +67,8 @@ pub struct Details {
     pub parts: Vec<PartReport>,
     /// Damage of the results. Of a study with ratings, it is among their warnings.
     pub damage: Vec<String>,
+    /// What was corrected, one sentence each, with both values and the reason. Untrusted.
+    pub corrections: Vec<String>,
     /// Versions of the protocol: number, time, reason.
     pub versions: Vec<(u32, String, String)>,
 }

@@ -19,10 +19,12 @@
 //!   [`Effect::Limp`].
 //! * After a stop, a pause or a fault nothing is loaded or started until somebody
 //!   requests it again.
+//! * Nothing is answered after a longer pause than the protocol allows: it is felt again.
 //!
 //! Effects must be carried out in order. [`Effect::Limp`] also cancels a load: no
 //! [`Input::DeviceLoaded`] for it may follow.
 
+mod away;
 mod failures;
 mod flow;
 mod forms;
@@ -112,6 +114,8 @@ pub struct Session {
     clock: Moment,
     /// Since when an overlay hides the phase.
     overlaid_since: Option<Moment>,
+    /// Pauses since the end of the last playback, s; infinite if nobody knows how long.
+    away_s: f64,
     out: Vec<Effect>,
 }
 
@@ -159,6 +163,7 @@ impl Session {
             opened: None,
             clock: at,
             overlaid_since: None,
+            away_s: 0.0,
             out: Vec::new(),
         };
         if config.auto_identify {
@@ -222,6 +227,7 @@ impl Session {
             Input::DeviceLost(what) => self.device_gone(&what, at),
             Input::PlaybackLost(what) => self.playback_lost(&what, at),
             Input::DeviceReady => self.device_ready(),
+            Input::StoodStill { seconds } => self.stood_still(seconds, at),
             Input::Identify {
                 participant,
                 operator,
@@ -286,5 +292,6 @@ fn is_deliberate(input: &Input) -> bool {
             | Input::DeviceJudged(_)
             | Input::DeviceStopped(_)
             | Input::DeviceReady
+            | Input::StoodStill { .. }
     )
 }

@@ -21,6 +21,7 @@ pub mod replay;
 mod reveals;
 
 mod atomic;
+mod correction;
 mod derive;
 mod doctor;
 mod error;
@@ -42,6 +43,7 @@ mod tombstone;
 mod trial;
 mod verify;
 
+pub use correction::{AnswerCorrection, CorrectedAnswer};
 pub use derive::{Derived, participants};
 pub use error::{StoreError, plain, when};
 pub use head::{Head, HeadFile};

@@ -3,7 +3,7 @@
 
 use super::field::Field;
 use crate::tui::editor::{Editor, Handled};
-use crate::tui::keys::Key;
+use crate::tui::keys::{self, Key};
 use study_plan::protocol::Answer;
 use study_plan::protocol::phrases::{Phrase, Words};
 use study_session::outcome::{Author, Choice};
@@ -205,7 +205,8 @@ impl Confirm {
                 (Key::Enter, Screen::Consent { .. }) => {
                     DialogResult::Done(vec![Input::Consent(false)])
                 }
-                (Key::Enter | Key::Char('y' | 'Y'), _) => DialogResult::Closed,
+                (Key::Enter, _) => DialogResult::Closed,
+                (key, _) if keys::is_yes(key, words) => DialogResult::Closed,
                 _ => missing(&format!(
                     "Enter: {}  ·  y: {}",
                     words.get(Phrase::RefuseConfirm),
@@ -214,7 +215,7 @@ impl Confirm {
             };
         }
         match key {
-            Key::Char('y' | 'Y') => DialogResult::Done(match (self, screen) {
+            key if keys::is_yes(key, words) => DialogResult::Done(match (self, screen) {
                 (Self::Quit, _) => vec![Input::Quit],
                 (Self::DropOut, Screen::ResumeChoice { .. }) => {
                     vec![Input::Resume(Choice::DropOut)]
@@ -270,13 +271,13 @@ impl Correct {
             Step::Answer(field) => match key {
                 Key::Enter => match field.answer(&item.question) {
                     Ok(Some(answer)) if answer == item.answer => {
-                        missing("That is already the answer.")
+                        missing(words.get(Phrase::AlreadyAnswer))
                     }
                     Ok(Some(answer)) => self.ask_why(Some(answer)),
                     Ok(None) if matches!(field, Field::Text(_)) => {
                         self.ask_why(Some(Answer::Text(String::new())))
                     }
-                    Ok(None) => missing("Enter the new answer first, or press Esc."),
+                    Ok(None) => missing(words.get(Phrase::NewAnswerFirst)),
                     Err(why) => missing(&why.words(words)),
                 },
                 Key::Decline => self.ask_why(None),
@@ -288,7 +289,7 @@ impl Correct {
             },
             Step::Reason { answer, by, reason } => match key {
                 Key::Enter if reason.is_blank() && answer.is_none() => {
-                    missing("Type a reason first, or press Esc.")
+                    missing(words.get(Phrase::ReasonFirst))
                 }
                 Key::Enter => {
                     let reason = match reason.is_blank() {

@@ -61,7 +61,7 @@ impl UiState {
         match keys::read(event) {
             Some(Key::Char(' ')) if view.armed => vec![Input::Stop],
             Some(key @ (Key::Esc | Key::Quit)) => self.press(key, view),
-            Some(key @ Key::Char('y' | 'n')) if leaving => self.press(key, view),
+            Some(key @ Key::Char(_)) if leaving => self.press(key, view),
             _ => Vec::new(),
         }
     }
@@ -89,7 +89,7 @@ impl UiState {
             }
             Key::Remark => Ok(Dialog::remark()),
             Key::Correct if view.correctable.is_empty() => {
-                Err("There is no earlier answer to correct.".to_owned())
+                Err(view.words.get(Phrase::NothingToCorrect).to_owned())
             }
             Key::Correct => Ok(Dialog::correct(view)),
             Key::MarkBad => match &view.can_mark_bad {
@@ -151,7 +151,7 @@ impl UiState {
                 _ => Vec::new(),
             },
             Screen::Consent { .. } => match key {
-                Key::Char('y' | 'Y') => vec![Input::Consent(true)],
+                key if keys::is_yes(key, &view.words) => vec![Input::Consent(true)],
                 Key::Char('n' | 'N') => self.confirm(Confirm::Refuse),
                 Key::Enter => self.notify(view.words.get(Phrase::ChooseYesOrNo)),
                 _ => Vec::new(),
@@ -201,7 +201,11 @@ impl UiState {
             Key::Tab | Key::BackTab | Key::Up | Key::Down => who.on_operator = !who.on_operator,
             Key::Enter if who.participant.is_blank() => {
                 who.on_operator = false;
-                return self.notify("Type the participant's id first.");
+                match roster.and_then(Roster::next_id) {
+                    // The id that is proposed; another Enter goes on with it.
+                    Some(id) => who.participant = Editor::line(id.as_str()),
+                    None => return self.notify("Type the participant's id first."),
+                }
             }
             Key::Enter if !who.on_operator && who.operator.is_blank() => who.on_operator = true,
             Key::Enter => {

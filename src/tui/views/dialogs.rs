@@ -2,7 +2,7 @@
 
 use super::answer::AnswerField;
 use crate::tui::theme::Theme;
-use crate::tui::ui_state::dialog::{Confirm, Correct, Dialog, SLIP, Step};
+use crate::tui::ui_state::dialog::{Confirm, Correct, Dialog, Step};
 use crate::tui::widgets::{TextField, dialog, hints, left, left_all, middle, row, rows, styled};
 use crate::tui::wrap;
 use ratatui::buffer::Buffer;
@@ -57,9 +57,12 @@ fn keys(words: &Words) -> Vec<(&'static str, &'static str, String)> {
 }
 
 /// An answer as one line of safe text, at most `columns` cells wide.
-pub fn answer_words(answer: &Answer, columns: usize) -> String {
+pub fn answer_words(answer: &Answer, columns: usize, words: &Words) -> String {
     match answer {
-        Answer::Declined { reason } => wrap::one_line(&format!("declined: {reason}"), columns),
+        Answer::Declined { reason } => {
+            let declined = words.get(Phrase::Declined);
+            wrap::one_line(&format!("{declined}: {reason}"), columns)
+        }
         Answer::Text(text) if text.trim().is_empty() => "–".to_owned(),
         other => wrap::one_line(&other.cell(), columns),
     }
@@ -71,11 +74,14 @@ impl DialogView<'_> {
         let (title, width, height) = match self.dialog {
             Dialog::Help => (self.words.get(Phrase::Help), 76, 18),
             Dialog::Remark { .. } => ("Remark", 68, 11),
-            Dialog::Correct(correct) => match &correct.step {
-                Step::List => ("Correct an answer", 76, 16),
-                Step::Answer(_) => ("Correct an answer", 76, 18),
-                Step::Reason { .. } => ("Correct an answer", 68, 12),
-            },
+            Dialog::Correct(correct) => {
+                let title = self.words.get(Phrase::CorrectTitle);
+                match &correct.step {
+                    Step::List => (title, 76, 16),
+                    Step::Answer(_) => (title, 76, 18),
+                    Step::Reason { .. } => (title, 76, 12),
+                }
+            }
             Dialog::MarkBad { .. } => ("Mark as bad", 68, 10),
             Dialog::Decline { .. } => (self.words.get(Phrase::DeclineTitle), 68, 10),
             Dialog::Confirm(Confirm::Quit) if !self.unsaved.is_empty() => ("NOT SAVED", 72, 15),
@@ -177,9 +183,12 @@ impl DialogView<'_> {
         let one =
             |author, name: &str| Span::styled(format!("{} {name}   ", mark(author)), style(author));
         Line::from(vec![
-            Span::styled("By    ", self.theme.quiet()),
-            one(Author::Experimenter, "experimenter"),
-            one(Author::Participant, "participant"),
+            Span::styled(
+                format!("{:<6}", self.words.get(Phrase::By)),
+                self.theme.quiet(),
+            ),
+            one(Author::Experimenter, self.words.get(Phrase::Experimenter)),
+            one(Author::Participant, self.words.get(Phrase::Participant)),
         ])
     }
 
@@ -212,8 +221,11 @@ impl DialogView<'_> {
                 } else {
                     self.theme.text()
                 };
-                let answer =
-                    answer_words(&item.answer, usize::from(inside.width).saturating_sub(34));
+                let answer = answer_words(
+                    &item.answer,
+                    usize::from(inside.width).saturating_sub(34),
+                    self.words,
+                );
                 // The title stands once for the answers of a form.
                 let before = i.checked_sub(1).and_then(|b| correct.items.get(b));
                 let title = match before {
@@ -228,7 +240,11 @@ impl DialogView<'_> {
                 );
                 left(buf, row(inside, y), &styled(words, style));
             }
-            let keys = [("↑ ↓", "select"), ("0–9", "answer"), ("Enter", "correct")];
+            let keys = [
+                ("↑ ↓", self.words.get(Phrase::Select)),
+                ("0–9", self.words.get(Phrase::Answer)),
+                ("Enter", self.words.get(Phrase::CorrectIt)),
+            ];
             self.keys(buf, inside, &keys);
             return;
         }
@@ -238,12 +254,15 @@ impl DialogView<'_> {
         let columns = usize::from(inside.width);
         let prompt = wrap::one_line(&item.question.prompt, columns);
         left(buf, row(inside, 1), &styled(prompt, self.theme.strong()));
-        let now = answer_words(&item.answer, columns.saturating_sub(20));
+        let now = answer_words(&item.answer, columns.saturating_sub(20), self.words);
         let title = wrap::one_line(&item.title, 12);
         let arrow = match &correct.step {
             Step::Reason { answer, .. } => match answer {
-                Some(new) => format!("  →  {}", answer_words(new, columns.saturating_sub(40))),
-                None => "  →  declined".to_owned(),
+                Some(new) => {
+                    let new = answer_words(new, columns.saturating_sub(40), self.words);
+                    format!("  →  {new}")
+                }
+                None => format!("  →  {}", self.words.get(Phrase::Declined)),
             },
             _ => String::new(),
         };
@@ -256,18 +275,29 @@ impl DialogView<'_> {
             Step::Reason { by, answer, .. } => {
                 left(buf, row(inside, 3), &self.by(*by));
                 let default = match answer {
-                    Some(_) => format!(" Enter alone: {SLIP}."),
+                    Some(_) => format!(
+                        " {}: {}.",
+                        self.words.get(Phrase::PlainEnterAlone),
+                        self.words.get(Phrase::Slip)
+                    ),
                     None => String::new(),
                 };
-                let why = styled(format!("Why? Both answers are kept.{default}"), quiet);
+                let why = self.words.get(Phrase::BothKept);
+                let why = styled(format!("{why}{default}"), quiet);
                 left(buf, row(inside, 4), &why);
-                let keys = [("Enter", "correct"), ("Tab", "author")];
+                let keys = [
+                    ("Enter", self.words.get(Phrase::CorrectIt)),
+                    ("Tab", self.words.get(Phrase::Author)),
+                ];
                 self.keys(buf, inside, &keys);
             }
             _ => {
-                let new = styled("The new answer:", quiet);
+                let new = styled(self.words.get(Phrase::NewAnswer), quiet);
                 left(buf, row(inside, 4), &new);
-                let keys = [("Enter", "continue"), ("F6", "decline")];
+                let keys = [
+                    ("Enter", self.words.get(Phrase::Continue)),
+                    ("F6", self.words.get(Phrase::Decline)),
+                ];
                 self.keys(buf, inside, &keys);
             }
         }
@@ -303,7 +333,10 @@ impl Widget for &DialogView<'_> {
             Dialog::Help => self.help(buf, inside),
             Dialog::Remark { by, .. } => {
                 left(buf, row(inside, 1), &self.by(*by));
-                let keys = [("Enter", "save"), ("Tab", "author")];
+                let keys = [
+                    ("Enter", self.words.get(Phrase::Save)),
+                    ("Tab", self.words.get(Phrase::Author)),
+                ];
                 self.keys(buf, inside, &keys);
             }
             Dialog::Correct(correct) => self.correct(buf, inside, correct),

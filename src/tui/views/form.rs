@@ -258,7 +258,7 @@ impl FormView<'_> {
             }
         };
         let answers = self.view.correctable.iter().take(8).map(|earlier| {
-            let answer = super::dialogs::answer_words(&earlier.answer, columns);
+            let answer = super::dialogs::answer_words(&earlier.answer, columns, &self.view.words);
             let id = earlier.question.id.as_str();
             wrap::one_line(&format!("{}: {id} {answer}", earlier.title), columns)
         });

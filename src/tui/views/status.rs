@@ -164,19 +164,26 @@ impl Top<'_> {
 
 impl Widget for &Top<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
-        let mut taken_left = 3;
-        if let Some(banner) = &self.page.banner {
-            let words = format!(" {banner} ");
-            taken_left += wrap::width(&words);
-            let at = area.inner(Margin::new(1, 0));
-            left(buf, at, &styled(words, self.theme.banner()));
-        }
         let parts = [&self.page.sheet, &self.page.progress]
             .into_iter()
             .flatten();
         let words: Vec<&str> = parts.map(|part| part.words.as_str()).collect();
+        let words = words.join(" · ");
+        let mut taken_left = 3;
+        if let Some(banner) = &self.page.banner {
+            // Where there is no room for both, the banner is its first word.
+            let whole = wrap::width(banner) + wrap::width(&words) + 6;
+            let shown = match banner.split_once(" — ") {
+                Some((short, _)) if whole > usize::from(area.width) => short,
+                _ => banner,
+            };
+            let shown = format!(" {shown} ");
+            taken_left += wrap::width(&shown);
+            let at = area.inner(Margin::new(1, 0));
+            left(buf, at, &styled(shown, self.theme.banner()));
+        }
         if !words.is_empty() {
-            let words = styled(words.join(" · "), self.theme.quiet());
+            let words = styled(words, self.theme.quiet());
             let at = Rect {
                 width: area.width.saturating_sub(1),
                 ..area

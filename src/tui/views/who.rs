@@ -117,7 +117,7 @@ impl Widget for &WhoView<'_> {
                     width: at.width.saturating_sub(4),
                     ..row(at, 1)
                 };
-                let words = format!("→ {next}");
+                let words = format!("→ or Enter: {next}");
                 left(buf, ghost, &styled(words, self.theme.quiet()));
             }
             let below = rows(area, at.bottom().saturating_sub(area.y), 1);

@@ -49,7 +49,7 @@ fn a_track_after_a_fault_a_bad_trial_a_correction_and_a_resume_is_the_one_withou
         let mut rig = Rig::back(protocol.clone(), rig.journal.clone(), 60.0);
         until(&mut rig, 12, answering);
         rig.send(Input::Abort("power".to_owned()));
-        let mut rig = Rig::back(protocol.clone(), rig.journal.clone(), 60.0);
+        let mut rig = Rig::back(protocol.clone(), rig.journal.clone(), 30.0);
         finish(&mut rig);
 
         assert_eq!(recorded(&rig, &protocol), expected, "{procedure}");

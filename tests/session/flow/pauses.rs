@@ -4,7 +4,8 @@ use super::device::{in_phase, screen};
 use super::part_rig::pairs;
 use super::rig::{DeviceMood, Rig, StoreMood};
 use super::studies::plain;
-use study_session::outcome::Event;
+use chrono::TimeDelta;
+use study_session::outcome::{Event, Failure};
 use study_session::session::{Effect, Input, Screen};
 
 #[test]
@@ -86,11 +87,120 @@ fn what_comes_between_two_intervals_holds_the_next_one_back() {
 fn a_pause_is_no_part_of_the_response_time() {
     let mut rig = Rig::new(plain());
     rig.until("Form").wait(3.0);
-    rig.send(Input::Pause).wait(600.0).send(Input::Advance);
+    rig.send(Input::Pause).wait(50.0).send(Input::Advance);
     rig.wait(2.0).answer_page();
     let response = rig.events().find_map(|e| match e {
         Event::TrialDone { response_s, .. } => Some(*response_s),
         _ => None,
     });
     assert!((response.unwrap() - 5.0).abs() < 1e-6, "{response:?}");
+}
+
+/// What somebody does in a session.
+type Does = fn(&mut Rig);
+
+/// The failures because of a pause: trial, attempt, pause.
+fn forgotten(rig: &Rig) -> Vec<(u32, u32, Option<f64>)> {
+    let failed = rig.events().filter_map(|e| match e {
+        Event::AttemptFailed {
+            trial,
+            attempt,
+            failure: Failure::Interrupted,
+            detail,
+            paused_s,
+            ..
+        } if detail.starts_with("felt again") => Some((*trial, *attempt, *paused_s)),
+        _ => None,
+    });
+    failed.collect()
+}
+
+fn paused_s(rig: &Rig) -> Option<f64> {
+    rig.events().find_map(|e| match e {
+        Event::TrialDone { paused_s, .. } => Some(*paused_s),
+        _ => None,
+    })?
+}
+
+#[test]
+fn after_a_long_pause_a_trial_is_felt_again() {
+    let pauses: [(&str, Does); 3] = [
+        ("a pause", |rig| {
+            rig.send(Input::Pause).wait(61.0).send(Input::Advance);
+        }),
+        ("three short ones", |rig| {
+            for _ in 0..3 {
+                rig.send(Input::Pause).wait(21.0).send(Input::Advance);
+            }
+        }),
+        ("a suspended computer", |rig| {
+            rig.now.wall += TimeDelta::seconds(14_000);
+            rig.wait(0.1);
+        }),
+    ];
+    for (what, pause) in pauses {
+        let mut rig = Rig::new(plain());
+        rig.until("Form").wait(3.0);
+        pause(&mut rig);
+        assert_eq!(screen(&rig), "Reference", "{what}");
+        let found = forgotten(&rig);
+        let [(1, 1, Some(s))] = found[..] else {
+            panic!("{what}: {found:?}");
+        };
+        assert!(s > 60.0, "{what}: {s}");
+        rig.finish();
+        rig.assert_whole();
+        assert_eq!(rig.closed()[&1], Some(2), "{what}");
+        assert_eq!(rig.positions(), [1, 2, 3, 4, 5, 6], "{what}");
+        assert_eq!(paused_s(&rig), None, "{what}: of the second attempt");
+    }
+}
+
+#[test]
+fn a_short_pause_is_recorded() {
+    let mut rig = Rig::new(plain());
+    rig.until("Form").send(Input::Pause).wait(20.0);
+    rig.send(Input::Advance).answer_page();
+    assert_eq!(forgotten(&rig), []);
+    assert!((paused_s(&rig).unwrap() - 20.0).abs() < 1e-6);
+}
+
+#[test]
+fn the_protocol_says_how_long_a_pause_may_be() {
+    let mut protocol = plain();
+    protocol.session.longest_pause_s = 600.0;
+    let mut rig = Rig::new(protocol);
+    rig.until("Form").send(Input::Pause).wait(500.0);
+    rig.send(Input::Advance);
+    assert_eq!(screen(&rig), "Form");
+    rig.send(Input::Pause).wait(101.0).send(Input::Advance);
+    assert_eq!(screen(&rig), "Reference");
+}
+
+/// Whoever stopped a trial and comes back much later does not rate it from memory.
+#[test]
+fn what_was_stopped_long_ago_is_not_rated() {
+    let mut rig = Rig::new(plain());
+    rig.until("Playing").send(Input::Stop).wait(59.0);
+    assert_eq!(rig.view().screen, Screen::Stopped { can_rate: true });
+    rig.wait(2.0);
+    assert_eq!(rig.view().screen, Screen::Stopped { can_rate: false });
+    rig.send(Input::RateStopped);
+    assert_eq!(screen(&rig), "Stopped");
+    rig.send(Input::PlayAgain).finish();
+    rig.assert_whole();
+}
+
+#[test]
+fn a_playback_during_which_the_clock_jumps_forward_is_felt_again() {
+    let mut rig = Rig::new(plain());
+    rig.until("Playing");
+    rig.effects.clear();
+    rig.now.wall += TimeDelta::seconds(20);
+    rig.wait(0.1);
+    assert!(rig.effects.contains(&Effect::Limp));
+    assert_eq!(screen(&rig), "Reference");
+    rig.finish();
+    rig.assert_whole();
+    assert_eq!(rig.closed()[&1], Some(2));
 }

@@ -190,7 +190,86 @@ fn a_rating_goes_on_at_the_first_question_that_was_not_answered() {
         } if matches!(form, FormId::Trial { trial: t, .. } if t == *trial) => Some(*response_s),
         _ => None,
     });
-    assert!((response.unwrap() - 14.0).abs() < 1e-6, "{response:?}");
+    // The time over the gap counts.
+    assert!((response.unwrap() - 74.0).abs() < 1e-6, "{response:?}");
+}
+
+/// How somebody leaves a session.
+type Stop = fn(&mut Rig);
+
+#[test]
+fn a_trial_that_was_felt_too_long_ago_is_felt_again() {
+    let stops: [(&str, Stop); 3] = [
+        ("felt", |rig| {
+            rig.until("Form");
+        }),
+        ("left", |rig| {
+            rig.until("Form").send(Input::Quit);
+        }),
+        ("stopped", |rig| {
+            rig.until("Playing").send(Input::Stop);
+        }),
+    ];
+    for (what, stop) in stops {
+        for (gap_s, kept) in [(59.0, true), (61.0, false), (3.5 * 3600.0, false)] {
+            let mut rig = left_at(&plain(), gap_s, stop);
+            assert_eq!(screen(&rig) != "Reference", kept, "{what} {gap_s}");
+            let again = rig.events().find_map(|e| match e {
+                Event::AttemptFailed {
+                    trial: 1,
+                    attempt: 1,
+                    failure: Failure::Interrupted,
+                    paused_s,
+                    ..
+                } => *paused_s,
+                _ => None,
+            });
+            assert_eq!(again.is_none(), kept, "{what} {gap_s}");
+            assert!(again.is_none_or(|s| (s - gap_s).abs() < 1e-3), "{again:?}");
+            rig.finish();
+            rig.assert_whole();
+            let row = &rig.session.history().rating_rows(&plain())[0];
+            assert_eq!(row.felt_again_after_s, again, "{what} {gap_s}");
+        }
+    }
+}
+
+/// Neither leaving again and again nor a clock that was set back makes a pause short.
+#[test]
+fn pauses_add_up_and_an_unknown_one_is_too_long() {
+    let mut rig = left_at(&plain(), 40.0, |rig| {
+        rig.until("Form");
+    });
+    assert_eq!(screen(&rig), "Form");
+    let mut again = Rig::back(plain(), rig.journal.clone(), 40.0);
+    again.identify();
+    assert_eq!(screen(&again), "Reference");
+    rig.answer_page();
+    let row = &rig.session.history().rating_rows(&plain())[0];
+    assert!((row.paused_s.unwrap() - 40.0).abs() < 1e-3);
+    let back = left_at(&plain(), -86_400.0, |rig| {
+        rig.until("Form");
+    });
+    assert_eq!(screen(&back), "Reference");
+}
+
+/// What was answered in time is not lost, however long the pause after it was; the row says so.
+#[test]
+fn a_trial_that_is_answered_in_part_goes_on_after_any_pause() {
+    let mut rig = left_at(&rich(), 7200.0, |rig| {
+        rig.until_reference(1).until("Form").answer_page();
+    });
+    assert!(matches!(rig.view().screen, Screen::Form { page: 2, .. }));
+    let kept = answers(&rig.journal);
+    rig.answer_page();
+    assert_eq!(answers(&rig.journal)[..kept.len()], kept[..]);
+    let paused = rig.events().filter_map(|e| match e {
+        Event::TrialDone { paused_s, .. } => *paused_s,
+        _ => None,
+    });
+    assert_eq!(paused.map(f64::round).collect::<Vec<_>>(), [7200.0]);
+    rig.finish();
+    rig.assert_whole();
 }
 
 #[test]

@@ -68,7 +68,7 @@ fn from_tap_to_saved_in_less_than_50_ms_more_than_the_sync() {
 }
 
 /// Memory of a process, kB; 0 where the system does not tell.
-fn resident_kb(process: u32) -> u64 {
+pub(super) fn resident_kb(process: u32) -> u64 {
     let status = fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
     let line = status.lines().find_map(|l| l.strip_prefix("VmRSS:"));
     let number = line.and_then(|l| l.split_whitespace().next());

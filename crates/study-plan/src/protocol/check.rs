@@ -3,6 +3,7 @@
 //! No finding here prevents a study from running. Warnings that need the models'
 //! tables or the orders are given where these are loaded.
 
+mod exposure;
 mod ladders;
 mod parts;
 
@@ -46,6 +47,7 @@ pub fn warnings(protocol: &Protocol, spans: &Spans, unread: &[&ModelId]) -> Vec<
     } else {
         parts::warnings(protocol, spans, &mut faults);
     }
+    exposure::warnings(protocol, spans, &mut faults);
     duration(protocol, spans, &mut faults);
     roles(protocol, spans, &mut faults);
     apart(protocol, spans, &mut faults);
@@ -416,7 +418,9 @@ mod tests {
     use crate::protocol::{Breaks, example};
 
     fn messages(protocol: &Protocol) -> Vec<String> {
-        warnings(protocol, &Spans::new(), &[])
+        let mut protocol = protocol.clone();
+        protocol.trial.minimum_strokes = 1;
+        warnings(&protocol, &Spans::new(), &[])
             .into_iter()
             .map(|f| f.message)
             .collect()

@@ -252,10 +252,8 @@ table! {
             ("physical", "a physical sample"),
         ], "role of the realization; `test` for a level and where there are several"),
         Repetition: whole("repetition", "repetition of the realization, from 1; 0 for practice"),
-        PreviousModel: text(
-            "previous_model",
-            "realization presented just before this attempt, failed attempts and practice included",
-        ).empty("nothing was presented before, or the trial was never presented"),
+        PreviousModel: text("previous_model", "realization presented just before this attempt, failed attempts and practice included")
+            .empty("nothing was presented before, or the trial was never presented"),
         Practice: flag("practice", "whether the trial is practice, which is not analyzed"),
         Pilot: PILOT,
         Simulated: SIMULATED,
@@ -284,7 +282,7 @@ table! {
             "exploration_s",
             "duration of the playback, from its confirmed start to its confirmed stop",
         ).unit("s").empty("no playback ended, or the device reported no duration"),
-        ResponseS: number("response_s", "time from the opening of the rating to its confirmation")
+        ResponseS: number("response_s", "time from the opening of the rating to its confirmation, also while the program was left, but not while it was paused")
             .unit("s").empty("the rating was not confirmed"),
         Strokes: whole("strokes", "full strokes").empty(NO_TELEMETRY),
         LeastEnergyJ: number(
@@ -335,22 +333,16 @@ table! {
             "rendered_vaf",
             "share of the variance of the table's force for the reported motion that the device commanded",
         ).empty("not known, or the force did not vary").optional(),
-        DeliveredVaf: number(
-            "delivered_vaf",
-            "VAF of what was delivered: of the table's force on the validation recording, with the gain and the delay of the playback",
-        ).empty("not judged, or there is no validation recording with the protocol").optional(),
+        DeliveredVaf: number("delivered_vaf", "VAF of what was delivered: of the table's force on the validation recording, with the gain and the delay of the playback")
+            .empty("not judged, or there is no validation recording with the protocol").optional(),
         RenderedGain: number("rendered_gain", "slope of the commanded on the table's force")
             .empty("not known, or the force did not vary").optional(),
         RenderedBiasN: number("rendered_bias_n", "mean of the commanded minus the table's force")
             .unit("N").empty("not known").optional(),
-        RenderedDelayMs: number(
-            "rendered_delay_ms",
-            "how much later than the table's force the commanded force was",
-        ).unit("ms").empty("not known, or the two hardly correlate").optional(),
-        RenderedErrorN: number(
-            "rendered_error_n",
-            "largest difference of commanded and table's force that lasted 20 ms",
-        ).unit("N").empty("not known").optional(),
+        RenderedDelayMs: number("rendered_delay_ms", "how much later than the table's force the commanded force was")
+            .unit("ms").empty("not known, or the two hardly correlate").optional(),
+        RenderedErrorN: number("rendered_error_n", "largest difference of commanded and table's force that lasted 20 ms")
+            .unit("N").empty("not known").optional(),
         HostLateMs: number(
             "host_late_ms",
             "how late this computer's thread for the device was at most during the playback",
@@ -368,6 +360,10 @@ table! {
             .empty("not known").optional(),
         Levels: text("one for each factor", "level of the realization in the factor; factors in the order of the protocol")
             .empty("the realization is not part of the factorial design").repeats(Repeats::Factor),
+        PausedS: number("paused_s", "pauses between the end of the playback and the answer")
+            .unit("s").empty("less than 1 s, or not answered").optional(),
+        FeltAgainAfterS: number("felt_again_after_s", "pause after which an earlier attempt was felt again instead of answered, as it was longer than the protocol allows")
+            .unit("s").empty("there was none, or its length is not known").optional(),
     }
 }
 
@@ -461,7 +457,7 @@ table! {
         What: level("what", &[
             ("attempt", "an attempt started"),
             ("answer", "a question was answered"),
-            ("correction", "an answer was corrected"),
+            ("correction", "an answer was corrected, or, without a question, the id"),
             ("failure", "an attempt failed"),
             ("closed", "the trial was abandoned"),
             ("remark", "a remark was made"),
@@ -480,7 +476,7 @@ table! {
             ("playback-lost", "the start or end of the playback was not confirmed"),
             ("marked-bad", "marked as bad by a person"),
             ("stopped", "stopped, and played again instead of rated"),
-            ("interrupted", "the program ended during the attempt"),
+            ("interrupted", "the program ended or stood still during the attempt, or paused too long before its answer"),
             ("rendering", "the force was not that of the table"),
         ], "why the attempt failed").empty("the event is no failure"),
         By: level("by", &[

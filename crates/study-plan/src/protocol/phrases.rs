@@ -182,6 +182,30 @@ phrases! {
     TextCut "text-cut" "The text is too long: at most {kib} KiB are stored, the rest was removed.";
     PageLost "page-lost" "The connection is lost. Trying again …";
     PageClosed "page-closed" "This page is closed. Please tell the experimenter.";
+    OnceMore "once-more" "The pause was long: once more, please.";
+    CorrectTitle "correct-title" "Correct an answer";
+    CorrectIt "correct-it" "correct";
+    Select "select" "select";
+    Author "author" "author";
+    By "by" "By";
+    Experimenter "experimenter" "experimenter";
+    Participant "participant" "participant";
+    NewAnswer "new-answer" "The new answer:";
+    BothKept "both-kept" "Why? Both answers are kept.";
+    Slip "slip" "a slip of the key";
+    AlreadyAnswer "already-answer" "That is already the answer.";
+    NewAnswerFirst "new-answer-first" "Enter the new answer first, or press Esc.";
+    ReasonFirst "reason-first" "Type a reason first, or press Esc.";
+    NothingToCorrect "nothing-to-correct" "There is no earlier answer to correct.";
+    WhichCorrect "which-correct" "Type the number of the answer to correct. Enter alone: none.";
+    WhichOfList "which-of-list" "Type a number of the list.";
+    PlainWhy "plain-why" "Type the reason, then press Enter.";
+    PlainDeclineIt "plain-decline-it" "Type /decline to decline it.";
+    NothingCorrected "nothing-corrected" "Nothing is corrected.";
+    PracticeNumber "practice-number" "practice {n}";
+    FormSetup "form-setup" "set-up";
+    FormIntake "form-intake" "intake";
+    FormOutro "form-outro" "closing questions";
 }
 
 impl Phrase {

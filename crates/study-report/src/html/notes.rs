@@ -179,6 +179,13 @@ pub(super) fn provenance(source: &Source, d: &Details, question: Option<&str>) -
                     dt { "fingerprint: " (safe(name)) } dd { code { (safe(value)) } }
                 }
             }
+            @if !d.corrections.is_empty() {
+                details open {
+                    summary { (counted(d.corrections.len(), "correction", "corrections")) }
+                    ul { @for one in &d.corrections { li { (safe(one)) } } }
+                    p.note { "Both values are in attempts.csv and in the journals." }
+                }
+            }
             @if !d.versions.is_empty() {
                 details open[d.versions.len() > 1] {
                     summary { "Versions of the protocol" }

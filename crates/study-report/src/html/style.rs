@@ -26,7 +26,7 @@ svg { display: block; width: 100%; height: auto; }
 table { border-collapse: collapse; font-size: .9rem; font-variant-numeric: tabular-nums; overflow-wrap: normal; }
 caption { text-align: left; font-weight: bold; padding-bottom: .3rem; }
 th, td { padding: .22rem .6rem .22rem 0; text-align: right; vertical-align: top; white-space: nowrap; }
-th { border-bottom: 1px solid #1a1a1a; }
+th, thead td { border-bottom: 1px solid #1a1a1a; }
 td { border-bottom: 1px solid #ddd; }
 th:first-child, td:first-child, .text { text-align: left; }
 td:first-child { white-space: normal; min-width: 7.5rem; max-width: 23rem; overflow-wrap: anywhere; }

@@ -28,7 +28,10 @@ pub(super) fn grid(t: &Table, captioned: bool) -> Markup {
                 @if captioned { caption { (t.caption) } }
                 thead { tr {
                     @for (i, head) in t.heads(Medium::Report).iter().enumerate() {
-                        th class=[wraps(i)] scope="col" { (safe(head)) }
+                        // An empty header heads nothing.
+                        @if head.is_empty() { td {} } @else {
+                            th class=[wraps(i)] scope="col" { (safe(head)) }
+                        }
                     }
                 } }
                 tbody {

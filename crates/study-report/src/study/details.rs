@@ -8,7 +8,7 @@ use study_analysis::study::{Analyzed, Study};
 use study_base::apa;
 use study_base::text::counted;
 use study_plan::protocol::{Answer, Order, Protocol, Question, Scale};
-use study_session::outcome::ParticipantRow;
+use study_session::outcome::{AttemptEvent, AttemptRow, ParticipantRow, STEP_BACK};
 use study_session::store::Derived;
 use study_stats::describe::mean;
 
@@ -94,12 +94,40 @@ pub fn details(study: &Study, derived: &Derived, analyzed: &Analyzed) -> Details
             ("wording".to_owned(), prints.wording.clone()),
             ("analysis".to_owned(), prints.analysis.clone()),
         ],
+        corrections: corrections(&derived.attempts),
         versions: manifest
             .versions
             .iter()
             .map(|v| (v.version, v.at.to_rfc3339(), v.reason.clone()))
             .collect(),
     }
+}
+
+/// What was corrected, with both values and the reason. What a participant changed before an
+/// answer was complete is no correction.
+fn corrections(attempts: &[AttemptRow]) -> Vec<String> {
+    let corrected = attempts
+        .iter()
+        .filter(|row| row.what == AttemptEvent::Correction && row.text != STEP_BACK);
+    let value = |answer: &Option<Answer>| match answer {
+        None | Some(Answer::Declined { .. }) => "declined".to_owned(),
+        Some(answer) => answer.cell(),
+    };
+    let sentence = |row: &AttemptRow| {
+        let place = row
+            .trial
+            .map_or_else(String::new, |trial| format!(", trial {trial}"));
+        let question = row.question.as_ref().map_or("id", |q| q.as_str());
+        format!(
+            "{}{place}: {question} {} → {} ({}, {})",
+            row.participant,
+            value(&row.from),
+            value(&row.to),
+            row.text,
+            row.at.format("%Y-%m-%d %H:%M %:z")
+        )
+    };
+    corrected.map(sentence).collect()
 }
 
 /// Number of participants by state; pilots and simulated ones only if there are no

@@ -307,6 +307,8 @@ row! {
         FrontName: front_name,
         Group: group,
         SessionId: session_id,
+        PausedS: paused_s,
+        FeltAgainAfterS: felt_again_after_s,
         ..fidelity {
             Rendering: verdict,
             RenderedVaf: rendered_vaf,

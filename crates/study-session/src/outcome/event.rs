@@ -98,7 +98,8 @@ named! {
         MarkedBad = "marked-bad",
         /// Stopped by Esc or a pause and played again instead of rated.
         Stopped = "stopped",
-        /// The program ended during the attempt.
+        /// The program ended or stood still during the attempt, or paused too long before
+        /// its answer.
         Interrupted = "interrupted",
         /// The force was not that of the table.
         Rendering = "rendering",
@@ -239,6 +240,9 @@ pub struct Start {
     pub assigned: Assigned,
 }
 
+/// The reason of a correction that is made on a page to which somebody went back.
+pub const STEP_BACK: &str = "step back";
+
 /// Something that happened in a session.
 ///
 /// In all events `trial` is [`Trial::trial`], `attempt` counts from 1, and `queue` has the
@@ -378,6 +382,9 @@ pub enum Event {
         /// Whether the order of the trials still to come violates `max_run` or
         /// `min_distance`.
         constraint_broken: bool,
+        /// The pause after which it would have been answered, s, if that is why.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        paused_s: Option<f64>,
     },
     /// All questions of an attempt are answered: the trial is completed.
     TrialDone {
@@ -385,6 +392,10 @@ pub enum Event {
         attempt: u32,
         /// From the opening of the rating to its confirmation, s.
         response_s: f64,
+        /// Pauses between the end of the playback and the answer, s, if there were any; not
+        /// in journals of earlier releases.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        paused_s: Option<f64>,
     },
     /// The trial was closed after `max_attempts` failures.
     TrialClosed {
@@ -428,6 +439,13 @@ pub enum Event {
     Interrupted { reason: String },
     /// Every trial is closed and every form answered.
     Finished,
+    /// The participant's id had been mistyped; it was corrected from outside a session.
+    IdCorrected {
+        /// As it was typed.
+        from: ParticipantId,
+        to: ParticipantId,
+        reason: String,
+    },
     /// The operator set the participant's state from outside a session.
     StateSet { state: State, reason: String },
     /// The order was shown to somebody during the study.

@@ -29,7 +29,7 @@ pub use trial::{Attempt, AttemptStart, Completion, Ended, Presentation, Sitting}
 
 use super::event::{Channel, Choice, Entry, Event, Failure, FormId, Moment, Start, State};
 use std::collections::{BTreeMap, BTreeSet};
-use study_base::text::{PartId, QuestionId};
+use study_base::text::{PartId, ParticipantId, QuestionId};
 use study_plan::protocol::{Answer, Trial};
 use trial::TrialHistory;
 
@@ -39,6 +39,8 @@ pub struct History {
     /// The first event and when it happened.
     start: Option<(Moment, Box<Start>)>,
     sitting: Sitting,
+    /// Ids that were mistyped and corrected, the oldest first.
+    pub former_ids: Vec<ParticipantId>,
     /// The state of the session.
     pub standing: Standing,
     /// Numbers of the trials still to come, the present or next one first.
@@ -155,6 +157,7 @@ impl History {
             | Event::ClockStepped { .. }
             | Event::Revealed { .. }
             | Event::TelemetryLost { .. }
+            | Event::IdCorrected { .. }
             | Event::StateSet { .. } => {}
             _ => self.last_activity = Some(at),
         }
@@ -267,13 +270,19 @@ impl History {
                 attempt,
                 failure,
                 queue,
+                paused_s,
                 ..
-            } => self.failed(*trial, *attempt, *failure, queue),
+            } => {
+                self.failed(*trial, *attempt, *failure, queue);
+                let trial = self.trials.entry(*trial).or_default();
+                trial.again_after_s = paused_s.or(trial.again_after_s);
+            }
             Event::TrialDone {
                 trial,
                 attempt,
                 response_s,
-            } => self.done(*trial, *attempt, *response_s, at),
+                paused_s,
+            } => self.done(*trial, *attempt, (*response_s, *paused_s), at),
             Event::TrialClosed { trial, .. } => {
                 self.trials.entry(*trial).or_default().given_up = true;
                 self.queue.retain(|t| t != trial);
@@ -293,6 +302,12 @@ impl History {
             }
             Event::BreakEnded { .. } => self.open_break = None,
             Event::Finished => self.set_state(State::Done, ""),
+            Event::IdCorrected { from, to, .. } => {
+                self.former_ids.push(from.clone());
+                if let Some((_, start)) = &mut self.start {
+                    start.participant = to.clone();
+                }
+            }
             Event::StateSet { state, reason } => self.set_state(*state, reason),
             Event::Remark { trial: None, .. }
             | Event::Paused
@@ -328,7 +343,9 @@ impl History {
         if let Some(open) = self.open_mut()
             && let Some((from, last)) = open.rating.replace((at, at))
         {
-            open.rated_earlier_s += last.seconds_since(&from);
+            // The time over the gap counts, by the wall clock: its processes are two.
+            let gap_s = (at.wall - last.wall).as_seconds_f64().max(0.0);
+            open.rated_earlier_s += last.seconds_since(&from) + gap_s;
         }
         self.reopen_tracks(queue);
         self.set_queue(queue);
@@ -403,7 +420,13 @@ impl History {
         *failures += u32::from(failure.counts());
     }
 
-    fn done(&mut self, trial: u32, attempt: u32, response_s: f64, at: Moment) {
+    fn done(
+        &mut self,
+        trial: u32,
+        attempt: u32,
+        (response_s, paused_s): (f64, Option<f64>),
+        at: Moment,
+    ) {
         let practice = self.planned(trial).is_some_and(|t| t.practice);
         let number = self.closed(practice) + 1;
         let told = self.first_answer(trial, attempt);
@@ -412,6 +435,7 @@ impl History {
             attempt.done = Some(Completion {
                 at,
                 response_s,
+                paused_s,
                 number,
             });
         }

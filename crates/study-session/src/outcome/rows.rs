@@ -82,6 +82,8 @@ pub struct RatingRow {
     pub front_name: Option<String>,
     pub group: Option<PartId>,
     pub session_id: Option<PartId>,
+    pub paused_s: Option<f64>,
+    pub felt_again_after_s: Option<f64>,
 }
 
 impl RatingRow {
@@ -142,6 +144,8 @@ impl RatingRow {
             front_name: None,
             group: None,
             session_id: None,
+            paused_s: None,
+            felt_again_after_s: None,
         }
     }
 }
@@ -194,7 +198,7 @@ impl AttemptEvent {
         Some(match event {
             Event::AttemptStarted { .. } => Self::Attempt,
             Event::Answered { .. } => Self::Answer,
-            Event::Corrected { .. } => Self::Correction,
+            Event::Corrected { .. } | Event::IdCorrected { .. } => Self::Correction,
             Event::AttemptFailed { .. } => Self::Failure,
             Event::TrialClosed { .. } => Self::Closed,
             Event::Remark { .. } => Self::Remark,

@@ -45,7 +45,10 @@ impl Session {
 
     /// Fails the attempt under way because of the device.
     pub(super) fn lose_attempt(&mut self, failure: Failure, what: &str, at: Moment) {
-        let refused = failure == Failure::DeviceFault && self.phase.preparing();
+        // Why a force is not played may tell which one it is. A program that presents something
+        // else says what it lacks, such as a player of sounds.
+        let hidden = self.presents_force();
+        let refused = failure == Failure::DeviceFault && self.phase.preparing() && hidden;
         self.fail(failure, what, at);
         self.proceed(at);
         self.set_problem(if refused { REFUSED } else { what }, failure);
@@ -87,7 +90,7 @@ impl Session {
         let pause = matches!(self.phase, Phase::Stopping { pause: true, .. });
         self.out.push(Effect::Limp);
         if limped {
-            self.phase = Phase::Stopped;
+            self.phase = Phase::Stopped { since: at };
         } else {
             let what = format!("the device did not confirm {what} within {within_s} s");
             self.lose_attempt(Failure::PlaybackLost, &what, at);
@@ -193,6 +196,8 @@ impl Session {
             detail: detail.to_owned(),
             queue: queue.iter().map(|t| t.trial).collect(),
             constraint_broken,
+            paused_s: (self.paused_s())
+                .filter(|_| failure == Failure::Interrupted && self.is_forgotten(0.0)),
         };
         self.record(failed, at);
         if given_up {
@@ -223,7 +228,7 @@ impl Session {
 }
 
 /// What the screen shows instead of a device's reason for not playing a realization.
-const REFUSED: &str = "the device does not play this trial; the journal has its reason";
+const REFUSED: &str = "the device does not play this trial; attempts.csv will have its reason";
 
 /// What the screen shows after a playback with a wrong force.
 const WRONG_FORCE: &str = "the device did not do what it was told";

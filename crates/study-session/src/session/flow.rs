@@ -238,7 +238,7 @@ impl Session {
             &Phase::Playing { strokes, since, .. } => {
                 self.finish_playing(at.seconds_since(&since), strokes, at);
             }
-            Phase::Stopped => self.notify("choose: play it again or rate it"),
+            Phase::Stopped { .. } => self.notify("choose: play it again or rate it"),
             Phase::Break { since, rested_s } => {
                 let rested_s = rested_s + at.seconds_since(since);
                 if self.break_wait_s(at) > 0.0 {
@@ -298,7 +298,7 @@ impl Session {
     }
 
     /// Excludes the time under an overlay from what is measured: the rating time
-    /// pauses, a reference prompt starts again.
+    /// pauses, a reference prompt starts again. It counts as a pause before the answer.
     pub(super) fn track_overlay(&mut self, at: Moment) {
         match (self.overlay(), self.overlaid_since) {
             (Some(_), None) => self.overlaid_since = Some(at),
@@ -316,8 +316,10 @@ impl Session {
                         *overlaid_s += at.seconds_since(&from);
                     }
                     Phase::Reference { since } => *since = at,
+                    Phase::Stopped { since } => *since = at,
                     _ => {}
                 }
+                self.was_away(at.seconds_since(&since), at);
             }
             _ => {}
         }

@@ -3,14 +3,11 @@
 use super::Session;
 use super::flow::Step;
 use super::phase::{Form, Phase};
-use crate::outcome::{Author, Event, FormId, Moment};
+use crate::outcome::{Author, Event, FormId, Moment, STEP_BACK};
 use study_base::text::QuestionId;
 use study_plan::protocol::answer::MAX_TEXT_BYTES;
 use study_plan::protocol::phrases::{Phrase, Words};
 use study_plan::protocol::{Answer, Control, Question, Refusal, Stimuli};
-
-/// The reason of a correction that is made on a page to which somebody went back.
-const STEP_BACK: &str = "step back";
 
 /// Why an input was not accepted; shown to the operator.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -206,6 +203,7 @@ impl Session {
                 trial,
                 attempt,
                 response_s: spent_s + earlier.unwrap_or(0.0),
+                paused_s: self.paused_s(),
             };
             self.record(done, at);
             self.feedback = self.told(trial);

@@ -99,6 +99,12 @@ pub enum Input {
     PlaybackLost(String),
     /// The device responds again and is limp.
     DeviceReady,
+    /// The program did not run for a while: the computer was suspended, or the process
+    /// stopped.
+    StoodStill {
+        /// For how long, s.
+        seconds: f64,
+    },
     /// More events are on disk.
     Saved {
         /// Number of events of this process on disk, counted from the first.

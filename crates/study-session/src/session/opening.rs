@@ -139,8 +139,8 @@ impl Session {
     }
 
     /// Records the resumption. An attempt whose playback had not ended fails and its
-    /// trial comes next; one that waits for its rating stays open unless its block
-    /// is restarted.
+    /// trial comes next, as does one that was felt too long ago; another one that waits
+    /// for its rating stays open unless its block is restarted.
     fn reopen(&mut self, gap_s: f64, choice: Option<Choice>, at: Moment) {
         let restart = choice == Some(Choice::RestartBlock);
         if let Some(open) = self.history.open()
@@ -152,6 +152,10 @@ impl Session {
                 "the program ended during it"
             };
             self.fail(Failure::Interrupted, why, at);
+        }
+        self.came_back(at);
+        if self.comes_too_late() {
+            self.feel_again(at);
         }
         for (trial, attempt) in self.unrecorded_closings() {
             self.record(Event::TrialClosed { trial, attempt }, at);

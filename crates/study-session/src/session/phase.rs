@@ -71,7 +71,9 @@ pub(super) enum Phase {
         pause: bool,
     },
     /// Stopped: play again or rate.
-    Stopped,
+    Stopped {
+        since: Moment,
+    },
     /// Whether the answer was correct is shown.
     Feedback {
         correct: bool,

@@ -122,8 +122,8 @@ impl Session {
                 interval: self.interval_of(),
             },
             Phase::Stopping { .. } => Screen::Stopping,
-            Phase::Stopped => Screen::Stopped {
-                can_rate: self.can_rate(),
+            Phase::Stopped { since } => Screen::Stopped {
+                can_rate: self.can_rate() && !self.is_forgotten(at.seconds_since(since)),
             },
             Phase::Break { .. } => Screen::Break {
                 text: (self.protocol.text.rest.clone())
@@ -185,7 +185,7 @@ impl Session {
     /// Counts closed trials, so that a repeated trial looks like any other.
     fn progress(&self) -> Option<Progress> {
         let rating = matches!(&self.phase, Phase::Form(f) if matches!(f.id, FormId::Trial { .. }));
-        let prompt = matches!(self.phase, Phase::Reference { .. } | Phase::Stopped);
+        let prompt = matches!(self.phase, Phase::Reference { .. } | Phase::Stopped { .. });
         if !(rating || prompt || self.phase.armed()) {
             return None;
         }
@@ -263,7 +263,7 @@ impl Session {
     fn current_device(&self) -> DeviceKind {
         let under_way = self
             .playing_model()
-            .filter(|_| self.phase.armed() || matches!(self.phase, Phase::Stopped));
+            .filter(|_| self.phase.armed() || matches!(self.phase, Phase::Stopped { .. }));
         let own = under_way.and_then(|model| self.protocol.model(model)?.device);
         let claimed = self.claim.as_ref().map(|c| c.device_kind);
         own.or(claimed).unwrap_or(self.protocol.device.kind)
@@ -271,7 +271,7 @@ impl Session {
 
     /// Whether the study plays tables of force. A program of the laboratory may present
     /// sounds or pictures, which have none.
-    fn presents_force(&self) -> bool {
+    pub(super) fn presents_force(&self) -> bool {
         let protocol = &self.protocol;
         self.current_device() != DeviceKind::Process
             || protocol.models.iter().any(|m| m.file.is_some())
@@ -296,7 +296,7 @@ impl Session {
         }
         let mut items = Vec::new();
         for (form, answers) in forms {
-            let title = self.form_title(form);
+            let title = self.shown_title(form);
             for question in self.questions(form) {
                 let given = answers.iter().find(|g| g.question == question.id);
                 items.extend(given.map(|given| Correctable {
@@ -310,16 +310,40 @@ impl Session {
         items
     }
 
+    /// The title of a form for the participant.
+    fn shown_title(&self, form: FormId) -> String {
+        let phrase = match form {
+            FormId::Setup => Phrase::FormSetup,
+            FormId::Intake => Phrase::FormIntake,
+            FormId::Outro => Phrase::FormOutro,
+            FormId::Trial { trial, .. } => {
+                let (practice, number) = self.shown_number(trial);
+                let phrase = match practice {
+                    true => Phrase::PracticeNumber,
+                    false => Phrase::TrialNumber,
+                };
+                return self.words.fill(phrase, &[("n", &number)]);
+            }
+        };
+        self.words.get(phrase).to_owned()
+    }
+
+    /// Whether a trial is practice, and its number on the screen.
+    fn shown_number(&self, trial: u32) -> (bool, u32) {
+        let practice = self.history.planned(trial).is_some_and(|t| t.practice);
+        let now = || self.history.closed(practice) + 1;
+        let done = self.history.completion(trial);
+        (practice, done.map_or_else(now, |(_, done)| done.number))
+    }
+
+    /// The title of a form for the experimenter.
     pub(super) fn form_title(&self, form: FormId) -> String {
         match form {
             FormId::Setup => "set-up".to_owned(),
             FormId::Intake => "intake".to_owned(),
             FormId::Outro => "closing questions".to_owned(),
             FormId::Trial { trial, .. } => {
-                let practice = self.history.planned(trial).is_some_and(|t| t.practice);
-                let now = || self.history.closed(practice) + 1;
-                let done = self.history.completion(trial);
-                let number = done.map_or_else(now, |(_, done)| done.number);
+                let (practice, number) = self.shown_number(trial);
                 title(practice, number)
             }
         }

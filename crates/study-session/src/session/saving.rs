@@ -205,6 +205,11 @@ impl Session {
         if by_s.abs() > CLOCK_STEP_S {
             self.clock = at;
             self.record(Event::ClockStepped { by_s }, at);
+            // A computer that was suspended counts the time by its wall clock only.
+            if by_s > 0.0 {
+                self.stood_still(by_s, at);
+                self.was_away(by_s, at);
+            }
         }
     }
 }
@@ -226,6 +231,7 @@ mod tests {
             trial: 1,
             attempt: 1,
             response_s: 1.0,
+            paused_s: None,
         };
         saves.send(done, at);
         for (saved, shown) in [(0, false), (1, false), (2, true)] {

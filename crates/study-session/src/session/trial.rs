@@ -30,6 +30,7 @@ impl Session {
             intervals,
             level: presenting.level,
         };
+        self.away_s = 0.0;
         self.record(started, at);
         self.load_interval(at);
     }
@@ -205,6 +206,7 @@ impl Session {
             interval: self.interval(),
         };
         self.record(ended, at);
+        self.away_s = 0.0;
         match rendering {
             Some(found) if found.verdict == Verdict::Fault => self.wrong_force(&found, at),
             _ => self.after_playback(at),
@@ -228,13 +230,17 @@ impl Session {
         let Some(open) = self.history.open() else {
             return self.proceed(at);
         };
+        if self.comes_too_late() {
+            self.feel_again(at);
+            return self.proceed(at);
+        }
         if open.attempt.interval().is_some() {
             let last = open.attempt.presentations.last();
             let on = |(_, ended): (Moment, Ended)| !ended.stopped;
             if last.is_some_and(|p| p.ended.is_some_and(on) && self.suffices(p)) {
                 self.load_interval(at);
             } else {
-                self.phase = Phase::Stopped;
+                self.phase = Phase::Stopped { since: at };
             }
             return;
         }
@@ -243,7 +249,7 @@ impl Session {
         if begun || (!aborted && self.can_rate()) {
             self.open_trial_form(at);
         } else {
-            self.phase = Phase::Stopped;
+            self.phase = Phase::Stopped { since: at };
         }
     }
 
@@ -296,8 +302,14 @@ impl Session {
     }
 
     pub(super) fn rate_stopped(&mut self, at: Moment) {
-        if !matches!(self.phase, Phase::Stopped) {
+        let Phase::Stopped { since } = self.phase else {
+            return;
+        };
+        let stopped_s = at.seconds_since(&since);
+        if self.is_forgotten(stopped_s) {
+            self.notify("it was felt too long ago for a rating");
         } else if self.can_rate() {
+            self.away_s += stopped_s;
             self.open_trial_form(at);
         } else {
             self.notify("not enough was felt for a rating");
@@ -315,7 +327,7 @@ impl Session {
             self.record(replayed, at);
             return self.load_interval(at);
         }
-        if !matches!(self.phase, Phase::Stopped) {
+        if !matches!(self.phase, Phase::Stopped { .. }) {
             return;
         }
         self.fail(Failure::Stopped, "played again", at);

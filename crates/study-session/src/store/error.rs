@@ -269,6 +269,14 @@ pub enum StoreError {
         /// Reason.
         why: String,
     },
+    /// Something cannot be corrected.
+    #[error("{participant}: {why}")]
+    CorrectionRefused {
+        /// Participant.
+        participant: ParticipantId,
+        /// Reason, safe to print.
+        why: String,
+    },
     /// An earlier write to this segment failed; it must not be written to again.
     #[error("{}: an earlier write failed; a new segment is needed", .path.display())]
     SegmentFailed {
@@ -408,6 +416,7 @@ impl StoreError {
                 | Self::Group { .. }
                 | Self::Unknown { .. }
                 | Self::StateRefused { .. }
+                | Self::CorrectionRefused { .. }
                 | Self::OutsideFolder { .. }
         )
     }

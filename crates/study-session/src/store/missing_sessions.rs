@@ -42,6 +42,10 @@ impl StudyFolder {
         for session in sessions.iter().filter(|s| s.claimed) {
             let id = session.participant.as_str();
             present.insert((id, session.session.to_string()));
+            // The tables have the id of before until they are written again.
+            for former in &session.history.former_ids {
+                present.insert((former.as_str(), session.session.to_string()));
+            }
             if session.tombstone.is_some() {
                 erased.insert(id);
             }

@@ -184,7 +184,7 @@ impl StudyFolder {
         })
     }
 
-    fn near(&self, id: &ParticipantId) -> Result<Option<ParticipantId>, StoreError> {
+    pub(super) fn near(&self, id: &ParticipantId) -> Result<Option<ParticipantId>, StoreError> {
         let ids = self.participant_ids()?;
         let near =
             study_base::diagnostic::did_you_mean(id.as_str(), ids.iter().map(|i| i.as_str()));
@@ -193,7 +193,7 @@ impl StudyFolder {
 
     /// Appends the state to the journal of a session. A participant without a session
     /// gets a folder without a seat.
-    fn append_state(
+    pub(super) fn append_state(
         &self,
         participant: &ParticipantId,
         new: bool,

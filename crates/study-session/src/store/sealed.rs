@@ -4,23 +4,21 @@
 //! value replaced by zeros.
 
 use super::error::StoreError;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
+use serde_json::Value;
 use std::path::Path;
 use study_base::hex::sha256;
 
 /// Number of digits of a SHA-256 in hexadecimal.
 const DIGITS: usize = 64;
+/// Key of the checksum.
+const KEY: &str = "sha256";
 
 #[derive(Serialize)]
 struct Sealed<'a, T> {
     #[serde(flatten)]
     content: &'a T,
     sha256: &'a str,
-}
-
-#[derive(Deserialize)]
-struct Seal {
-    sha256: Option<String>,
 }
 
 /// The bytes of a document with its checksum; `path` is for the error.
@@ -47,15 +45,29 @@ pub(super) fn seal<T: Serialize>(content: &T, path: &Path) -> Result<Vec<u8>, St
 }
 
 /// Whether a document agrees with its checksum; `None` if it has none, as a file of an
-/// earlier release, or is no JSON object.
+/// earlier release, or is no JSON object. A checksum under another name is a damaged one.
 pub(super) fn is_intact(bytes: &[u8]) -> Option<bool> {
-    let sum = serde_json::from_slice::<Seal>(bytes).ok()?.sha256?;
+    let document: serde_json::Map<String, Value> = serde_json::from_slice(bytes).ok()?;
     let text = std::str::from_utf8(bytes).ok()?;
-    let Some(at) = text.rfind(&sum).filter(|_| sum.len() == DIGITS) else {
+    let Some(sum) = document.get(KEY) else {
+        return last_value(text).is_some_and(is_sum).then_some(false);
+    };
+    let sum = sum.as_str().unwrap_or_default();
+    let Some(at) = text.rfind(sum).filter(|_| sum.len() == DIGITS) else {
         return Some(false);
     };
     let blank = [&text[..at], &"0".repeat(DIGITS), &text[at + DIGITS..]].concat();
     Some(sha256(blank.as_bytes()) == sum)
+}
+
+/// The last value of an object, if it is a text.
+fn last_value(object: &str) -> Option<&str> {
+    let value = object.trim_end().strip_suffix('}')?.trim_end();
+    Some(value.strip_suffix('"')?.rsplit_once('"')?.1)
+}
+
+fn is_sum(text: &str) -> bool {
+    text.len() == DIGITS && text.bytes().all(|b| b.is_ascii_hexdigit())
 }
 
 #[cfg(test)]
@@ -72,8 +84,10 @@ mod tests {
             for bit in 0..8 {
                 let mut changed = bytes.clone();
                 changed[at] ^= 1 << bit;
-                // Changed digits or another name of the key are no checksum any more.
-                assert_ne!(is_intact(&changed), Some(true), "bit {bit} of byte {at}");
+                // What is no JSON any more is an error of its own.
+                let is_json = serde_json::from_slice::<Value>(&changed).is_ok();
+                let found = is_intact(&changed);
+                assert_eq!(found, is_json.then_some(false), "bit {bit} of byte {at}");
             }
         }
     }
@@ -82,6 +96,7 @@ mod tests {
     fn a_document_without_a_checksum_is_neither() {
         assert_eq!(is_intact(b"{\"format\": \"x/1\"}\n"), None);
         assert_eq!(is_intact(b"not JSON"), None);
+        assert_eq!(is_intact(b"{\"versions\": []}\n"), None);
     }
 
     /// The sum of the file with zeros in its place, by `sha256sum`.

@@ -197,6 +197,8 @@ mod tests {
             front_name: d.maybe(Draws::text),
             group: d.maybe(Draws::part),
             session_id: d.maybe(Draws::part),
+            paused_s: d.maybe(Draws::number),
+            felt_again_after_s: d.maybe(Draws::number),
         }
     }
 

@@ -1,9 +1,10 @@
 //! Verifying a results folder: every file is read again and compared.
 
+mod clocks;
+mod tables;
 mod telemetry;
 mod tracks;
 
-use super::derive::Derived;
 use super::error::{At as _, StoreError, plain};
 use super::ledger::SeatKind;
 use super::manifest::{CHECKSUM, Manifest};
@@ -58,6 +59,7 @@ impl StudyFolder {
         for session in &sessions {
             let place = place_of(session);
             self.verify_telemetry(session, &place, &mut found);
+            clocks::verify_clocks(session, &place, &mut found);
         }
         if let Some(protocol) = protocol {
             for session in &sessions {
@@ -216,7 +218,7 @@ impl StudyFolder {
             });
         }
         if let Some(claim) = &session.claim
-            && (claim.participant != session.participant || claim.session != session.session)
+            && (!is_or_was(session, &claim.participant) || claim.session != session.session)
         {
             let whose = format!(
                 "the journal belongs to {}, session {}",
@@ -301,29 +303,6 @@ impl StudyFolder {
             Some(_) => {}
         }
     }
-
-    fn verify_tables(
-        &self,
-        sessions: &[SessionData],
-        protocol: &Protocol,
-        found: &mut Vec<Finding>,
-    ) -> Result<(), StoreError> {
-        let derived = Derived::of(sessions, protocol);
-        for (name, bytes) in derived.tables(protocol).at(&self.path)? {
-            match self.disk.read(&self.path.join(name)) {
-                Ok(old) if old == bytes => {}
-                Ok(_) => found.push(Finding::problem(
-                    name,
-                    "differs from what the journals give",
-                )),
-                Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
-                    found.push(Finding::note(name, "not written yet"));
-                }
-                Err(e) => found.push(Finding::problem(name, plain(&e))),
-            }
-        }
-        Ok(())
-    }
 }
 
 /// Notes which journals have no head: their ends could be missing unnoticed.
@@ -338,6 +317,11 @@ fn verify_protection(sessions: &[SessionData], found: &mut Vec<Finding>) {
         );
         found.push(Finding::note(layout::SESSIONS, what));
     }
+}
+
+/// Whether an id is that of a session, or was until it was corrected.
+fn is_or_was(session: &SessionData, id: &ParticipantId) -> bool {
+    session.participant == *id || session.history.former_ids.contains(id)
 }
 
 fn place_of(session: &SessionData) -> String {

@@ -68,6 +68,10 @@ pub(super) const SESSION: &[Key] = keys! {
     /// the operator chooses: restart the block, continue (which is recorded), or record a
     /// drop-out.
     "resume_within_h": Kind::not_negative("h"), "2.5", default("4");
+    /// The longest pause between feeling and answering: the program was left or paused, waited
+    /// for the device or the disk, or the computer was suspended. After a longer one the trial
+    /// is felt again, unless a question of it is answered already.
+    "longest_pause_s": Kind::not_negative("s"), "120", default("60");
 };
 
 pub(super) const TRIAL: &[Key] = keys! {
@@ -162,6 +166,7 @@ pub(super) fn session(mut section: Section<'_, '_>) -> Option<SessionRules> {
     Some(SessionRules {
         entry: section.word("entry")?,
         resume_within_h: section.number("resume_within_h")?,
+        longest_pause_s: section.number("longest_pause_s")?,
     })
 }
 

@@ -1,7 +1,7 @@
 //! The rows of `attempts.csv`: a log of single events.
 
 use super::History;
-use crate::outcome::event::{Choice, Entry, Event, FormId};
+use crate::outcome::event::{Author, Choice, Entry, Event, FormId};
 use crate::outcome::rows::{AttemptEvent, AttemptRow};
 use std::collections::BTreeMap;
 use study_base::text::{ModelId, ParticipantId};
@@ -91,6 +91,7 @@ pub fn attempt_rows(
                 detail,
                 queue,
                 constraint_broken,
+                paused_s: _,
             } => {
                 (row.trial, row.attempt) = (Some(*trial), Some(*attempt));
                 row.failure = Some(*failure);
@@ -125,6 +126,12 @@ pub fn attempt_rows(
             }
             Event::StateSet { state, reason } => {
                 row.text = format!("{}: {reason}", state.as_str());
+            }
+            Event::IdCorrected { from, to, reason } => {
+                let id = |id: &ParticipantId| Some(Answer::Text(id.to_string()));
+                (row.from, row.to) = (id(from), id(to));
+                row.by = Some(Author::Experimenter);
+                row.text.clone_from(reason);
             }
             Event::Revealed { reason } => {
                 row.text.clone_from(reason);

@@ -137,6 +137,8 @@ impl History {
             answers: answers(given.into_iter()),
             group: start.assigned.group.clone(),
             session_id: start.assigned.session_id.clone(),
+            paused_s: done.and_then(|d| d.paused_s),
+            felt_again_after_s: felt.again_after_s,
         }
     }
 

@@ -109,6 +109,7 @@ fn done(trial: u32, attempt: u32) -> Event {
         trial,
         attempt,
         response_s: 1.5,
+        paused_s: None,
     }
 }
 
@@ -133,6 +134,7 @@ fn fail(trial: u32, attempt: u32) -> Event {
         detail: String::new(),
         queue: Vec::new(),
         constraint_broken: false,
+        paused_s: None,
     }
 }
 
@@ -263,6 +265,7 @@ fn the_log_says_what_breaks_the_constraint_of_the_order() {
         detail: "hot".to_owned(),
         queue: queue.to_vec(),
         constraint_broken,
+        paused_s: None,
     };
     let mut restarted = reopened(Some(Choice::RestartBlock), &[1, 3]);
     if let Event::Reopened {
@@ -305,6 +308,7 @@ fn a_stopped_presentation_that_is_resumed_is_one_presentation() {
         detail: String::new(),
         queue: vec![1, 2, 3],
         constraint_broken: false,
+        paused_s: None,
     };
     let start = |attempt| Event::PlaybackStarted {
         trial: 1,

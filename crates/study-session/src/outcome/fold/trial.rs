@@ -14,6 +14,8 @@ pub(super) struct TrialHistory {
     /// Closed as failed after its last attempt.
     pub(super) given_up: bool,
     pub(super) remarks: Vec<String>,
+    /// The last pause after which it was felt again, s.
+    pub(super) again_after_s: Option<f64>,
 }
 
 impl TrialHistory {
@@ -73,7 +75,7 @@ pub struct Attempt {
     pub rendering: Vec<Fidelity>,
     /// The answer that the track was told, as it was when the trial was completed.
     pub told: Option<Answer>,
-    /// Rating time before the program was last left, s.
+    /// Rating time until the program was last resumed, s.
     pub rated_earlier_s: f64,
     /// First and last moment of the rating in this sitting.
     pub(super) rating: Option<(Moment, Moment)>,
@@ -141,6 +143,8 @@ pub struct Completion {
     pub at: Moment,
     /// From the opening of the rating to its confirmation, s.
     pub response_s: f64,
+    /// Pauses between the end of the playback and the answer, s.
+    pub paused_s: Option<f64>,
     /// Number of the trial on the screen, from 1.
     pub number: u32,
 }

@@ -15,6 +15,7 @@ use std::collections::BTreeSet;
 use std::io::ErrorKind;
 use std::path::PathBuf;
 use study_base::hex::sha256;
+use study_base::text::ParticipantId;
 
 /// A folder on both sides: first in the results, then in the mirror.
 #[derive(Clone)]
@@ -50,6 +51,7 @@ pub(in crate::store) fn catch_up(
     study.manifest(&mut notices)?;
     study.longer(layout::REVEALS)?;
     let sessions = study.inner(layout::SESSIONS);
+    sessions.corrected_ids(&mut notices)?;
     for id in sessions.names()? {
         sessions.inner(&id).participant(&mut notices)?;
     }
@@ -183,6 +185,42 @@ impl Pair<'_> {
         }
         if self.copy(lead, layout::MANIFEST)? {
             notices.push(updated(lead, layout::MANIFEST));
+        }
+        Ok(())
+    }
+
+    /// Gives a folder the new name that it has on the other side, where the id of its
+    /// participant was corrected without this one.
+    fn corrected_ids(&self, notices: &mut Vec<String>) -> Result<(), StoreError> {
+        for side in [0, 1] {
+            let behind = 1 - side;
+            let others = self.names_of(behind)?;
+            for id in self.names_of(side)?.difference(&others) {
+                let new = self.inner(id);
+                for number in new
+                    .names_of(side)?
+                    .iter()
+                    .filter(|n| layout::number(n).is_some())
+                {
+                    let now = new.inner(number).replay(side)?;
+                    let was = |former: &&ParticipantId| {
+                        let old = self.inner(former.as_str()).inner(number).replay(behind);
+                        let is_same = |old: &Replay| {
+                            old.records > 0 && old.hashes.iter().all(|h| now.hashes.contains(h))
+                        };
+                        old.is_ok_and(|old| is_same(&old))
+                    };
+                    let Some(former) = now.history.former_ids.iter().rev().find(was) else {
+                        continue;
+                    };
+                    let (disk, folder) = (self.disk(behind), self.at(behind));
+                    let from = folder.join(former.as_str());
+                    disk.rename(&from, &folder.join(id)).at(&from)?;
+                    disk.sync_folder(&folder).at(&folder)?;
+                    notices.push(updated(side, &format!("{former} is {id}")));
+                    break;
+                }
+            }
         }
         Ok(())
     }

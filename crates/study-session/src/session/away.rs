@@ -1,0 +1,109 @@
+//! Time between feeling and answering in which nobody could answer.
+//!
+//! An answer has to be about what was felt, not about what is remembered of it. The program
+//! may be left, paused, or wait for the device or the disk; the computer may be suspended.
+//! After a longer pause than the protocol allows the trial is felt again. Once a question of it is
+//! answered it is not: that answer was in time and must not be lost. The others then go on, and
+//! the trial records its pause.
+
+use super::phase::{CLOCK_STEP_S, Phase};
+use super::{Effect, Session};
+use crate::outcome::{Failure, FormId, Moment};
+use study_plan::protocol::phrases::Phrase;
+
+/// Least pause that a trial records, s.
+const RECORDED_S: f64 = 1.0;
+
+impl Session {
+    /// Notes a pause after what was felt, s. If it became too long, the trial comes again.
+    pub(super) fn was_away(&mut self, seconds: f64, at: Moment) {
+        if !self.is_felt() {
+            return;
+        }
+        self.away_s += seconds.max(0.0);
+        let waits = match &self.phase {
+            Phase::Stopped { .. } => true,
+            Phase::Form(form) => matches!(form.id, FormId::Trial { .. }),
+            _ => false,
+        };
+        if waits && self.comes_too_late() {
+            self.feel_again(at);
+            self.proceed(at);
+        }
+    }
+
+    /// Notes the pause of a session that is resumed: since the last playback or answer of the
+    /// trial under way, by the wall clock. Where that went back, nobody knows how long it was.
+    pub(super) fn came_back(&mut self, at: Moment) {
+        let last = self.history.open().and_then(|open| {
+            let ended = open.attempt.presentations.iter().filter_map(|p| p.ended);
+            let answers = self.history.answers.iter();
+            let answered = answers
+                .filter(|given| given.form == open.form())
+                .filter_map(|given| given.answered_at);
+            ended.map(|(at, _)| at).chain(answered).last()
+        });
+        self.away_s = match last.map(|last| (at.wall - last.wall).as_seconds_f64()) {
+            None => 0.0,
+            Some(s) if s < -CLOCK_STEP_S => f64::INFINITY,
+            Some(s) => s.max(0.0),
+        };
+    }
+
+    /// Whether the trial under way was felt to its end.
+    fn is_felt(&self) -> bool {
+        let open = self.history.open();
+        open.is_some_and(|open| open.attempt.ended.is_some())
+    }
+
+    /// Whether the first answer to the trial under way would be about a memory.
+    pub(super) fn comes_too_late(&self) -> bool {
+        let open = self.history.open();
+        let unanswered = open.is_some_and(|open| !self.history.any_answer(open.form()));
+        unanswered && self.is_felt() && self.is_forgotten(0.0)
+    }
+
+    /// Whether an answer would come too long after what was felt, after `more_s` in addition.
+    pub(super) fn is_forgotten(&self, more_s: f64) -> bool {
+        self.away_s + more_s > self.protocol.session.longest_pause_s
+    }
+
+    /// The pause before the answer, s, if there was one.
+    pub(super) fn paused_s(&self) -> Option<f64> {
+        Some(self.away_s).filter(|s| *s >= RECORDED_S && s.is_finite())
+    }
+
+    /// The attempt under way does not count: its trial comes next.
+    pub(super) fn feel_again(&mut self, at: Moment) {
+        let detail = match self.away_s.is_finite() {
+            true => format!("felt again after a pause of {:.0} s", self.away_s),
+            false => "felt again: the clock went back during the pause".to_owned(),
+        };
+        self.fail(Failure::Interrupted, &detail, at);
+        self.away_s = 0.0;
+        self.notify_once_more();
+    }
+
+    fn notify_once_more(&mut self) {
+        let words = self.words.get(Phrase::OnceMore).to_owned();
+        self.notify(words);
+    }
+
+    /// The computer stood still for so long, s. What a device did meanwhile, and for how long
+    /// it was felt, is not known.
+    pub(super) fn stood_still(&mut self, seconds: f64, at: Moment) {
+        let pause = match self.phase {
+            Phase::Ready { .. } | Phase::Playing { .. } => false,
+            Phase::Stopping { pause, .. } => pause,
+            _ => return,
+        };
+        self.out.push(Effect::Limp);
+        let what = format!("the computer stood still for {seconds:.1} s");
+        self.fail(Failure::Interrupted, &what, at);
+        self.proceed(at);
+        self.notify_once_more();
+        if pause {
+            self.start_pause(at);
+        }
+    }
+}

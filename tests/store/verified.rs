@@ -1,0 +1,129 @@
+//! What `study verify` says beside a session that is open, of clocks that jumped, and of a
+//! manifest whose checksum has lost its name.
+
+#![allow(clippy::unwrap_used)]
+
+use crate::world::{Kept, at, protocol, real, session, telemetry};
+use std::fs;
+use std::path::Path;
+use study_session::outcome::Event;
+use study_session::store::{Finding, StudyFolder};
+
+fn open(results: &Path) -> StudyFolder {
+    StudyFolder::open_or_create(results, &Kept::new().frozen(), at(0)).unwrap()
+}
+
+/// Runs a session to its end.
+fn finished(study: &StudyFolder, id: &str, more: &[Event]) {
+    let mut claimed = study.claim(&real(id)).unwrap();
+    let mut journal = claimed.folder.journal().unwrap();
+    let mut all = session(id, claimed.session, claimed.seat);
+    all.splice(3..3, more.iter().cloned());
+    for (event, n) in all.iter().zip(0..) {
+        journal.append(at(n), event).unwrap();
+    }
+    telemetry(claimed.folder.path(), &all);
+}
+
+fn problems(found: &[Finding]) -> Vec<String> {
+    let problems = found.iter().filter(|f| f.is_problem);
+    problems
+        .map(|f| format!("{}: {}", f.place, f.what))
+        .collect()
+}
+
+#[test]
+fn a_session_that_is_open_is_no_problem_and_hides_none() {
+    let results = tempfile::tempdir().unwrap();
+    let study = open(results.path());
+    finished(&study, "P01", &[]);
+    study.refresh(&protocol()).unwrap();
+    let mut claimed = study.claim(&real("P02")).unwrap();
+    let mut journal = claimed.folder.journal().unwrap();
+    let all = session("P02", claimed.session, claimed.seat);
+    for (event, n) in all.iter().zip(0..).take(14) {
+        journal.append(at(n), event).unwrap();
+    }
+    telemetry(claimed.folder.path(), &all[..14]);
+    let verify = || open(results.path()).verify(Some(&protocol())).unwrap();
+    let found = verify();
+    assert_eq!(problems(&found), [""; 0]);
+    let open_one = found
+        .iter()
+        .filter(|f| f.what.contains("a session is open"));
+    assert_eq!(
+        open_one.map(|f| &f.place).collect::<Vec<_>>(),
+        ["sessions/P02"]
+    );
+
+    // A changed row of somebody else is found all the same.
+    let ratings = study.path().join("ratings.csv");
+    let whole = fs::read_to_string(&ratings).unwrap();
+    fs::write(&ratings, whole.replacen(",ok,", ",failed,", 1)).unwrap();
+    let expected = ["ratings.csv: differs from what the journals give"];
+    assert_eq!(problems(&verify()), expected);
+    fs::write(&ratings, &whole).unwrap();
+    // So is one that is missing.
+    let (rest, _) = whole.trim_end().rsplit_once("\r\n").unwrap();
+    fs::write(&ratings, format!("{rest}\r\n")).unwrap();
+    assert_eq!(problems(&verify()), expected);
+    fs::write(&ratings, &whole).unwrap();
+
+    // A session that was killed is behind its tables, and nobody has it open.
+    drop((journal, claimed));
+    assert_eq!(problems(&verify()).len(), 3);
+    study.refresh(&protocol()).unwrap();
+    assert_eq!(problems(&verify()), [""; 0]);
+}
+
+#[test]
+fn a_clock_that_jumped_is_noted() {
+    let results = tempfile::tempdir().unwrap();
+    let study = open(results.path());
+    let jump = |by_s| Event::ClockStepped { by_s };
+    finished(&study, "P01", &[jump(172_800.0), jump(-2.1)]);
+    finished(&study, "P02", &[jump(2.1)]);
+    study.refresh(&protocol()).unwrap();
+    let found = study.verify(Some(&protocol())).unwrap();
+    assert_eq!(problems(&found), [""; 0]);
+    let jumps: Vec<&Finding> = found.iter().filter(|f| f.what.contains("jumped")).collect();
+    assert_eq!(jumps.len(), 1, "{found:?}");
+    assert_eq!(jumps[0].place, "sessions/P01/1");
+    assert!(jumps[0].what.contains("by +172800 s:"), "{}", jumps[0].what);
+}
+
+#[test]
+fn a_checksum_that_lost_its_name_is_a_damaged_one() {
+    let results = tempfile::tempdir().unwrap();
+    let study = open(results.path());
+    finished(&study, "P01", &[]);
+    let path = study.path().join("study.json");
+    let whole = fs::read_to_string(&path).unwrap();
+    let key = whole.rfind("sha256").unwrap();
+    let without: String = whole
+        .lines()
+        .filter(|line| !line.contains("\"sha256\""))
+        .collect();
+    let without = without.replacen(",}", "}", 1);
+    let renamed = (0..6).map(|n| {
+        let mut bytes = whole.clone().into_bytes();
+        bytes[key + n] ^= 1;
+        String::from_utf8(bytes).unwrap()
+    });
+    for damaged in renamed.chain([without]) {
+        fs::write(&path, &damaged).unwrap();
+        let found = StudyFolder::open(study.path())
+            .unwrap()
+            .verify(None)
+            .unwrap();
+        let problems = problems(&found);
+        assert_eq!(problems.len(), 1, "{damaged}");
+        assert!(
+            problems[0].contains("checksum does not match"),
+            "{problems:?}"
+        );
+        // Nothing is added to such a study.
+        let refused = StudyFolder::open_or_create(results.path(), &Kept::new().frozen(), at(0));
+        assert!(refused.is_err(), "{damaged}");
+    }
+}
