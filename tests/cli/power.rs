@@ -462,7 +462,7 @@ fn what_cannot_be_simulated_is_refused_by_name() {
     for (more, what) in [
         (
             &["--tests", "preferred"][..],
-            "`preferred` is no test of the relation with VAF",
+            "`preferred` is no test of ratings",
         ),
         (&["--tests", "reference-equivalence"], "equivalence_margin"),
         (&["--scale", "logit"], "from a pilot, and there is none"),

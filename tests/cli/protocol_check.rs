@@ -604,7 +604,7 @@ fn a_study_of_pairs_has_no_power_of_a_correlation() {
     assert!(!out.contains("power:"), "{out}");
     let (code, _, err) = run(dir.path(), &["power", "pairs", "--closed"]);
     assert_eq!(code, 2);
-    assert!(err.contains("have no closed form"), "{err}");
+    assert!(err.contains("has no closed form"), "{err}");
 }
 
 /// The residual force of a realization is σ_F √(1 − VAF), and a tenth of a newton is noticed;

@@ -45,9 +45,7 @@ fn kills(seed: u64, count: u32) {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let protocol = folder.join("protocol");
-    // Kills come within two seconds, and a trial has to be done before.
-    let short = ("exposure = { min_s = 2 }", "exposure = { min_s = 0.05 }");
-    changed_protocol("turn-signal", &protocol, &[PATIENT, short]);
+    changed_protocol("turn-signal", &protocol, &[PATIENT]);
     let protocol = protocol.to_str().unwrap();
     let mut chance = Stream::new(seed, &["kill"]);
     let mut participant = 1;

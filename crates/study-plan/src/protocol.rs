@@ -18,6 +18,7 @@ pub mod factors;
 pub mod file;
 pub mod fingerprint;
 pub mod groups;
+pub mod identification;
 pub mod keys;
 pub mod kinds;
 pub mod pairs;
@@ -32,11 +33,13 @@ pub mod rules;
 pub mod scale;
 pub mod schema;
 mod section;
+pub mod spaces;
 
 pub use answer::{Answer, Given, Refusal};
 pub use control::{Control, Pick};
 pub use factors::{Crossing, Factor};
 pub use groups::{Assign, Assigned, GroupRules, Groups, SessionPlan};
+pub use identification::{Criterion, Feedback, Identification, Label};
 pub use kinds::QuestionKind;
 pub use pairs::{IntervalOrder, Pairs};
 pub use parts::{
@@ -49,6 +52,7 @@ pub use questionnaires::{Inventory, Questionnaire};
 pub use relative::Relative;
 pub use rules::Exclusion;
 pub use scale::Scale;
+pub use spaces::{Axis, SearchTask, SpaceRules};
 
 use keys::words;
 use serde::Serialize;
@@ -104,6 +108,9 @@ pub struct Protocol {
     /// `[[families]]`
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub families: Vec<FamilyRules>,
+    /// `[[spaces]]`
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub spaces: Vec<SpaceRules>,
     /// `[[tracks]]`
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub tracks: Vec<TrackRules>,

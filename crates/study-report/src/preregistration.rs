@@ -1,7 +1,7 @@
 //! The preregistration as a document.
 
 use super::power::{Report, own_design};
-use super::study::track_in_words;
+use super::study::{search_rule, track_in_words};
 use super::{apa, sentences, wording};
 use chrono::NaiveDate;
 use serde_json::{Value, json};
@@ -359,6 +359,19 @@ fn trials(p: &Protocol, part: &Part) -> String {
         Task::Rating(own) => each(own, "rating"),
         Task::Magnitude(own) => each(own, "magnitude estimation"),
         Task::Mushra(own) => each(&own.presentations, "rating beside a reference"),
+        Task::Identification(own) => format!(
+            "{}, each is given one of {}",
+            each(&own.presentations, "identification"),
+            match own.criterion {
+                None => counted(own.labels.len(), "label", "labels"),
+                Some(c) => format!(
+                    "{}, after practice until {} of the last {} answers are correct",
+                    counted(own.labels.len(), "label", "labels"),
+                    c.correct,
+                    c.of
+                ),
+            }
+        ),
         Task::Pairs(pairs) => format!(
             "{}, {} each, {}, {}",
             counted(
@@ -395,6 +408,12 @@ fn trials(p: &Protocol, part: &Part) -> String {
                 ids.join(", ")
             )
         }
+        Task::Search(own) => format!(
+            "search in the space `{}`, {}, {}; it decides nothing",
+            own.space,
+            counted(own.rule.trials as usize, "pair", "pairs"),
+            search_rule(&own.rule)
+        ),
     }
 }
 

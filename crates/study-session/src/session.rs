@@ -35,6 +35,7 @@ mod phase;
 mod project_view;
 pub mod roster;
 mod saving;
+mod search;
 mod tracks;
 mod trial;
 mod unsaved;
@@ -48,7 +49,7 @@ pub use view::{Screen, View};
 
 use crate::outcome::fold::History;
 use crate::outcome::{Channel, Event, Fidelity, Moment};
-use phase::{DeviceProblem, Phase};
+use phase::{DeviceProblem, Phase, Told};
 use saving::SaveState;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -100,8 +101,10 @@ pub struct Session {
     parts_shown: BTreeSet<PartId>,
     /// Tracks in progress.
     running: Vec<tracks::Running>,
+    /// The last pair of a search, with the answers from which it follows.
+    searching: Option<search::Searching>,
     /// Whether the last answer was correct, until the participant is told.
-    feedback: Option<bool>,
+    feedback: Option<Told>,
     /// Remarks of this process.
     remarks: Vec<String>,
     /// How the inputs are entered.
@@ -155,6 +158,7 @@ impl Session {
             passed: BTreeSet::new(),
             parts_shown: BTreeSet::new(),
             running: Vec::new(),
+            searching: None,
             feedback: None,
             remarks: Vec::new(),
             channel: None,

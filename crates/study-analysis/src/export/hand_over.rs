@@ -292,8 +292,10 @@ fn settings(
             Task::Rating(_) => "rating",
             Task::Magnitude(_) => "magnitude",
             Task::Mushra(_) => "mushra",
+            Task::Identification(_) => "identification",
             Task::Pairs(_) => "pairs",
             Task::Discrimination { .. } => "tracks",
+            Task::Search(_) => "search",
         };
         put(&format!("{kind} {}", part.id), question);
         for session in sessions_of(protocol, part).into_iter().flatten() {
@@ -319,7 +321,16 @@ fn settings(
                     put(&format!("ratios {}", part.id), "true");
                 }
             }
-            Task::Rating(_) | Task::Mushra(_) => {}
+            Task::Identification(own) => {
+                let labels = own.labels.iter().flat_map(|label| {
+                    let models = label.models.iter();
+                    models.map(|model| (model, label.text.as_str()))
+                });
+                for (model, label) in labels {
+                    put(&format!("label {} {model}", part.id), label);
+                }
+            }
+            Task::Rating(_) | Task::Mushra(_) | Task::Search(_) => {}
         }
     }
     for (path, sum) in sums {

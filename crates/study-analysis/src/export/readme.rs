@@ -71,6 +71,16 @@ pub(super) fn methods(job: &Job<'_>) -> String {
                 ),
                 counted(p.presentations.repetitions as usize, "time", "times")
             ),
+            Task::Identification(p) => format!(
+                "{} felt {} and given one of {}",
+                counted(
+                    p.presentations.models.len(),
+                    "realization was",
+                    "realizations were"
+                ),
+                counted(p.presentations.repetitions as usize, "time", "times"),
+                counted(p.labels.len(), "label", "labels")
+            ),
             Task::Pairs(p) => format!(
                 "{} compared {}",
                 counted(
@@ -83,6 +93,11 @@ pub(super) fn methods(job: &Job<'_>) -> String {
             Task::Discrimination { tracks } => format!(
                 "levels were told from a standard on {}",
                 counted(tracks.len(), "track", "tracks")
+            ),
+            Task::Search(own) => format!(
+                "two points of the space {} were compared in {}, chosen from the answers before",
+                own.space,
+                counted(own.rule.trials as usize, "trial", "trials")
             ),
         };
         text += &format!(" Part {}: {task}.", part.id);

@@ -25,6 +25,7 @@ mod power;
 mod questionnaires;
 mod questions;
 mod resolve;
+mod spaces;
 mod tracks;
 
 pub use orders::parse_orders;
@@ -60,7 +61,7 @@ pub const ROOT: &[Key] = keys! {
     /// How a trial goes.
     "trial": Kind::Table(general::TRIAL), "";
     /// The realizations; at least one whose role is not `practice`.
-    "models": Kind::Tables(models::MODELS), "", derived("required, unless every part takes its levels from families");
+    "models": Kind::Tables(models::MODELS), "", derived("required, unless every part takes its levels from families or spaces");
     /// The factors of a factorial design: what is varied within participants. Every combination of
     /// their levels has a realization. Needs the format `study-protocol/3`.
     "factors": Kind::Tables(factors::FACTORS), "";
@@ -70,6 +71,9 @@ pub const ROOT: &[Key] = keys! {
     /// Dimensions of the stimulus: each is a ladder of levels, and each level a table of its
     /// own, certified and hashed before the session. Needs the format `study-protocol/2`.
     "families": Kind::Tables(families::FAMILIES), "";
+    /// Spaces of the parts of kind `search`: several dimensions of the stimulus at once, on a finite lattice whose points are
+    /// certified before the session. Needs the format `study-protocol/3`.
+    "spaces": Kind::Tables(spaces::SPACES), "";
     /// Tracks of the parts of kind `discrimination`. Needs the format `study-protocol/2`.
     "tracks": Kind::Tables(tracks::TRACKS), "";
     /// Groups of participants: each belongs to one for good. Needs the format
@@ -113,10 +117,12 @@ const FORMATS: &[Word] = &[
 const OF_FORMAT_2: [&str; 5] = ["parts", "families", "tracks", "groups", "sessions"];
 
 /// Keys that need [`FORMAT_3`], without the places in lists.
-pub const OF_FORMAT_3: [&str; 7] = [
+pub const OF_FORMAT_3: [&str; 8] = [
     "design.order_version",
     "factors",
+    "spaces",
     "models.levels",
+    "parts.answers",
     "analysis.model",
     "device.commissioned_within_days",
     "tracks.relative",
@@ -189,7 +195,13 @@ pub fn parse(path: &str, text: &str) -> Parsed {
     let read = document.finish();
     findings.faults = read.faults;
     if version.is_some_and(|version| version < 3) {
-        let newer = read.spans.iter().filter(|(place, _)| is_of_format_3(place));
+        // A list is reported once, and not for each of its entries.
+        let is_listed = |place: &str| {
+            let list = place.strip_suffix(']').and_then(|p| p.rsplit_once('['));
+            list.is_some_and(|(list, _)| read.spans.contains_key(list))
+        };
+        let newer =
+            (read.spans.iter()).filter(|(place, _)| is_of_format_3(place) && !is_listed(place));
         (findings.faults).extend(newer.map(|(place, span)| {
             Fault::error(format!("`{place}` needs the format `{FORMAT_3}`"))
                 .at(Some(span.clone()))
@@ -298,6 +310,9 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
         families: (root.sections("families").into_iter())
             .map(families::read)
             .collect(),
+        spaces: (root.sections("spaces").into_iter())
+            .map(spaces::read)
+            .collect(),
         tracks: root
             .sections("tracks")
             .into_iter()
@@ -390,6 +405,7 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
         analysis: analysis?,
         parts: resolved.parts?,
         families: resolved.families?,
+        spaces: resolved.spaces?,
         tracks: resolved.tracks?,
         groups: match groups {
             None => None,

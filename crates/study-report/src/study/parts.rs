@@ -4,7 +4,8 @@ use crate::figures::of_part;
 use crate::html::PartReport;
 use study_analysis::analyze::psychophysics::PartAnalysis;
 use study_base::text::counted;
-use study_plan::procedure::Rule;
+use study_plan::procedure::{Choose, Rule, SearchRule};
+use study_plan::protocol::identification::{Criterion, Feedback};
 use study_plan::protocol::pairs::IntervalOrder;
 use study_plan::protocol::parts::{Compared, Part, Task, TrackRules};
 use study_plan::protocol::{Protocol, Relative};
@@ -50,6 +51,39 @@ fn trials(protocol: &Protocol, part: &Part) -> String {
                 counted(presented.repetitions as usize, "trial", "trials")
             ));
         }
+        Task::Identification(own) => {
+            let presented = &own.presentations;
+            let told = match own.feedback {
+                Feedback::Never => "participants were not told which label was correct",
+                Feedback::Always => {
+                    "participants were told after each trial which label was correct"
+                }
+                Feedback::Practice if presented.practice.is_empty() => {
+                    "participants were not told which label was correct"
+                }
+                Feedback::Practice => {
+                    "participants were told after each practice trial which label was correct"
+                }
+            };
+            text.push(format!(
+                "In each trial one of {} was felt and given one of {}, each in {}; {told}.",
+                counted(presented.models.len(), "realization", "realizations"),
+                counted(own.labels.len(), "label", "labels"),
+                counted(presented.repetitions as usize, "trial", "trials")
+            ));
+            if let Some(Criterion {
+                correct,
+                of,
+                rounds,
+            }) = own.criterion
+            {
+                let most = presented.practice.len() * rounds as usize;
+                text.push(format!(
+                    "Practice went on until {correct} of the last {of} answers were correct, for {} at most.",
+                    counted(most, "trial", "trials")
+                ));
+            }
+        }
         Task::Pairs(pairs) => {
             let order = match pairs.interval_order {
                 IntervalOrder::Balanced => "each pair in both orders in turn",
@@ -71,6 +105,13 @@ fn trials(protocol: &Protocol, part: &Part) -> String {
             let tracks = tracks.iter().filter_map(|id| protocol.track(id));
             text.extend(tracks.map(|track| track_in_words(protocol, track)));
         }
+        Task::Search(own) => text.push(format!(
+            "In each of {} two points of the space {} were felt one after the other and one was chosen; the pairs were {}. \
+             Which of the two came first was drawn for each trial.",
+            counted(own.rule.trials as usize, "trial", "trials"),
+            own.space,
+            search_rule(&own.rule)
+        )),
     }
     let exposure = &part.exposure;
     let mut felt = match part.gap_s > 0.0 {
@@ -95,6 +136,18 @@ fn trials(protocol: &Protocol, part: &Part) -> String {
     };
     text.push(felt.trim_start().to_owned());
     text.join(" ")
+}
+
+/// How the pairs of a search are chosen.
+pub fn search_rule(rule: &SearchRule) -> String {
+    match rule.choose {
+        Choose::PreferenceGp { start } => format!(
+            "the first {start} of a Sobol sequence, then those with the largest expected utility of the better point by a \
+             Gaussian process of the participant's answers (EUBO)"
+        ),
+        Choose::Sobol => "those of a Sobol sequence".to_owned(),
+        Choose::Random => "drawn at random".to_owned(),
+    }
 }
 
 /// What a track compares, and by which rule.

@@ -1,9 +1,10 @@
 //! What the ids in parts and tracks stand for; every unknown one is reported.
 
 use super::agree::{Sections, at, unknown};
-use super::parts::RawPairs;
+use super::parts::{RawLabel, RawPairs};
+use super::spaces::PartialSpace;
 use crate::protocol::pairs::neighbors;
-use crate::protocol::{DeviceKind, FamilyRules, Presentations, Role};
+use crate::protocol::{Criterion, DeviceKind, FamilyRules, Label, Presentations, Role};
 use study_base::diagnostic::Fault;
 use study_base::diagnostic::table::Document;
 use study_base::text::{ModelId, PartId, QuestionId};
@@ -66,6 +67,30 @@ impl Looked<'_> {
             self.fault(path, "family", unknown("family", id.as_str(), known));
         }
         found
+    }
+
+    /// Reports a space that there is not. Samples mounted by hand have none.
+    pub(super) fn space(&self, id: &PartId, spaces: &[PartialSpace], path: &str) {
+        let device = self.sections.device;
+        if device.is_some_and(|d| d.kind == DeviceKind::Manual) {
+            let fault = Fault::error("samples mounted by hand are no points of a space");
+            let hint = "a part of kind \"pairs\" compares samples";
+            self.fault(path, "space", fault.hint(hint));
+        }
+        // One with a fault of its own may be the one that is meant.
+        if spaces.iter().any(|space| space.space.is_none()) {
+            return;
+        }
+        let known = || {
+            spaces
+                .iter()
+                .filter_map(|s| s.space.as_ref())
+                .map(|s| &s.id)
+        };
+        if !known().any(|known| known == id) {
+            let known = known().map(PartId::as_str);
+            self.fault(path, "space", unknown("space", id.as_str(), known));
+        }
     }
 
     /// The realizations of some levels of a family, or of all.
@@ -143,6 +168,67 @@ impl Looked<'_> {
     pub(super) fn practice(&self, raw: &Presentations, path: &str) {
         for (i, id) in raw.practice.iter().enumerate() {
             self.model(id, &format!("{path}.practice[{i}]"));
+        }
+    }
+
+    /// The labels with their realizations. Realizations that do not exist, those with two labels,
+    /// and practice trials with realizations that have none are reported.
+    pub(super) fn labels(
+        &self,
+        raw: &[RawLabel],
+        family: Option<&FamilyRules>,
+        practice: &[ModelId],
+        path: &str,
+    ) -> Option<Vec<Label>> {
+        let mut labels: Vec<Label> = Vec::new();
+        let is_labeled =
+            |labels: &[Label], id: &ModelId| labels.iter().any(|l| l.models.contains(id));
+        for (i, raw) in raw.iter().enumerate() {
+            let path = format!("{path}.answers[{i}]");
+            let levels = match (family, &raw.levels) {
+                (Some(family), Some(levels)) => self.levels(family, Some(levels), &path)?,
+                _ => Vec::new(),
+            };
+            for (j, id) in raw.models.iter().enumerate() {
+                self.model(id, &format!("{path}.models[{j}]"));
+            }
+            let models: Vec<ModelId> = raw.models.iter().cloned().chain(levels).collect();
+            for (j, id) in models.iter().enumerate() {
+                if models[..j].contains(id) || is_labeled(&labels, id) {
+                    let fault = Fault::error(format!("`{id}` is there twice"));
+                    self.fault_at(&path, fault);
+                }
+            }
+            let text = raw.text.clone();
+            labels.push(Label { text, models });
+        }
+        for (i, id) in practice.iter().enumerate() {
+            let place = format!("{path}.practice[{i}]");
+            if !is_labeled(&labels, id) && self.model(id, &place) {
+                let fault = Fault::error(format!("`{id}` has no label"));
+                self.fault_at(&place, fault.hint("its practice trial has no right answer"));
+            }
+        }
+        Some(labels)
+    }
+
+    /// Reports a criterion over more answers than practice has.
+    pub(super) fn reachable(
+        &self,
+        criterion: Option<&Criterion>,
+        practice: &[ModelId],
+        path: &str,
+    ) {
+        let Some(Criterion { of, rounds, .. }) = criterion else {
+            return;
+        };
+        let trials = practice.len() * *rounds as usize;
+        if !practice.is_empty() && (*of as usize) > trials {
+            let what = format!(
+                "`{path}.criterion` is never reached: practice has {trials} trials at most"
+            );
+            let fault = Fault::error(what).hint("raise rounds, or lower of");
+            self.fault(path, "criterion", fault);
         }
     }
 
