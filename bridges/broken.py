@@ -478,7 +478,7 @@ def checked(study: str, name: str) -> "Tuple[str, List[str]]":
 
 
 def table(study: str, names: List[str]) -> int:
-    with ThreadPoolExecutor(10) as pool:
+    with ThreadPoolExecutor(6) as pool:
         found = list(pool.map(lambda name: checked(study, name), names))
     print("| name | what is wrong | check | what it says |\n|---|---|---|---|")
     for name, (verdict, seen) in zip(names, found):
