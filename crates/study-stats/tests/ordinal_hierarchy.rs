@@ -137,15 +137,15 @@ fn compare(name: &str, data: &Data, effort: OrdinalEffort) {
     );
 }
 
-/// A few draws of a small set, so that the ordinary tests see the model.
+/// Many draws of a small set, so that the ordinary tests see the model.
 #[test]
 fn a_small_posterior_is_that_of_nuts() {
-    let few = OrdinalEffort {
+    let many = OrdinalEffort {
         chains: 4,
-        warmup: 200,
-        draws: 400,
+        warmup: 500,
+        draws: 20_000,
     };
-    compare("few", &read(DATA[3].1), few);
+    compare("few", &read(DATA[3].1), many);
 }
 
 #[test]
