@@ -45,6 +45,7 @@ pub(crate) fn values(text: &str) -> Result<Map<String, Json>, Error> {
         "pairs_edge" => cases(input)?,
         "magnitude" => vec![(String::new(), magnitude(input)?)],
         "mushra" => vec![(String::new(), mushra(input)?)],
+        "identification" => vec![(String::new(), identification(input)?)],
         other => return Err(Error::Unknown("the kind", other.to_owned())),
     };
     let mut printed = Map::new();
@@ -487,6 +488,27 @@ fn magnitude(input: &Settings) -> Result<Values, Error> {
         })
         .collect::<Result<Vec<_>, Error>>()?;
     Ok(named("magnitude", &analysis::magnitude(&rows)))
+}
+
+fn identification(input: &Settings) -> Result<Values, Error> {
+    let labels: Vec<String> = input.get("labels", "list")?;
+    let rows = (input.rows()?.iter())
+        .map(|row| {
+            let place = |column: &str| {
+                let label = row.name(column);
+                let place = label.and_then(|label| labels.iter().position(|l| *l == label));
+                place.ok_or_else(|| Error::Key(column.to_owned(), "label"))
+            };
+            Ok(analysis::LabelRow {
+                participant: row.name("participant").unwrap_or_default(),
+                realization: row.name("realization"),
+                right: place("target")?,
+                given: place("answer")?,
+            })
+        })
+        .collect::<Result<Vec<_>, Error>>()?;
+    let found = analysis::identification(&rows, &labels).0;
+    Ok(named("identification", &found))
 }
 
 fn mushra(input: &Settings) -> Result<Values, Error> {

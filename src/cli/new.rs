@@ -84,6 +84,8 @@ enum TrialKind {
     Magnitude,
     /// Ratings from 0 to 100 beside a reference
     Mushra,
+    /// One of several labels for each realization
+    Identification,
     /// Yes or no, with catch trials
     #[value(name = "yesno")]
     YesNo,
@@ -103,6 +105,7 @@ impl TrialKind {
             Self::QuestPlus => (include_str!("new/questplus.toml"), &[STATIC]),
             Self::Magnitude => (include_str!("new/magnitude.toml"), &[STATIC]),
             Self::Mushra => (include_str!("new/mushra.toml"), &WITH_ANCHORS),
+            Self::Identification => (include_str!("new/identification.toml"), &CROSSED),
             Self::YesNo => (include_str!("new/yesno.toml"), &[STATIC]),
             Self::Abx => (include_str!("new/abx.toml"), &[MODELS[0], MODELS[2]]),
         }

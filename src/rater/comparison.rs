@@ -1,5 +1,5 @@
-//! Raters who compare intervals, pairs and tracks, who estimate magnitudes, and who rate
-//! beside a reference.
+//! Raters who compare intervals, pairs and tracks, who estimate magnitudes, who rate
+//! beside a reference, and who say which label a realization has.
 //!
 //! Each interval is felt with normal noise of the rater's own, and the rater decides as an
 //! observer without memory would: the largest, the odd one, the nearer one, a distance
@@ -12,7 +12,9 @@ use study_base::perception::FORCE_JND_N;
 use study_base::rng::Stream;
 use study_base::text::{ModelId, PartId};
 use study_haptics::model::Realization;
-use study_plan::protocol::{Answer, Method, Protocol, Question, Role, Stimuli, Task, Trial};
+use study_plan::protocol::{
+    Answer, Identification, Label, Method, Protocol, Question, Role, Stimuli, Task, Trial,
+};
 
 /// Median standard deviation of the noise of an interval of a track, N: the just
 /// noticeable difference of a force.
@@ -31,6 +33,10 @@ const ESTIMATE_NOISE: f64 = 0.2;
 /// has fallen to 37, N.
 const CLOSE_N: (f64, f64) = (0.2, 1.5);
 
+/// Difference of force at which the similarity of two realizations has fallen to 37 %, N: how
+/// easily labels are confused. What is named from memory differs by several just noticeable differences.
+const CONFUSED_N: f64 = 10.0 * FORCE_JND_N;
+
 /// What raters feel of the realizations of a study.
 #[derive(Debug, Default)]
 pub struct Percepts {
@@ -42,6 +48,9 @@ pub struct Percepts {
     distances: BTreeMap<(PartId, ModelId), f64>,
     /// Of each realization of a part with a reference its distance from it, N.
     from_reference: BTreeMap<(PartId, ModelId), f64>,
+    /// Of two realizations with labels the distance between them, N; the one that sorts first comes
+    /// first.
+    between: BTreeMap<(ModelId, ModelId), f64>,
 }
 
 impl Percepts {
@@ -59,6 +68,7 @@ impl Percepts {
                 .collect(),
             distances: BTreeMap::new(),
             from_reference: BTreeMap::new(),
+            between: between(protocol, tables, &reference),
         };
         for part in &protocol.parts {
             let Task::Mushra(own) = &part.task else {
@@ -111,10 +121,42 @@ impl Percepts {
         self.target.as_ref()
     }
 
+    /// How far apart two realizations with labels are, N.
+    fn between_n(&self, a: &ModelId, b: &ModelId) -> Option<f64> {
+        if a == b {
+            return Some(0.0);
+        }
+        self.between
+            .get(&(a.min(b).clone(), a.max(b).clone()))
+            .copied()
+    }
+
     /// The impression of a realization.
     pub fn impression(&self, model: &ModelId) -> Option<&Impression> {
         self.impressions.get(model)
     }
+}
+
+/// The distances of the realizations of each part of identification.
+fn between(
+    protocol: &Protocol,
+    tables: &BTreeMap<ModelId, Realization>,
+    reference: &Reference,
+) -> BTreeMap<(ModelId, ModelId), f64> {
+    let mut between = BTreeMap::new();
+    for own in (protocol.parts.iter()).filter_map(|part| part.task.identification()) {
+        let mut models: Vec<&ModelId> = own.labels.iter().flat_map(|l| &l.models).collect();
+        models.sort_unstable();
+        for (i, first) in models.iter().enumerate() {
+            for second in &models[i + 1..] {
+                if let (Some(a), Some(b)) = (tables.get(*first), tables.get(*second)) {
+                    let distance = Impression::distance_n(a, b, reference);
+                    between.insert(((*first).clone(), (*second).clone()), distance);
+                }
+            }
+        }
+    }
+    between
 }
 
 /// Of a study whose realizations were not identified from switch B, the one with the highest
@@ -172,6 +214,30 @@ impl Comparing {
         Answer::Number((estimate / digit).round() * digit)
     }
 
+    /// One of the labels: each as probable as its realizations are similar to the one that is felt
+    /// (Shepard 1957, Luce 1963). `distance_n`: how far each of them is from it.
+    fn name(&mut self, own: &Identification, distance_n: impl Fn(&ModelId) -> f64) -> Answer {
+        let lapses = self.stream.unit() < self.lapse_rate;
+        let falls_n = CONFUSED_N * self.noise;
+        let weight = |label: &Label| -> f64 {
+            let models = label.models.iter();
+            let similar = |model| libm::exp(-distance_n(model) / falls_n);
+            if lapses {
+                1.0
+            } else {
+                models.map(similar).sum()
+            }
+        };
+        let weights: Vec<f64> = own.labels.iter().map(weight).collect();
+        let mut left = self.stream.unit() * weights.iter().sum::<f64>();
+        let chosen = weights.iter().position(|weight| {
+            left -= weight;
+            left < 0.0
+        });
+        let label = chosen.map_or(own.labels.last(), |at| own.labels.get(at));
+        Answer::Choice(label.map(|l| l.text.clone()).into_iter().collect())
+    }
+
     /// A rating from 0 to 100 for a distance from the reference, N.
     fn beside_reference(&mut self, distance_n: f64) -> Answer {
         let felt = (distance_n + 0.5 * NOISE_N * self.noise * self.stream.normal()).abs();
@@ -215,6 +281,13 @@ impl Rater {
                     self.comparing
                         .beside_reference(distance.copied().unwrap_or(0.0)),
                 );
+            }
+            (Some(Task::Identification(own)), Some(model)) => {
+                let distance_n = |other: &ModelId| {
+                    let distance = percepts.between_n(model, other).filter(|_| known);
+                    distance.unwrap_or(0.0)
+                };
+                return Some(self.comparing.name(own, distance_n));
             }
             _ => {}
         }
@@ -305,6 +378,44 @@ mod tests {
             means[0] > 80.0 && means.is_sorted_by(|a, b| a > b),
             "{means:?}"
         );
+    }
+
+    /// The closer a realization is to another, the more often it gets its label.
+    #[test]
+    fn labels_are_confused_as_their_realizations_are_similar() {
+        use study_plan::protocol::{Feedback, Order, Presentations};
+        let id = |name: &str| ModelId::new(name).unwrap();
+        let label = |text: &str, models: &[&str]| Label {
+            text: text.to_owned(),
+            models: models.iter().map(|m| id(m)).collect(),
+        };
+        let own = Identification {
+            labels: vec![label("near", &["a", "b"]), label("far", &["c"])],
+            feedback: Feedback::Never,
+            criterion: None,
+            presentations: Presentations {
+                models: Vec::new(),
+                order: Order::Blocked,
+                repetitions: 1,
+                max_run: None,
+                min_distance: None,
+                practice: Vec::new(),
+            },
+        };
+        let share = |far_n: f64| {
+            let right = |number: &u32| {
+                let distance_n = |m: &ModelId| if *m == id("c") { far_n } else { 0.0 };
+                let answer = Comparing::new(3, *number).name(&own, distance_n);
+                answer == Answer::Choice(vec!["near".to_owned()])
+            };
+            (1..=600).filter(right).count() as f64 / 600.0
+        };
+        // 2/(2 + e^−d), where d is the distance over that of confusion; one in fifty lapses.
+        let expected = |far: f64| 0.98 * 2.0 / (2.0 + libm::exp(-far)) + 0.02 * 0.5;
+        for far in [0.0, 1.0, 3.0] {
+            let (found, expected) = (share(far * CONFUSED_N), expected(far));
+            assert!((found - expected).abs() < 0.06, "{far}: {found} {expected}");
+        }
     }
 
     #[test]

@@ -201,7 +201,7 @@ fn statistics(all: Vec<Declared>) -> Vec<(String, &'static str, bool)> {
 }
 
 /// What stands for names of the data.
-const NAMES: [&str; 13] = [
+const NAMES: [&str; 16] = [
     "M",
     "R",
     "D",
@@ -210,6 +210,9 @@ const NAMES: [&str; 13] = [
     "SITE",
     "PARTICIPANT",
     "CONDITION",
+    "LABEL",
+    "RIGHT",
+    "GIVEN",
     "GROUP",
     "PARAMETER",
     "ITEM",

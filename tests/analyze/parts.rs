@@ -396,6 +396,97 @@ fn ratings_beside_a_reference_are_screened_and_rated_as_their_table() {
     assert!(out.contains("mushra, 30 trials"), "{out}");
 }
 
+/// A rehearsed identification study has the statistics of its table, and what its confusions say.
+#[test]
+fn labels_of_a_study_are_confused_as_in_their_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let part = rehearsed(folder.path(), "identification");
+    let results = folder.path().join("out/identification");
+    let protocol = fs::read_to_string(folder.path().join("identification/protocol.toml")).unwrap();
+    let columns = ["participant", "model", "which", "correct", "practice"];
+    let rows = cells(&results.join("ratings.csv"), &columns);
+    // Two participants, four realizations, six repetitions; and practice, until a criterion is reached.
+    let practice = rows.iter().filter(|row| row[4] == "true").count();
+    assert_eq!(rows.len(), 2 * 4 * 6 + practice);
+    assert!((2 * 8..=2 * 6 * 4).contains(&practice), "{practice}");
+    let label = |model: &str| {
+        let line = protocol
+            .lines()
+            .find(|l| l.contains(&format!("models = [\"{model}\"]")));
+        line.unwrap().split('"').nth(1).unwrap().to_owned()
+    };
+    let mut table = "participant,realization,target,answer\n".to_owned();
+    for row in rows.iter().filter(|row| row[4] == "false") {
+        let right = label(&row[1]);
+        assert_eq!(row[3] == "true", row[2] == right, "{row:?}");
+        table += &format!("{},{},{right},{}\n", row[0], row[1], row[2]);
+    }
+    assert_eq!(
+        (&part["task"], &part["trials"]),
+        (&"identification".into(), &48.into())
+    );
+    let mut values = part["values"].clone();
+    let mut of_table = of_table(folder.path(), &table, &["identification"]);
+    // The labels of a table are in alphabetical order.
+    for values in [&mut values, &mut of_table] {
+        let values = values.as_object_mut().unwrap();
+        values.retain(|id, _| !id.ends_with("/place"));
+        assert!(values.len() > 80, "{}", values.len());
+    }
+    for (id, value) in values.as_object().unwrap() {
+        let (a, b) = (value.as_f64(), of_table[id].as_f64());
+        let close = a
+            .zip(b)
+            .is_none_or(|(a, b)| (a - b).abs() <= 1e-9 * b.abs().max(1.0));
+        assert!(
+            a.is_some() == b.is_some() && close,
+            "{id}: {value} {}",
+            of_table[id]
+        );
+    }
+    let tables = [
+        "part_confusions.csv",
+        "part_label_pairs.csv",
+        "part_recall.csv",
+        "part_identification.csv",
+    ];
+    let report = report(folder.path(), "identification", &["confusions"], &tables);
+    assert!(report.contains("Are the labels given more often than by guessing?"));
+    let analysis = results.join("analysis");
+    // The matrix of everybody in the figure is that of the table, and the sum of the participants'.
+    let drawn = cells(
+        &analysis.join("figures/part-1-confusions.csv"),
+        &["participant", "right", "given", "n"],
+    );
+    let count = |who: &str, right: &str, given: &str| -> f64 {
+        let row = drawn
+            .iter()
+            .find(|r| r[0] == who && r[1] == right && r[2] == given);
+        row.unwrap()[3].parse().unwrap()
+    };
+    let matrix = cells(
+        &analysis.join("part_confusions.csv"),
+        &["label", "given_1", "given_2", "given_3", "given_4"],
+    );
+    let mut correct = 0.0;
+    for (i, right) in matrix.iter().enumerate() {
+        for (j, given) in matrix.iter().enumerate() {
+            let (right, given, n) = (&right[0], &given[0], &right[j + 1]);
+            let own = count("SIM001", right, given) + count("SIM002", right, given);
+            assert_eq!(n.parse::<f64>().unwrap(), own);
+            assert_eq!(count("", right, given), own);
+            correct += if i == j { own } else { 0.0 };
+        }
+    }
+    let share = part["values"]["identification/correct"].as_f64().unwrap();
+    assert!(
+        (correct / 48.0 - share).abs() < 1e-12 && (0.4..0.95).contains(&share),
+        "{share}"
+    );
+    let (code, out, err) = study(&["verify", "out"], folder.path());
+    assert_eq!(code, 0, "{out}{err}");
+}
+
 /// The other kinds, with few trials, rehearse, pass `verify` and have an analysis.
 #[test]
 fn yes_no_and_abx_are_rehearsed_and_analyzed() {

@@ -433,6 +433,51 @@ fn preferences_magnitudes_and_ratings_have_their_tables() {
     );
 }
 
+#[test]
+fn identification_has_its_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = golden("identification_sim");
+    let table = csv("participant,realization,target,answer", &file, joined);
+    let found = values(&mut analyze(
+        folder.path(),
+        &table,
+        &["--task", "identification", "--json"],
+    ));
+    for id in [
+        "information/corrected",
+        "above_guessing/p",
+        "pair/buzz|soft%2Flong/similarity",
+        "realization/m4/correct_ci95_lo",
+    ] {
+        close(&found, &file, &format!("identification/{id}"));
+    }
+    let page = text(&mut analyze(
+        folder.path(),
+        &table,
+        &["--task", "identification"],
+    ));
+    assert!(
+        page.contains("soft/long") && page.contains("Information transfer: 0.60 bits"),
+        "{page}"
+    );
+    let answered = table.replace("target,answer", "target,response");
+    let again = values(&mut analyze(
+        folder.path(),
+        &answered,
+        &["--task", "identification", "--json"],
+    ));
+    assert_eq!(again, found);
+    let empty = "participant,target,answer\nP1,a,\n";
+    let done = analyze(folder.path(), empty, &["--task", "identification"])
+        .assert()
+        .code(1);
+    let said = String::from_utf8(done.get_output().stderr.clone()).unwrap();
+    assert!(
+        said.contains("t.csv:2: answer is ``, expected a label"),
+        "{said}"
+    );
+}
+
 /// What cannot be estimated is named with its reason, and the command succeeds.
 #[test]
 fn what_is_undefined_says_why() {

@@ -256,6 +256,15 @@ fn tracks_and_estimates_are_declared() {
             "magnitude",
             &["magnitude estimation of ", "Power was not computed:"],
         ),
+        (
+            "identification",
+            &[
+                "identification of 4 realizations, 6 trials each, order shuffled, each is given one of 4 labels, after practice until 7 of the last 8 answers are correct",
+                "Part `which`: Are the labels given more often than by guessing? Decided by: t test over participants",
+                "Do the sessions differ? Decided by: linear mixed model",
+                "Power was not computed:",
+            ],
+        ),
     ] {
         let folder = tempfile::tempdir().unwrap();
         let at = folder.path();

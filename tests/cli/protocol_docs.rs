@@ -54,6 +54,7 @@ fn page() -> String {
                 let _ = writeln!(out, "\n## `[[{}]]`\n\n{}", key.name, key.effect);
                 alternatives(&mut out, variants);
                 nested(&mut out, key.name, variants.common);
+                below(&mut out, key.name, variants);
             }
             _ => panic!("{}", key.name),
         }
@@ -97,19 +98,23 @@ fn nested(out: &mut String, path: &str, keys: &[Key]) {
             Kind::Variant(variants) => {
                 let _ = writeln!(out, "\n### `{path}`");
                 alternatives(out, variants);
-                let shapes = variants.shapes.iter();
-                let mut seen: Vec<&str> = Vec::new();
-                for key in shapes.flat_map(|shape| shape.keys) {
-                    let own = std::slice::from_ref(key);
-                    if !seen.contains(&key.name) {
-                        seen.push(key.name);
-                        words(out, own);
-                        nested(out, &path, own);
-                    }
-                }
+                below(out, &path, variants);
             }
             Kind::Tables(keys) => table(out, &format!("`[[{path}]]`"), "", keys),
             _ => {}
+        }
+    }
+}
+
+/// The words and the tables of the keys of alternatives, each once.
+fn below(out: &mut String, path: &str, variants: &Variants) {
+    let mut seen: Vec<&str> = Vec::new();
+    for key in variants.shapes.iter().flat_map(|shape| shape.keys) {
+        let own = std::slice::from_ref(key);
+        if !seen.contains(&key.name) {
+            seen.push(key.name);
+            words(out, own);
+            nested(out, path, own);
         }
     }
 }

@@ -241,6 +241,7 @@ fn the_templates_of_parts_are_valid_and_broken_ones_are_not() {
         "questplus",
         "magnitude",
         "mushra",
+        "identification",
         "yesno",
         "abx",
         "protocols/cloth/protocol.toml",

@@ -172,6 +172,7 @@ fn studies(home: &Path) -> Vec<(PathBuf, &'static [&'static str])> {
         several("abx", 6),
         several("magnitude", 6),
         several("mushra", 6),
+        several("identification", 6),
     ]
 }
 

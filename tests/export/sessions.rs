@@ -209,6 +209,16 @@ fn the_headline_of_groups_and_sessions_is_that_of_the_analysis() {
             "",
             &["magnitude/exponent", "magnitude/log10_coefficient"],
         ),
+        (
+            "identification",
+            "",
+            &[
+                "identification/information/corrected",
+                "identification/above_guessing/p",
+                "identification/pair/heavy and crisp|heavy and soft/similarity",
+                "sessions/p",
+            ],
+        ),
     ] {
         let home = tempfile::tempdir().unwrap();
         let folder = match kind {

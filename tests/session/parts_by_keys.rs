@@ -566,3 +566,61 @@ repetitions = 2
     );
     assert!(part["values"]["magnitude/exponent"].as_f64().unwrap() > 0.3);
 }
+
+/// Five labels by the keys of their places; after each trial the right one is told.
+#[test]
+fn identification_by_keys() {
+    let folder = tempfile::tempdir().unwrap();
+    let label = |name: &str| format!("{{ label = \"lever {name}\", models = [\"l{name}\"] }}");
+    let labels = ["9991", "9993", "9995", "9997", "9999"]
+        .map(label)
+        .join(", ");
+    let part = format!(
+        r#"{}[[parts]]
+id = "answer"
+kind = "identification"
+prompt = "{PROMPT}"
+answers = [{labels}]
+repetitions = 1
+practice = ["l9991"]
+feedback = "always"
+"#,
+        models()
+    );
+    written(folder.path(), &part);
+    let file = folder.path().join("p/protocol.toml");
+    let text = fs::read_to_string(&file).unwrap();
+    fs::write(&file, text.replace("study-protocol/2", "study-protocol/3")).unwrap();
+    // Every lever is taken for the one after it, but the last one is known.
+    let next = |attempt: &Json| {
+        let places = ["l9991", "l9993", "l9995", "l9997", "l9999"];
+        let felt = attempt["model"].as_str().unwrap();
+        let place = places.iter().position(|p| *p == felt).unwrap() + 1;
+        ((place + 1).min(5).to_string(), place.to_string())
+    };
+    let rows = eventful(folder.path(), next);
+    assert_eq!(rows.len(), 1 + 5);
+    let arguments = ["analyze", "results", "--include", "pilot", "--json"];
+    let (_, out, _) = study(&arguments, folder.path());
+    let document: Json = serde_json::from_str(&out).unwrap();
+    let part = &document["parts"][0];
+    assert_eq!(
+        (&part["task"], &part["trials"]),
+        (&"identification".into(), &5.into())
+    );
+    let values = &part["values"];
+    let count = |right: &str, given: &str| {
+        let id = format!("identification/confusion/lever {right}/lever {given}");
+        values[id].as_f64().unwrap()
+    };
+    assert_eq!(count("9999", "9999"), 1.0);
+    // One of the others was corrected, if it was no practice.
+    let right = values["identification/correct"].as_f64().unwrap();
+    assert!(right == 0.2 || right == 0.4, "{right}");
+    let verdict = &part["findings"][0];
+    assert_eq!(verdict["question"], "identified");
+    assert_eq!(
+        verdict["undefined_because"],
+        "there are fewer than two participants"
+    );
+}

@@ -70,6 +70,9 @@ impl Kind {
             Self::Task(TableKind::Pairs) => &["participant", "first", "second", "answer"],
             Self::Task(TableKind::Magnitude) => &["participant", "level", "estimate"],
             Self::Task(TableKind::Mushra) => &["participant", "condition", "role", "rating"],
+            Self::Task(TableKind::Identification) => {
+                &["participant", "realization", "target", "answer"]
+            }
         }
     }
 
@@ -78,6 +81,7 @@ impl Kind {
         match self {
             Self::Ratings => &["subject", "model", "rating"],
             Self::Task(TableKind::Trials(_)) => &["participant"],
+            Self::Task(TableKind::Identification) => &["participant", "target", "answer"],
             Self::Task(_) => self.columns(),
         }
     }
@@ -87,7 +91,7 @@ impl Kind {
         match self {
             Self::Ratings => &["rating"],
             Self::Task(TableKind::Trials(_)) => &["answer", "correct", "positive"],
-            Self::Task(TableKind::Pairs) => &["answer"],
+            Self::Task(TableKind::Pairs | TableKind::Identification) => &["answer"],
             Self::Task(TableKind::Magnitude) => &["estimate"],
             Self::Task(TableKind::Mushra) => &["rating"],
         }

@@ -18,6 +18,7 @@ pub mod factors;
 pub mod file;
 pub mod fingerprint;
 pub mod groups;
+pub mod identification;
 pub mod keys;
 pub mod kinds;
 pub mod pairs;
@@ -37,6 +38,7 @@ pub use answer::{Answer, Given, Refusal};
 pub use control::{Control, Pick};
 pub use factors::{Crossing, Factor};
 pub use groups::{Assign, Assigned, GroupRules, Groups, SessionPlan};
+pub use identification::{Criterion, Feedback, Identification, Label};
 pub use kinds::QuestionKind;
 pub use pairs::{IntervalOrder, Pairs};
 pub use parts::{

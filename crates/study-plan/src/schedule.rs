@@ -29,10 +29,11 @@ mod tracks;
 pub use crate::protocol::{Seat, Trial};
 pub use requeue::{Felt, Requeued, breaks_constraint, requeue};
 
-use crate::protocol::{FileOrders, Mushra, PartsOrder, Protocol, Stimuli, Task};
+use crate::protocol::{FileOrders, Identification, Mushra, PartsOrder, Protocol, Stimuli, Task};
 use constraints::Violation;
 use pairs::PairOrders;
 use sequence::Sequence;
+use study_base::rng::Stream;
 use study_base::text::{ModelId, PartId};
 use tracks::TrackOrders;
 
@@ -228,6 +229,9 @@ pub struct Planner {
 struct PartOrders {
     part: Option<PartId>,
     practice: Vec<ModelId>,
+    /// How often practice comes at most, in orders that are drawn; `None`: once, as listed.
+    rounds: Option<u32>,
+    seed: u64,
     /// Felt before each realization.
     reference: Option<ModelId>,
     kind: Kind,
@@ -264,6 +268,8 @@ impl Planner {
             let only = PartOrders {
                 part: None,
                 practice: protocol.design.practice.clone(),
+                rounds: None,
+                seed,
                 reference: None,
                 kind: Kind::Rating(Sequence::of_models(
                     seed,
@@ -286,6 +292,9 @@ impl Planner {
                 | Task::Magnitude(own)
                 | Task::Mushra(Mushra {
                     presentations: own, ..
+                })
+                | Task::Identification(Identification {
+                    presentations: own, ..
                 }) => Kind::Rating(Sequence::of_models(
                     seed,
                     id,
@@ -301,6 +310,8 @@ impl Planner {
             Ok(PartOrders {
                 part: id.cloned(),
                 practice: design.practice,
+                rounds: (part.task.identification()).and_then(|own| Some(own.criterion?.rounds)),
+                seed,
                 reference: part.task.reference().cloned(),
                 kind,
             })
@@ -385,7 +396,7 @@ impl PartOrders {
         let mut number = u32::try_from(trials.len()).unwrap_or(u32::MAX);
         let block = last(|t| t.block, false);
         let (practiced, position) = (last(|t| t.position, true), last(|t| t.position, false));
-        for (place, model) in (1..).zip(&self.practice) {
+        for (place, model) in (1..).zip(&self.practiced(seat)) {
             number += 1;
             trials.push(Trial {
                 trial: number,
@@ -410,6 +421,31 @@ impl PartOrders {
             });
         }
         Ok(())
+    }
+}
+
+impl PartOrders {
+    /// The realizations of the practice trials, in their order for a seat.
+    fn practiced(&self, seat: Seat) -> Vec<ModelId> {
+        let (Some(rounds), Some(part)) = (self.rounds, &self.part) else {
+            return self.practice.clone();
+        };
+        let number = seat.number().to_string();
+        let path = [
+            "schedule",
+            "part",
+            part.as_str(),
+            "practice",
+            seat.stream(),
+            &number,
+        ];
+        let mut stream = Stream::new(self.seed, &path);
+        let round = |_| {
+            let mut models = self.practice.clone();
+            stream.shuffle(&mut models);
+            models
+        };
+        (0..rounds).flat_map(round).collect()
     }
 }
 

@@ -7,6 +7,7 @@
 
 mod counts;
 mod factors;
+mod identification;
 mod means;
 mod pairs;
 mod parts;

@@ -3,6 +3,7 @@
 
 use super::answers::Answer;
 use super::{apa, sentences, wording};
+use study_analysis::analyze::psychophysics::results::LabelPair;
 use study_analysis::analyze::psychophysics::{LevelData, PartAnalysis, PartFinding, PartQuestion};
 use study_analysis::analyze::results::{Interval, Number as _, Stat};
 use study_analysis::analyze::{Pair, Verdict};
@@ -34,6 +35,10 @@ fn answer(part: &PartAnalysis, f: &PartFinding) -> Option<Answer> {
     let words = wording::of_part(part, f);
     let mut answer = Answer::new(&words.ask(), words.answer()?);
     answer.main = f.caveats.iter().map(sentences::caveat).collect();
+    if f.question == PartQuestion::Identified {
+        answer.main.extend(information(part));
+        answer.main.extend(most_confused(part));
+    }
     if f.question == PartQuestion::Sessions {
         answer.main.extend(retest(part));
     }
@@ -105,6 +110,7 @@ pub(super) fn results(part: &PartAnalysis) -> String {
     text.extend(webers_law(part));
     text.extend(scores(part));
     text.extend(exponent(part));
+    text.extend(information(part));
     let tested = part.findings.iter().filter(|f| f.test.is_some());
     text.extend(tested.filter_map(|f| wording::of_part(part, f).paper()));
     text.extend(retest(part));
@@ -177,6 +183,38 @@ fn webers_law(part: &PartAnalysis) -> Option<String> {
         apa::two(law.exponent.number()?),
         ci(law.exponent_ci95.ends(), apa::two),
         law.n.number()?
+    ))
+}
+
+/// Information transfer over all participants.
+fn information(part: &PartAnalysis) -> Option<String> {
+    let found = part.results.over.identification.as_ref()?;
+    let bits = &found.information;
+    Some(format!(
+        "Information transfer: {} bits of {}{}, as much as {} labels that are identified without an error.",
+        apa::two(bits.corrected.number()?),
+        apa::two(bits.stimulus.number()?),
+        ci(bits.corrected_ci95.ends(), apa::two),
+        apa::one(bits.items.number()?),
+    ))
+}
+
+/// The two labels that are most alike.
+fn most_confused(part: &PartAnalysis) -> Option<String> {
+    let found = part.results.over.identification.as_ref()?;
+    let alike = |pair: &LabelPair| pair.similarity.number();
+    let pairs = found.pairs.iter().filter(|(_, pair)| alike(pair).is_some());
+    let (names, pair) = pairs.max_by(|a, b| {
+        alike(a.1)
+            .unwrap_or(0.0)
+            .total_cmp(&alike(b.1).unwrap_or(0.0))
+    })?;
+    let [first, second] = names.names();
+    Some(format!(
+        "Most alike: “{first}” and “{second}” (similarity {}{}, d′ = {}).",
+        apa::two(alike(pair)?),
+        ci(pair.similarity_ci95.ends(), apa::two),
+        apa::two(pair.d.number()?),
     ))
 }
 
@@ -289,6 +327,15 @@ pub(super) fn methods(part: &PartAnalysis) -> String {
     }
     if let Some((_, how)) = questionnaire(part) {
         text.push(how.to_owned());
+    }
+    if over.identification.is_some() {
+        text.push(
+            "Participants' shares of correct answers were compared with those of guesses that have their own \
+             preferences for labels. Information transfer is that of the summed confusion matrices less its bias \
+             (Miller, 1955); similarities and biases of labels are those of Luce's (1963) choice model by maximum \
+             likelihood. Intervals are by leaving out each participant in turn (Tukey, 1958)."
+                .to_owned(),
+        );
     }
     if over.magnitude.is_some() {
         text.push(

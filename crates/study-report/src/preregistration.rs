@@ -359,6 +359,19 @@ fn trials(p: &Protocol, part: &Part) -> String {
         Task::Rating(own) => each(own, "rating"),
         Task::Magnitude(own) => each(own, "magnitude estimation"),
         Task::Mushra(own) => each(&own.presentations, "rating beside a reference"),
+        Task::Identification(own) => format!(
+            "{}, each is given one of {}",
+            each(&own.presentations, "identification"),
+            match own.criterion {
+                None => counted(own.labels.len(), "label", "labels"),
+                Some(c) => format!(
+                    "{}, after practice until {} of the last {} answers are correct",
+                    counted(own.labels.len(), "label", "labels"),
+                    c.correct,
+                    c.of
+                ),
+            }
+        ),
         Task::Pairs(pairs) => format!(
             "{}, {} each, {}, {}",
             counted(

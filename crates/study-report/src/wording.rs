@@ -273,6 +273,7 @@ analysis = { primary = "better" }
             PartQuestion::Thresholds,
             PartQuestion::Magnitudes,
             PartQuestion::MagnitudeVaf,
+            PartQuestion::Identified,
             PartQuestion::Groups,
             PartQuestion::GroupsConditions,
             PartQuestion::Sessions,

@@ -48,7 +48,7 @@ pub use view::{Screen, View};
 
 use crate::outcome::fold::History;
 use crate::outcome::{Channel, Event, Fidelity, Moment};
-use phase::{DeviceProblem, Phase};
+use phase::{DeviceProblem, Phase, Told};
 use saving::SaveState;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -101,7 +101,7 @@ pub struct Session {
     /// Tracks in progress.
     running: Vec<tracks::Running>,
     /// Whether the last answer was correct, until the participant is told.
-    feedback: Option<bool>,
+    feedback: Option<Told>,
     /// Remarks of this process.
     remarks: Vec<String>,
     /// How the inputs are entered.

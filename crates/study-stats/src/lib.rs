@@ -24,6 +24,7 @@
 //! | Which is preferred, in pairs? | [`pairs`] |
 //! | Which is preferred in a space of stimuli, and which pair tells most? | [`preference_gp`] |
 //! | How do estimated magnitudes grow? | [`magnitude`] |
+//! | How well are several stimuli identified, and which are confused? | [`identification`] |
 //! | Who is screened in a MUSHRA test? | [`mushra`] |
 //! | Does a test reject at its level? | [`level`] |
 //! | Can a printed mean and standard deviation be right? | [`grim`] |
@@ -63,6 +64,7 @@ pub mod distribution;
 pub mod factorial;
 pub mod friedman;
 pub mod grim;
+pub mod identification;
 pub mod level;
 pub mod lmm;
 pub mod magnitude;

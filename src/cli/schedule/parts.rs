@@ -7,8 +7,8 @@ use std::fmt::Write as _;
 use study_base::text::{ModelId, PartId, Untrusted, counted};
 use study_plan::procedure::{Rule, Staircase};
 use study_plan::protocol::{
-    Interval, IntervalOrder, Mushra, Pairs, Part, PartsOrder, Protocol, Stimuli, Task, TrackRules,
-    Trial,
+    Identification, Interval, IntervalOrder, Mushra, Pairs, Part, PartsOrder, Protocol, Stimuli,
+    Task, TrackRules, Trial,
 };
 
 /// The orders of some rows.
@@ -49,12 +49,25 @@ pub(super) fn render(protocol: &Protocol, plans: &Plans, width: usize) -> String
             | Task::Mushra(Mushra {
                 presentations: task,
                 ..
+            })
+            | Task::Identification(Identification {
+                presentations: task,
+                ..
             }) => {
                 let design = protocol.design_of(Some(&part.id));
                 if let Some(reference) = part.task.reference() {
                     let _ = writeln!(out, "{reference} is felt first in each trial");
                 }
-                section(&mut out, protocol, &design, &task.models, &own, width);
+                let named = part.task.identification();
+                let criterion = named.and_then(|own| own.criterion);
+                section(
+                    &mut out,
+                    protocol,
+                    (&design, criterion),
+                    &task.models,
+                    &own,
+                    width,
+                );
             }
             Task::Pairs(task) => pairs(&mut out, protocol, part, task, &own, width),
             Task::Discrimination { tracks: ids } => {

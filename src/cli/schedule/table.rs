@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::fmt::Write as _;
 use study_base::text::{ModelId, Untrusted};
-use study_plan::protocol::{Design, Order, Protocol, Role, Trial};
+use study_plan::protocol::{Criterion, Design, Order, Protocol, Role, Trial};
 use study_plan::schedule::balance::{Balance, Balances, Spread, balances};
 
 /// Ids up to this length are used in the tables.
@@ -24,15 +24,23 @@ pub(super) fn render(
     width: usize,
 ) -> String {
     let mut out = format!("{}\n", Untrusted(&protocol.study.title));
-    section(&mut out, protocol, &protocol.design, models, plans, width);
+    section(
+        &mut out,
+        protocol,
+        (&protocol.design, None),
+        models,
+        plans,
+        width,
+    );
     out
 }
 
-/// Orders, counts and summary of realizations under the rules of a `design`.
+/// Orders, counts and summary of realizations under the rules of a `design`, whose practice may have
+/// a criterion.
 pub(super) fn section(
     out: &mut String,
     protocol: &Protocol,
-    design: &Design,
+    (design, criterion): (&Design, Option<Criterion>),
     models: &[ModelId],
     plans: &[(u32, Vec<Trial>)],
     width: usize,
@@ -43,7 +51,19 @@ pub(super) fn section(
     legend(out, protocol, models, &codes);
     if !design.practice.is_empty() {
         let ids: Vec<_> = design.practice.iter().map(ModelId::as_str).collect();
-        let _ = writeln!(out, "Practice, before every order: {}\n", ids.join(", "));
+        let _ = match criterion {
+            None => writeln!(out, "Practice, before every order: {}\n", ids.join(", ")),
+            Some(Criterion {
+                correct,
+                of,
+                rounds,
+            }) => writeln!(
+                out,
+                "Practice, before every order: {}, each time in an order that is drawn, until {correct} of the last \
+                 {of} answers are correct, at most {rounds} times\n",
+                ids.join(", ")
+            ),
+        };
     }
     let code = |trial: &Trial| {
         let model = trial.model().map_or("", |model| codes.of_model(model));

@@ -318,11 +318,14 @@ fn list(
             mark(marked, at, pick);
             return Handled::Yes;
         }
-        Key::Char(c @ '1'..='9') => {
-            let at = c as usize - '1' as usize;
-            if at >= count {
-                return Handled::Notice(Refusal::NotListed(count).words(words));
-            }
+        Key::Char(c) => {
+            let at = (0..count).find(|at| key_of(*at) == Some(c.to_ascii_lowercase()));
+            let Some(at) = at else {
+                return match c {
+                    '1'..='9' => Handled::Notice(Refusal::NotListed(count).words(words)),
+                    _ => Handled::No,
+                };
+            };
             *cursor = Some(at);
             mark(marked, at, pick);
             return Handled::Yes;
@@ -337,6 +340,13 @@ fn list(
         mark(marked, at, pick);
     }
     Handled::Yes
+}
+
+/// The key of an option of a list, by its place from 0: digits, then the letters that do nothing else
+/// there.
+pub fn key_of(at: usize) -> Option<char> {
+    let letters = ('a'..='z').filter(|c| *c != 'x');
+    ('1'..='9').chain(letters).nth(at)
 }
 
 /// Chooses an option, or takes it back where several can be chosen.

@@ -1,6 +1,7 @@
 //! A list of options; it scrolls if it is taller than its area.
 
 use crate::tui::theme::Theme;
+use crate::tui::ui_state::field::key_of;
 use crate::tui::widgets::{left, row, styled};
 use crate::tui::wrap;
 use ratatui::buffer::Buffer;
@@ -24,7 +25,7 @@ pub struct List<'a> {
     pub theme: Theme,
 }
 
-/// Cells before the text of an option: digit, cursor and mark.
+/// Cells before the text of an option: key, cursor and mark.
 const MARGIN: u16 = 8;
 /// Maximum number of lines of one option.
 const LINES: usize = 3;
@@ -109,14 +110,10 @@ impl Widget for &List<'_> {
                     self.theme.text()
                 };
                 let mut spans = if j == 0 {
-                    let digit = if i < 9 {
-                        (i + 1).to_string()
-                    } else {
-                        " ".to_owned()
-                    };
+                    let key = key_of(i).unwrap_or(' ').to_string();
                     let pointer = if here { "›" } else { " " };
                     vec![
-                        Span::styled(digit, self.theme.quiet()),
+                        Span::styled(key, self.theme.quiet()),
                         Span::styled(format!(" {pointer} "), self.theme.focus()),
                         Span::styled(format!("{mark} "), style),
                     ]

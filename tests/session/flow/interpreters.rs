@@ -2,7 +2,7 @@
 //! journals are equal but for the channel. Every page is checked against the schema of
 //! docs/page.md, and none has the name of a realization.
 
-use super::part_rig::{beside_a_reference, pairs, read, track};
+use super::part_rig::{beside_a_reference, identification, pairs, read, track};
 use super::rig::{DeviceMood, Rig, StoreMood};
 use super::studies::{MODELS, PRACTICE, question, rich};
 use crate::kinds::questions;
@@ -53,6 +53,9 @@ repetitions = 1
         track("3ifc", quest, ""),
         beside_a_reference(),
         read(magnitudes),
+        identification(
+            "practice = [\"KJW-3\", \"XQZ-7\"]\nfeedback = \"always\"\ncriterion = { correct = 2, of = 3, rounds = 3 }",
+        ),
     ]
 }
 

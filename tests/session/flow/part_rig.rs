@@ -103,6 +103,27 @@ repetitions = 1
     )
 }
 
+/// Two realizations with labels that are words of the program elsewhere; `more` is added to the part.
+pub(super) fn identification(more: &str) -> Protocol {
+    let text = format!(
+        r#"
+[analysis]
+primary = "which"
+[[parts]]
+id = "which"
+kind = "identification"
+prompt = "Which?"
+answers = [{{ label = "first", models = ["XQZ-7"] }}, {{ label = "no", models = ["KJW-3", "VVB-9"] }}]
+repetitions = 2
+{more}
+"#
+    );
+    let head = HEAD.replace("study-protocol/2", "study-protocol/3");
+    let parsed = parse("p", &format!("{head}{text}"));
+    let shown = parsed.findings.render(false);
+    parsed.protocol.unwrap_or_else(|| panic!("{shown}"))
+}
+
 /// The answer of an observer who hears a level of 1.55 and above, and else says the other.
 pub(super) fn observed(rig: &Rig) -> Vec<(QuestionId, Answer)> {
     let open = rig.session.history().open().unwrap();

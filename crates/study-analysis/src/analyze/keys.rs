@@ -69,6 +69,8 @@ names! {
     ParameterName = "PARAMETER",
     /// The name of an item of a questionnaire.
     ItemName = "NAME",
+    /// A label by which something is identified.
+    LabelName = "LABEL",
     /// The name of an effect: its factors, joined by `:`.
     EffectName = "EFFECT",
 }
@@ -151,6 +153,33 @@ impl Key for PairName {
 
     fn part(&self) -> Cow<'_, str> {
         format!("{}|{}", escaped(&self.first), escaped(&self.second)).into()
+    }
+}
+
+/// A label that was right, and the one that was given.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct ConfusionName {
+    /// The label that was right.
+    pub right: LabelName,
+    /// The label that was given.
+    pub given: LabelName,
+}
+
+impl ConfusionName {
+    /// The cell of these labels.
+    pub fn of(right: &str, given: &str) -> Self {
+        Self {
+            right: right.into(),
+            given: given.into(),
+        }
+    }
+}
+
+impl Key for ConfusionName {
+    const PLACEHOLDER: &'static str = "RIGHT/GIVEN";
+
+    fn part(&self) -> Cow<'_, str> {
+        format!("{}/{}", self.right.part(), self.given.part()).into()
     }
 }
 

@@ -1,5 +1,5 @@
 //! Statistics of thresholds and comparisons: tracks, psychometric functions, detection,
-//! paired preferences, magnitude estimation, MUSHRA. Each function takes what was
+//! paired preferences, magnitude estimation, MUSHRA, identification. Each function takes what was
 //! answered and returns statistics as records; `docs/statistics-psychophysics.md`
 //! defines them.
 
@@ -10,7 +10,9 @@ mod discriminations;
 mod excluded;
 mod findings;
 mod fits;
+mod identification;
 mod marginal;
+mod of_identification;
 mod of_scales;
 mod over_participants;
 mod part_data;
@@ -30,6 +32,7 @@ pub use detection::{Detection, Task, detection};
 pub(crate) use discriminations::{have_ratios, settings as track_settings};
 pub use findings::{PartFinding, PartQuestion};
 pub use fits::{FitCell, FitSettings, psychometric};
+pub use identification::{LabelRow, OwnConfusions, identification};
 pub use over_participants::Measured;
 pub use part_data::{LevelData, PartAnalysis, PartData, StudyData};
 pub(crate) use part_data::{asked, sessions_of};

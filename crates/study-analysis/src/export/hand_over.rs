@@ -292,6 +292,7 @@ fn settings(
             Task::Rating(_) => "rating",
             Task::Magnitude(_) => "magnitude",
             Task::Mushra(_) => "mushra",
+            Task::Identification(_) => "identification",
             Task::Pairs(_) => "pairs",
             Task::Discrimination { .. } => "tracks",
         };
@@ -317,6 +318,15 @@ fn settings(
                 }
                 if have_ratios(protocol, &tracks) {
                     put(&format!("ratios {}", part.id), "true");
+                }
+            }
+            Task::Identification(own) => {
+                let labels = own.labels.iter().flat_map(|label| {
+                    let models = label.models.iter();
+                    models.map(|model| (model, label.text.as_str()))
+                });
+                for (model, label) in labels {
+                    put(&format!("label {} {model}", part.id), label);
                 }
             }
             Task::Rating(_) | Task::Mushra(_) => {}

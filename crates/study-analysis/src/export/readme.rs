@@ -71,6 +71,16 @@ pub(super) fn methods(job: &Job<'_>) -> String {
                 ),
                 counted(p.presentations.repetitions as usize, "time", "times")
             ),
+            Task::Identification(p) => format!(
+                "{} felt {} and given one of {}",
+                counted(
+                    p.presentations.models.len(),
+                    "realization was",
+                    "realizations were"
+                ),
+                counted(p.presentations.repetitions as usize, "time", "times"),
+                counted(p.labels.len(), "label", "labels")
+            ),
             Task::Pairs(p) => format!(
                 "{} compared {}",
                 counted(

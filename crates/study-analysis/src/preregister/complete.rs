@@ -170,6 +170,7 @@ impl Made<'_> {
         match &part.task {
             Task::Rating(own) | Task::Magnitude(own) => self.presentations(part, own, who),
             Task::Mushra(own) => self.presentations(part, &own.presentations, who),
+            Task::Identification(own) => self.presentations(part, &own.presentations, who),
             Task::Pairs(pairs) => self.pairs(part, pairs, who),
             Task::Discrimination { tracks } => {
                 let protocol = self.protocol;

@@ -113,10 +113,11 @@ const FORMATS: &[Word] = &[
 const OF_FORMAT_2: [&str; 5] = ["parts", "families", "tracks", "groups", "sessions"];
 
 /// Keys that need [`FORMAT_3`], without the places in lists.
-pub const OF_FORMAT_3: [&str; 7] = [
+pub const OF_FORMAT_3: [&str; 8] = [
     "design.order_version",
     "factors",
     "models.levels",
+    "parts.answers",
     "analysis.model",
     "device.commissioned_within_days",
     "tracks.relative",
@@ -189,7 +190,13 @@ pub fn parse(path: &str, text: &str) -> Parsed {
     let read = document.finish();
     findings.faults = read.faults;
     if version.is_some_and(|version| version < 3) {
-        let newer = read.spans.iter().filter(|(place, _)| is_of_format_3(place));
+        // A list is reported once, and not for each of its entries.
+        let is_listed = |place: &str| {
+            let list = place.strip_suffix(']').and_then(|p| p.rsplit_once('['));
+            list.is_some_and(|(list, _)| read.spans.contains_key(list))
+        };
+        let newer =
+            (read.spans.iter()).filter(|(place, _)| is_of_format_3(place) && !is_listed(place));
         (findings.faults).extend(newer.map(|(place, span)| {
             Fault::error(format!("`{place}` needs the format `{FORMAT_3}`"))
                 .at(Some(span.clone()))

@@ -129,6 +129,11 @@ impl Protocol {
                         let stays = |m: &ModelId| models.contains(m) || hidden(m);
                         task.presentations.models.retain(stays);
                     }
+                    // The labels stay: they are the answers of everybody.
+                    Task::Identification(task) => {
+                        let stays = |m: &ModelId| models.contains(m) || self.level_of(m).is_some();
+                        task.presentations.models.retain(stays);
+                    }
                     Task::Discrimination { .. } => {}
                 }
             }

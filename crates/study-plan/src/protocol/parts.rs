@@ -6,7 +6,7 @@
 //! [`crate::procedure`].
 
 use super::keys::words;
-use super::{Answer, Design, Order, Pairs, Protocol, Relative, Seat};
+use super::{Answer, Design, Identification, Order, Pairs, Protocol, Relative, Seat};
 use crate::procedure::{Ladder, ProcedureError, Rule, Track};
 use serde::{Deserialize, Serialize};
 use study_base::rng::Stream;
@@ -40,6 +40,8 @@ pub enum Task {
     Magnitude(Presentations),
     /// One realization is rated from 0 to 100 beside a reference.
     Mushra(Mushra),
+    /// One realization is felt, and one of several labels is chosen for it.
+    Identification(Identification),
     /// Two realizations are felt, and one is chosen.
     Pairs(Pairs),
     /// Levels are told from a standard, on one track or several interleaved ones.
@@ -82,6 +84,7 @@ impl Task {
         match self {
             Self::Rating(own) | Self::Magnitude(own) => Some(own),
             Self::Mushra(own) => Some(&own.presentations),
+            Self::Identification(own) => Some(&own.presentations),
             Self::Pairs(_) | Self::Discrimination { .. } => None,
         }
     }
@@ -90,9 +93,19 @@ impl Task {
     pub fn reference(&self) -> Option<&ModelId> {
         match self {
             Self::Mushra(own) => own.reference.as_ref(),
-            Self::Rating(_) | Self::Magnitude(_) | Self::Pairs(_) | Self::Discrimination { .. } => {
-                None
-            }
+            Self::Rating(_)
+            | Self::Magnitude(_)
+            | Self::Identification(_)
+            | Self::Pairs(_)
+            | Self::Discrimination { .. } => None,
+        }
+    }
+
+    /// The labels of a part of identification.
+    pub fn identification(&self) -> Option<&Identification> {
+        match self {
+            Self::Identification(own) => Some(own),
+            _ => None,
         }
     }
 }
@@ -480,6 +493,12 @@ impl Protocol {
             Rule::QuestPlus(rule) => rule.sd_below.is_some() || rule.entropy_below.is_some(),
             Rule::Constant(_) => false,
         })
+    }
+
+    /// Whether the number of practice trials depends on the answers.
+    pub fn practices_to_a_criterion(&self) -> bool {
+        let named = self.parts.iter().filter_map(|p| p.task.identification());
+        named.into_iter().any(|own| own.criterion.is_some())
     }
 
     /// The rules of order that apply to the trials of a part: its own, or `[design]`'s

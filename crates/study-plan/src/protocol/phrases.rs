@@ -100,6 +100,7 @@ phrases! {
     TrialOf "trial-of" "trial {n} of {total}";
     PracticeOf "practice-of" "practice {n} of {total}";
     TrialNumber "trial-number" "trial {n}";
+    PracticeNumber "practice-number" "practice {n}";
     First "first" "first";
     Second "second" "second";
     Third "third" "third";
@@ -111,6 +112,7 @@ phrases! {
     Answer "answer" "answer";
     Correct "correct" "That was correct.";
     NotCorrect "not-correct" "That was not correct.";
+    ItWas "it-was" "It was: {label}";
     PageOf "page-of" "page {n} of {total}";
     NumberFirst "number-first" "Choose a number from {from} to {to} first.";
     SliderFirst "slider-first" "Choose a number from {from} to {to} first.";
@@ -202,7 +204,6 @@ phrases! {
     PlainWhy "plain-why" "Type the reason, then press Enter.";
     PlainDeclineIt "plain-decline-it" "Type /decline to decline it.";
     NothingCorrected "nothing-corrected" "Nothing is corrected.";
-    PracticeNumber "practice-number" "practice {n}";
     FormSetup "form-setup" "set-up";
     FormIntake "form-intake" "intake";
     FormOutro "form-outro" "closing questions";

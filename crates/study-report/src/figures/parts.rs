@@ -1,6 +1,7 @@
 //! The figures of a part that is no rating: psychometric functions with their data, tracks
 //! with their reversals, preferences, thresholds and sensitivities of the participants.
 
+use super::identification::confusions;
 use super::weber::webers_law;
 use super::{Canvas, Drawn, MAX_DRAWN, cell, drawn, head, rows_height};
 use crate::apa::digits;
@@ -35,6 +36,7 @@ pub fn of_part(number: usize, part: &PartAnalysis) -> Vec<Drawn> {
         preferences(&name("preferences"), part),
         against_vaf(&name("preference-against-vaf"), part),
         magnitudes(&name("magnitudes"), part),
+        confusions(&name("confusions"), part),
     ];
     let note = match (part.simulated, part.pilot) {
         (true, _) => Some("includes simulated data"),

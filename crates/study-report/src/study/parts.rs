@@ -5,6 +5,7 @@ use crate::html::PartReport;
 use study_analysis::analyze::psychophysics::PartAnalysis;
 use study_base::text::counted;
 use study_plan::procedure::Rule;
+use study_plan::protocol::identification::{Criterion, Feedback};
 use study_plan::protocol::pairs::IntervalOrder;
 use study_plan::protocol::parts::{Compared, Part, Task, TrackRules};
 use study_plan::protocol::{Protocol, Relative};
@@ -49,6 +50,39 @@ fn trials(protocol: &Protocol, part: &Part) -> String {
                 counted(presented.models.len(), "realization", "realizations"),
                 counted(presented.repetitions as usize, "trial", "trials")
             ));
+        }
+        Task::Identification(own) => {
+            let presented = &own.presentations;
+            let told = match own.feedback {
+                Feedback::Never => "participants were not told which label was correct",
+                Feedback::Always => {
+                    "participants were told after each trial which label was correct"
+                }
+                Feedback::Practice if presented.practice.is_empty() => {
+                    "participants were not told which label was correct"
+                }
+                Feedback::Practice => {
+                    "participants were told after each practice trial which label was correct"
+                }
+            };
+            text.push(format!(
+                "In each trial one of {} was felt and given one of {}, each in {}; {told}.",
+                counted(presented.models.len(), "realization", "realizations"),
+                counted(own.labels.len(), "label", "labels"),
+                counted(presented.repetitions as usize, "trial", "trials")
+            ));
+            if let Some(Criterion {
+                correct,
+                of,
+                rounds,
+            }) = own.criterion
+            {
+                let most = presented.practice.len() * rounds as usize;
+                text.push(format!(
+                    "Practice went on until {correct} of the last {of} answers were correct, for {} at most.",
+                    counted(most, "trial", "trials")
+                ));
+            }
         }
         Task::Pairs(pairs) => {
             let order = match pairs.interval_order {

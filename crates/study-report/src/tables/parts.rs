@@ -1,6 +1,7 @@
 //! The tables of thresholds, sensitivities and preferences: the same on the terminal, in
 //! the report and as CSV.
 
+mod identification;
 mod population;
 mod scales;
 
@@ -19,7 +20,7 @@ use study_base::text::Untrusted;
 type Kind = (&'static str, fn(&PartResults) -> Table);
 
 /// All tables, in the order of a page; those without rows and notes are left out of it.
-pub(crate) const KINDS: [Kind; 16] = [
+pub(crate) const KINDS: [Kind; 20] = [
     ("part_thresholds.csv", thresholds),
     ("part_population.csv", population::population),
     ("part_population_contrasts.csv", population::contrasts),
@@ -32,6 +33,10 @@ pub(crate) const KINDS: [Kind; 16] = [
     ("part_magnitudes.csv", magnitudes),
     ("part_magnitude_contrasts.csv", magnitude_contrasts),
     ("part_mushra.csv", ratings),
+    ("part_confusions.csv", identification::confusions),
+    ("part_label_pairs.csv", identification::label_pairs),
+    ("part_recall.csv", identification::recall),
+    ("part_identification.csv", identification::participants),
     ("part_scores.csv", scores),
     ("part_items.csv", items),
     ("part_groups.csv", groups),

@@ -4,6 +4,7 @@ use super::{USUAL, Wording, Words};
 use crate::{apa, sentences};
 use study_analysis::analyze::Pair;
 use study_analysis::analyze::psychophysics::{PartAnalysis, PartFinding, PartQuestion};
+use study_analysis::analyze::results::Number as _;
 
 /// What most questions about parts share.
 const PART: Wording = Wording {
@@ -81,6 +82,13 @@ fn texts(question: &PartQuestion) -> Wording {
             shown: "r = {r}, {result} ({corrected}, {realizations})",
             ..PART
         },
+        PartQuestion::Identified => Wording {
+            ask: "Are the labels given more often than by guessing?",
+            yes: "Labels were given more often than by guessing",
+            not_shown: "It was not shown that labels are given more often than by guessing",
+            shown: "{size} of the answers were correct, {guesses} by guessing, {result} ({corrected}, {people})",
+            ..PART
+        },
         PartQuestion::Groups => Wording {
             ask: "Do the groups differ?",
             yes: "The groups differed",
@@ -113,6 +121,12 @@ fn value(part: &PartAnalysis, f: &PartFinding, key: &str) -> Option<String> {
             PartQuestion::ToldApart(condition) => condition.clone(),
             _ => return None,
         },
+        "guesses" => {
+            let found = part.results.over.identification.as_ref();
+            found
+                .and_then(|own| own.by_guessing.number())
+                .map_or_else(String::new, apa::two)
+        }
         "clearest" => match clearest(part) {
             Some(pair) => format!(
                 "{} over {} by {}, {}",

@@ -409,6 +409,8 @@ pub enum Event {
         /// Whether its rule was fulfilled, not only its largest number of trials reached.
         finished: bool,
     },
+    /// The criterion of a part's practice was reached: its other practice trials do not take place.
+    PracticeEnded { part: PartId },
     /// A remark was entered.
     Remark {
         by: Author,

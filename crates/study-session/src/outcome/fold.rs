@@ -62,7 +62,9 @@ pub struct History {
     goes_on: bool,
     /// Tracks whose other planned trials do not take place.
     ended_tracks: BTreeSet<PartId>,
-    /// Completed trials of tracks, in the order in which the tracks were told.
+    /// Parts whose practice reached its criterion.
+    ended_practice: BTreeSet<PartId>,
+    /// Completed trials of tracks and of practice, in the order in which tracks and criteria were told.
     told: Vec<(u32, u32)>,
     /// Numbers of closed trials after which a break began.
     pub breaks: BTreeSet<u32>,
@@ -265,6 +267,11 @@ impl History {
                 let queue = std::mem::take(&mut self.queue);
                 self.set_queue(&queue);
             }
+            Event::PracticeEnded { part } => {
+                self.ended_practice.insert(part.clone());
+                let queue = std::mem::take(&mut self.queue);
+                self.set_queue(&queue);
+            }
             Event::AttemptFailed {
                 trial,
                 attempt,
@@ -439,7 +446,7 @@ impl History {
                 number,
             });
         }
-        if self.planned(trial).is_some_and(|t| t.track().is_some()) {
+        if practice || self.planned(trial).is_some_and(|t| t.track().is_some()) {
             self.told.push((trial, attempt));
         }
         self.queue.retain(|t| *t != trial);
@@ -499,12 +506,16 @@ impl History {
         self.queue = queue.iter().filter(takes_place).copied().collect();
     }
 
-    /// A trial that comes again takes its track up again, if that had ended.
+    /// A trial that comes again takes its track, or its practice, up again, if that had ended.
     fn reopen_tracks(&mut self, queue: &[u32]) {
         let again: Vec<PartId> = (queue.iter())
             .filter_map(|t| self.planned(*t)?.track().cloned())
             .collect();
         self.ended_tracks.retain(|track| !again.contains(track));
+        let again: Vec<PartId> = (queue.iter())
+            .filter_map(|t| self.planned(*t).filter(|t| t.practice)?.part.clone())
+            .collect();
+        self.ended_practice.retain(|part| !again.contains(part));
     }
 
     /// The answer with which a trial began: the first that was given.

@@ -141,7 +141,8 @@ impl Page {
         let words = &view.words;
         let progress = |p: view::Progress| {
             let phrase = match (p.practice, p.total) {
-                (true, _) => Phrase::PracticeOf,
+                (true, Some(_)) => Phrase::PracticeOf,
+                (true, None) => Phrase::PracticeNumber,
                 (false, Some(_)) => Phrase::TrialOf,
                 (false, None) => Phrase::TrialNumber,
             };

@@ -166,11 +166,8 @@ impl Session {
         let planned = |n: &u32| self.history.planned(*n).cloned();
         let mut rest: Vec<Trial> = self.history.queue.iter().filter_map(planned).collect();
         rest.retain(|t| t.trial != number);
-        // What is not told to a track that has ended takes it up again.
-        if trial
-            .track()
-            .is_some_and(|track| self.history.has_ended(track))
-        {
+        // What is not told to a track, or to practice, that has ended takes it up again.
+        if self.history.has_ended(&trial) {
             rest.extend(self.dropped(&[number]));
             rest.sort_by_key(|t| t.trial);
         }
@@ -206,13 +203,20 @@ impl Session {
         }
     }
 
-    /// The trials that the ends of the tracks of these trials have dropped.
+    /// The trials that the ends of the tracks, and of the practice, of these trials have dropped.
     pub(super) fn dropped(&self, again: &[u32]) -> Vec<Trial> {
-        let of = |n: &u32| self.history.planned(*n)?.track();
-        let tracks: Vec<_> = again.iter().filter_map(of).collect();
+        let of = |n: &u32| self.history.planned(*n);
+        let again: Vec<&Trial> = again.iter().filter_map(of).collect();
         let schedule = self.history.schedule().iter();
+        let same = |t: &&Trial| {
+            let track = t.track().is_some();
+            again.iter().any(|again| match track {
+                true => again.track() == t.track(),
+                false => again.practice && t.practice && again.part == t.part,
+            })
+        };
         schedule
-            .filter(|t| t.track().is_some_and(|track| tracks.contains(&track)))
+            .filter(same)
             .filter(|t| !self.history.takes_place(t.trial))
             .cloned()
             .collect()

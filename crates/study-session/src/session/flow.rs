@@ -37,8 +37,8 @@ impl Session {
     pub(super) fn proceed(&mut self, at: Moment) {
         if self.history.over() {
             self.phase = Phase::End;
-        } else if let Some(correct) = self.feedback.take() {
-            self.phase = Phase::Feedback { correct };
+        } else if let Some(told) = self.feedback.take() {
+            self.phase = Phase::Feedback(told);
         } else if self.consent_is_missing() {
             self.phase = Phase::Consent;
         } else if !self.before_trials(at) && !self.trials(at) && !self.after_trials(at) {
@@ -124,6 +124,7 @@ impl Session {
             };
             return true;
         }
+        self.end_practice(at);
         self.end_tracks(at);
         if self.show_message(MessageKind::Part) {
             return true;
@@ -223,7 +224,7 @@ impl Session {
                 }
                 self.proceed(at);
             }
-            Phase::Feedback { .. } => self.proceed(at),
+            Phase::Feedback(_) => self.proceed(at),
             Phase::Reference { since } => {
                 let shown_s = at.seconds_since(since);
                 if self.reference_wait_s(at) > 0.0 {

@@ -2,7 +2,7 @@
 
 use super::Session;
 use super::flow::Step;
-use super::phase::{Form, Phase};
+use super::phase::{Form, Phase, Told};
 use crate::outcome::{Author, Event, FormId, Moment, STEP_BACK};
 use study_base::text::QuestionId;
 use study_plan::protocol::answer::MAX_TEXT_BYTES;
@@ -213,17 +213,29 @@ impl Session {
     }
 
     /// Whether the answer to a trial is correct, if its participant is told.
-    fn told(&self, trial: u32) -> Option<bool> {
+    fn told(&self, trial: u32) -> Option<Told> {
         let planned = self.history.planned(trial)?;
-        let track = self.protocol.track(planned.track()?)?;
-        let (attempt, _) = self.history.completion(trial).filter(|_| track.feedback)?;
-        let question = self.part_of(planned)?.asks.first()?;
-        let answer = self
-            .history
-            .answer(FormId::Trial { trial, attempt }, question)?;
+        let part = self.part_of(planned)?;
+        let (attempt, _) = self.history.completion(trial)?;
+        let form = FormId::Trial { trial, attempt };
+        let answer = self.history.answer(form, part.asks.first()?)?;
         match &planned.stimuli {
-            Stimuli::Track { intervals, .. } => track.is_correct(intervals, answer),
-            Stimuli::One { .. } | Stimuli::Rated { .. } | Stimuli::Pair { .. } => None,
+            Stimuli::Track {
+                track, intervals, ..
+            } => {
+                let track = self.protocol.track(track).filter(|t| t.feedback)?;
+                let correct = track.is_correct(intervals, answer)?;
+                let label = None;
+                Some(Told { correct, label })
+            }
+            Stimuli::One { model } => {
+                let own = part.task.identification()?;
+                let own = Some(own).filter(|own| own.tells(planned.practice))?;
+                let correct = own.is_correct(model, answer)?;
+                let label = own.label_of(model).map(str::to_owned);
+                Some(Told { correct, label })
+            }
+            Stimuli::Rated { .. } | Stimuli::Pair { .. } => None,
         }
     }
 

@@ -6,10 +6,13 @@ use study_plan::protocol::phrases::Phrase;
 use study_plan::protocol::{Answer, Question, Scale};
 
 impl Session {
-    /// Whether a question is the one with which each trial of a part begins.
+    /// Whether a question is the one with which each trial of a part begins, and its answers
+    /// are words of this program. Labels are the study's own.
     fn is_of_part(&self, question: &Question) -> bool {
         let mut parts = self.protocol.parts.iter();
-        parts.any(|part| part.id.as_str() == question.id.as_str())
+        parts.any(|part| {
+            part.id.as_str() == question.id.as_str() && part.task.identification().is_none()
+        })
     }
 
     fn in_words(&self, word: &str) -> String {

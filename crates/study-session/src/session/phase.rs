@@ -75,9 +75,7 @@ pub(super) enum Phase {
         since: Moment,
     },
     /// Whether the answer was correct is shown.
-    Feedback {
-        correct: bool,
-    },
+    Feedback(Told),
     /// A scheduled break; `rested_s` is the part of it before a resume.
     Break {
         since: Moment,
@@ -126,6 +124,14 @@ impl Phase {
             Self::Identify | Self::Claiming | Self::Leaving { .. } | Self::Over(_)
         )
     }
+}
+
+/// What a participant is told of an answer.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Told {
+    pub(super) correct: bool,
+    /// The label that would have been correct, where labels are answers.
+    pub(super) label: Option<String>,
 }
 
 /// Questions being answered.

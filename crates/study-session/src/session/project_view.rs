@@ -2,7 +2,7 @@
 
 use super::failures::title;
 use super::flow::Overlay;
-use super::phase::{Form, Phase, TELEMETRY_WITHIN_S};
+use super::phase::{Form, Phase, TELEMETRY_WITHIN_S, Told};
 use super::view::{
     Banner, Correctable, DeviceState, MessageKind, Progress, Screen, StatusLine, Telemetry, View,
 };
@@ -91,15 +91,9 @@ impl Session {
                 kind: *kind,
                 text: self.message(*kind).unwrap_or_default().to_owned(),
             },
-            Phase::Feedback { correct } => Screen::Message {
+            Phase::Feedback(told) => Screen::Message {
                 kind: MessageKind::Feedback,
-                text: (self.words)
-                    .get(if *correct {
-                        Phrase::Correct
-                    } else {
-                        Phrase::NotCorrect
-                    })
-                    .to_owned(),
+                text: self.feedback_text(told),
             },
             Phase::Form(form) => self.form_screen(form),
             Phase::Reference { .. } => Screen::Reference {
@@ -150,6 +144,24 @@ impl Session {
         }
     }
 
+    fn feedback_text(&self, told: &Told) -> String {
+        let phrase = match told.correct {
+            true => Phrase::Correct,
+            false => Phrase::NotCorrect,
+        };
+        let said = self.words.get(phrase);
+        let missed = told.label.as_ref().filter(|_| !told.correct);
+        missed.map_or_else(
+            || said.to_owned(),
+            |label| {
+                format!(
+                    "{said} {}",
+                    self.words.fill(Phrase::ItWas, &[("label", label)])
+                )
+            },
+        )
+    }
+
     fn end_text(&self) -> String {
         let finished =
             self.history.finished() && !matches!(self.phase, Phase::Over(Ending::Nothing));
@@ -178,7 +190,10 @@ impl Session {
     /// Number of trials that count, or of practice trials; `None` if it depends on the
     /// answers.
     pub(super) fn total(&self, practice: bool) -> Option<u32> {
-        let known = practice || !self.protocol.is_adaptive();
+        let known = match practice {
+            true => !self.protocol.practices_to_a_criterion(),
+            false => !self.protocol.is_adaptive(),
+        };
         known.then(|| self.history.planned_total(practice))
     }
 

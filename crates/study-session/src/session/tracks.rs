@@ -1,5 +1,5 @@
 //! What the next attempt presents: of a track, the level that follows from the answers so
-//! far.
+//! far. Which practice has reached its criterion.
 
 use super::Session;
 use crate::outcome::{Event, Moment, TrackLevel};
@@ -92,6 +92,19 @@ impl Session {
         }
         running.told = told;
         Some(&self.running[at].track)
+    }
+
+    /// Ends the practice to which the next trial belongs, if its criterion is reached.
+    pub(super) fn end_practice(&mut self, at: Moment) {
+        let next = self.history.next_trial().filter(|t| t.practice);
+        let Some(part) = next.and_then(|t| self.part_of(t)) else {
+            return;
+        };
+        let criterion = part.task.identification().and_then(|own| own.criterion);
+        if criterion.is_some_and(|c| c.is_reached(&self.history.practiced(part))) {
+            let part = part.id.clone();
+            self.record(Event::PracticeEnded { part }, at);
+        }
     }
 
     /// Ends the track of the next trial, if its rule proposes nothing more, and so on.

@@ -188,3 +188,29 @@ fn an_empty_optional_text_is_no_answer() {
     field.key(&text, Key::Char(' '), &Words::default());
     assert_eq!(field.answer(&text), Ok(None));
 }
+
+#[test]
+fn options_after_the_ninth_have_letters() {
+    let options = (1..=30).map(|n| format!("option {n}")).collect();
+    let list = question(QuestionKind::Choice(kinds::Choice {
+        options,
+        multiple: false,
+    }));
+    let chosen = |keys: &str| {
+        let mut field = Field::new(&list);
+        let handled = digits(keys)
+            .into_iter()
+            .map(|key| field.key(&list, key, &Words::default()))
+            .last();
+        (field.answer(&list).ok().flatten(), handled)
+    };
+    let option = |n: u32| Some(Answer::Choice(vec![format!("option {n}")]));
+    for (key, n) in [("1", 1), ("9", 9), ("a", 10), ("B", 11), ("u", 30)] {
+        assert_eq!(chosen(key).0, option(n), "{key}");
+    }
+    assert_eq!(chosen("v"), (None, Some(Handled::No)));
+    // x marks the option at the cursor, and is the key of none.
+    assert_eq!(chosen("cx").0, option(12));
+    let keys = [8, 31, 32, 33, 34].map(key_of);
+    assert_eq!(keys, [Some('9'), Some('w'), Some('y'), Some('z'), None]);
+}

@@ -1,6 +1,7 @@
 //! The findings of a part that is no rating.
 
 use super::again::Again;
+use super::identification::Identified;
 use super::over_participants::{ConditionModel, Contrast, FTest, GroupSensitivity};
 use super::preferences::{AbilityDifference, Preferences};
 use crate::analyze::design::Design;
@@ -29,6 +30,8 @@ pub enum PartQuestion {
     Magnitudes,
     /// Does VAF predict the estimates?
     MagnitudeVaf,
+    /// Are the labels of what is felt given more often than by guessing?
+    Identified,
     /// Do the groups differ?
     Groups,
     /// Do the differences between conditions depend on the group?
@@ -48,6 +51,7 @@ impl PartQuestion {
             Self::Thresholds => "thresholds".to_owned(),
             Self::Magnitudes => "magnitudes".to_owned(),
             Self::MagnitudeVaf => "magnitude-vaf".to_owned(),
+            Self::Identified => "identified".to_owned(),
             Self::Groups => "groups".to_owned(),
             Self::GroupsConditions => "groups-conditions".to_owned(),
             Self::Sessions => "sessions".to_owned(),
@@ -262,6 +266,30 @@ pub(super) fn told_apart(
         finding.caveat(
             "below-chance",
             "answers are below chance: are the answers of the track interchanged?",
+        );
+    }
+    finding
+}
+
+/// Whether labels are given more often than by guessing.
+pub(super) fn identified(facts: &PartFacts, found: &Identified) -> PartFinding {
+    let (question, labels) = (PartQuestion::Identified, found.labels.len());
+    let above = &found.above_guessing;
+    let Some(p) = above.p.number() else {
+        return facts.undefined(question, &above.p, labels);
+    };
+    let test = Test::single(TestKind::OneSampleT, p, facts.alpha);
+    let test = test.with("t", above.t.number(), &[above.df.number()]);
+    let correct = found.all.correct.number();
+    let mut finding = Finding {
+        estimate: correct.map(|share| estimate("correct", share, &found.all.correct_ci95)),
+        ..Finding::decided(question, test, facts.design(labels))
+    };
+    if finding.is_yes() && above.mean.number().unwrap_or(0.0) <= 0.0 {
+        finding.verdict = Verdict::NotShown;
+        finding.caveat(
+            "below-chance",
+            "answers are below those of guesses: are the labels of the part interchanged?",
         );
     }
     finding

@@ -1,6 +1,7 @@
 //! What the parts of a study are analyzed from, and what is found of one.
 
 use super::findings::PartFinding;
+use super::identification::OwnConfusions;
 use super::over_participants::Measured;
 use super::results::PartResults;
 use super::tracks::TrackData;
@@ -87,6 +88,10 @@ pub struct PartData {
     pub levels: Vec<LevelData>,
     /// Tracks as they went.
     pub tracks: Vec<TrackData>,
+    /// Labels, in their order on the page.
+    pub labels: Vec<String>,
+    /// How often each participant gave each label where another was right.
+    pub confusions: OwnConfusions,
     /// VAF of the compared realizations that have one.
     pub vaf: BTreeMap<String, f64>,
     /// Thresholds and sensitivities, by which tracks, groups and sessions are compared.

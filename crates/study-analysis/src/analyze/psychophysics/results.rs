@@ -6,6 +6,9 @@ pub use super::fits::{
     Fitted, FreeLapse, Function, Functions, GroupThresholds, MaximumLikelihood, Mode,
     PooledFunction, Posterior, ThresholdSummary, WithStandard,
 };
+pub use super::identification::{
+    AboveGuessing, Identified, LabelPair, LabelUse, OwnIdentification, Recall, Transfer,
+};
 pub use super::marginal::Marginal;
 pub use super::over_participants::{
     AboveChance, Center, ConditionModel, Contrast, FTest, GroupSensitivity, Sample,
@@ -20,7 +23,9 @@ pub use super::standards::{AboveStandard, WebersLaw};
 pub use super::tracks::{
     EasyTrials, MarginalResult, QuestPlusResult, StaircaseResult, TrackResult,
 };
-pub use crate::analyze::keys::{At, CellName, ConditionName, GroupName, ItemName, ParameterName};
+pub use crate::analyze::keys::{
+    At, CellName, ConditionName, ConfusionName, GroupName, ItemName, LabelName, ParameterName,
+};
 use crate::analyze::record::{Interval, ParticipantName, RealizationName, Stat, statistics};
 use crate::analyze::results::Pearson;
 use std::collections::BTreeMap;
@@ -74,6 +79,8 @@ statistics! {
         mushra: Option<Mushra>,
         /// whether answers depend on the trial before
         sequential: Option<SequentialResult>,
+        /// labels that were given
+        identification: Option<Identified>,
         /// groups and sessions
         again: Again as "",
     }

@@ -4,9 +4,10 @@ use super::again::{again, by_condition};
 use super::discriminations::of_tracks;
 use super::excluded;
 use super::findings::{
-    PartFacts, PartFinding, PartQuestion, of_groups_and_sessions, of_model, of_preferences,
-    of_realizations, told_apart,
+    PartFacts, PartFinding, PartQuestion, identified, of_groups_and_sessions, of_model,
+    of_preferences, of_realizations, told_apart,
 };
+use super::of_identification::of_identification;
 use super::of_scales::{of_magnitudes, of_mushra};
 use super::over_participants::Measured;
 use super::part_data::{
@@ -87,7 +88,7 @@ pub fn parts(study: &StudyData<'_>, include: Include) -> Vec<PartAnalysis> {
                 "groups and sessions are not compared in this part: its means are those of all participants \
                  together",
             ),
-            Task::Rating(_) | Task::Discrimination { .. } => None,
+            Task::Rating(_) | Task::Discrimination { .. } | Task::Identification(_) => None,
         };
         let several = protocol.groups.is_some() || sessions_of(protocol, part).len() > 1;
         if let Some(text) = uncompared.filter(|_| several) {
@@ -135,6 +136,7 @@ fn findings(facts: &PartFacts, own: &Found) -> (Vec<PartFinding>, Vec<Pair>) {
             (Vec::from_iter(found), pairs)
         }
     };
+    found.extend((over.identification.as_ref()).map(|own| identified(facts, own)));
     let told = |name: &String| Some(told_apart(facts, name, over.sdt_group.get(name.as_str())?));
     found.extend(own.names.iter().filter_map(told));
     found.extend(of_groups_and_sessions(facts, &over.again));
@@ -153,6 +155,7 @@ fn of_part_task(
         Task::Rating(own) => of_ratings(study, part, own, rows),
         Task::Magnitude(own) => Some(of_magnitudes(study.protocol, part, own, (rows, rules))),
         Task::Mushra(own) => Some(of_mushra(study.protocol, part, &own.presentations, rows)),
+        Task::Identification(own) => Some(of_identification(study, part, own, rows)),
         Task::Pairs(pairs) => Some(of_pairs(study, part, pairs, rows, intervals, rules)),
         Task::Discrimination { tracks } => {
             let protocol = study.protocol;

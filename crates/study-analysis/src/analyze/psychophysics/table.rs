@@ -1,5 +1,6 @@
 //! Trials of somebody else's experiment, from a CSV.
 
+use super::identification::{LabelRow, identification, labels_of};
 use super::preferences::{Choice, Preference, in_both_orders, preferences};
 use super::results::PartResults;
 use super::scales::{MagnitudeRow, MushraRoles, MushraRow, magnitude, mushra};
@@ -21,14 +22,17 @@ pub enum TableKind {
     Magnitude,
     /// Ratings with hidden reference: `participant,condition,role,rating`.
     Mushra,
+    /// Identification: `participant[,realization],target,answer`.
+    Identification,
 }
 
 impl TableKind {
     /// The kinds that are no trials, with their names.
-    const OTHERS: [(Self, &str); 3] = [
+    const OTHERS: [(Self, &str); 4] = [
         (Self::Pairs, "pairs"),
         (Self::Magnitude, "magnitude"),
         (Self::Mushra, "mushra"),
+        (Self::Identification, "identification"),
     ];
 
     /// The kind of a name.
@@ -129,6 +133,10 @@ pub fn analyze_table(
             let (kept, all) = mushra(&ratings, &roles, &Screening::default());
             (results.over.mushra, results.mushra_unscreened) = (Some(kept), all);
         }
+        TableKind::Identification => {
+            let (answers, labels) = rows.labels()?;
+            results.over.identification = Some(identification(&answers, &labels).0);
+        }
     }
     Ok((results, rows.records.len()))
 }
@@ -144,6 +152,7 @@ pub fn read_table(name: &str, input: impl BufRead, kind: TableKind) -> Result<()
         TableKind::Pairs => rows.pairs().map(|_| ()),
         TableKind::Magnitude => rows.estimates().map(|_| ()),
         TableKind::Mushra => rows.ratings().map(|_| ()),
+        TableKind::Identification => rows.labels().map(|_| ()),
     }
 }
 
@@ -226,6 +235,9 @@ impl<'a> Rows<'a> {
             TableKind::Pairs => ("pairs", "[participant,]first,second,answer"),
             TableKind::Magnitude => ("magnitude estimation", "participant,level,estimate"),
             TableKind::Mushra => ("MUSHRA", "participant,condition,role,rating"),
+            TableKind::Identification => {
+                ("identification", "participant[,realization],target,answer")
+            }
         };
         found.ok_or_else(|| TableError::Column {
             name: self.name.to_owned(),
@@ -405,6 +417,39 @@ impl<'a> Rows<'a> {
             })
         };
         self.records.iter().map(one).collect()
+    }
+
+    /// The answers, and the labels in alphabetical order.
+    fn labels(&self) -> Result<(Vec<LabelRow>, Vec<String>), TableError> {
+        let participant = self.required("participant")?;
+        let target = self.required("target")?;
+        let answer = match self.column("answer").or_else(|| self.column("response")) {
+            Some(at) => at,
+            None => self.required("answer")?,
+        };
+        let realization = self.column("realization");
+        let cells = || {
+            self.records
+                .iter()
+                .flat_map(|r| [&r.1[target], &r.1[answer]])
+        };
+        let labels = labels_of(cells());
+        let place = |row: &(u64, csv::StringRecord), (column, at): (&'static str, usize)| {
+            let cell = &row.1[at];
+            let found = labels.binary_search_by(|l| l.as_str().cmp(cell)).ok();
+            let found = found.filter(|_| !cell.is_empty());
+            found.ok_or_else(|| self.fault(row.0, column, cell, "a label"))
+        };
+        let one = |row: &(u64, csv::StringRecord)| {
+            Ok(LabelRow {
+                participant: row.1[participant].to_owned(),
+                realization: realization.map(|at| row.1[at].to_owned()),
+                right: place(row, ("target", target))?,
+                given: place(row, ("answer", answer))?,
+            })
+        };
+        let rows: Result<Vec<_>, _> = self.records.iter().map(one).collect();
+        Ok((rows?, labels))
     }
 
     /// The ratings, and which conditions are hidden reference and mid anchor.

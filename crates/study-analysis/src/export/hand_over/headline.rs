@@ -2,7 +2,7 @@
 
 use crate::analyze::Analysis;
 use crate::analyze::psychophysics::PartAnalysis;
-use crate::analyze::psychophysics::results::Preferences;
+use crate::analyze::psychophysics::results::{Identified, Preferences};
 use crate::analyze::results::{Correlation, Field, Key, Number as _};
 use std::collections::BTreeMap;
 
@@ -92,6 +92,9 @@ pub(super) fn of_part(part: &PartAnalysis) -> Vec<Number> {
     if let Some(mushra) = &over.mushra {
         numbers.each("mushra", &mushra.conditions, &["median", "mean"], CLOSED);
     }
+    if let Some(found) = &over.identification {
+        numbers.of_identification(found);
+    }
     for (name, group) in &over.sdt_group {
         let id = format!("sdt_group/{}/above_chance", name.part());
         numbers.add(&id, &group.above_chance, &["t", "p"], CLOSED);
@@ -151,6 +154,41 @@ impl Numbers {
             &all[..1]
         };
         self.add(&format!("{id}/pearson"), &vaf.pearson, fields, tolerance);
+    }
+
+    fn of_identification(&mut self, found: &Identified) {
+        let id = "identification";
+        self.add(id, found, &["n", "correct", "by_guessing"], CLOSED);
+        let above = ["mean", "se", "t", "df", "p"];
+        self.add(
+            &format!("{id}/above_guessing"),
+            &found.above_guessing,
+            &above,
+            CLOSED,
+        );
+        let bits = [
+            "transmitted",
+            "corrected",
+            "corrected_ci95_lo",
+            "stimulus",
+            "items",
+        ];
+        self.add(
+            &format!("{id}/information"),
+            &found.information,
+            &bits,
+            CLOSED,
+        );
+        let recall = ["n", "correct"];
+        self.each(
+            &format!("{id}/realization"),
+            &found.realizations,
+            &recall,
+            CLOSED,
+        );
+        self.each(&format!("{id}/pair"), &found.pairs, &["d"], CLOSED);
+        self.each(&format!("{id}/pair"), &found.pairs, &["similarity"], FITTED);
+        self.each(&format!("{id}/label"), &found.labels, &["bias"], FITTED);
     }
 
     fn of_preferences(&mut self, pairs: &Preferences) {

@@ -3,13 +3,16 @@
 use super::{Spans, answers_s, pace};
 use crate::procedure::{Rule, Staircase};
 use crate::protocol::{
-    DeviceKind, IntervalOrder, Method, Mushra, Part, Protocol, Question, Role, Task, TrackRules,
+    DeviceKind, Identification, IntervalOrder, Method, Mushra, Part, Protocol, Question, Role,
+    Task, TrackRules,
 };
 use study_base::diagnostic::Fault;
 use study_base::text::{ModelId, PartId};
 
 /// Fewest levels of a magnitude estimation that need no warning.
 const MAGNITUDE_LEVELS: usize = 5;
+/// Fewest trials for each cell of a confusion matrix that need no warning.
+const TRIALS_OF_A_CELL: usize = 5;
 /// Fewest trials of an adaptive track that need no warning: the threshold is then known
 /// to about half the standard deviation of the noise.
 const TRACK_TRIALS: u32 = 30;
@@ -42,6 +45,14 @@ pub(super) fn trials(protocol: &Protocol, part: &Part) -> u32 {
         | Task::Mushra(Mushra {
             presentations: own, ..
         }) => all(own.models.len(), own.repetitions) + all(own.practice.len(), 1),
+        Task::Identification(Identification {
+            presentations: own,
+            criterion,
+            ..
+        }) => {
+            let rounds = criterion.map_or(1, |c| c.rounds);
+            all(own.models.len(), own.repetitions) + all(own.practice.len(), rounds)
+        }
         Task::Pairs(own) => all(own.pairs.len(), own.repetitions),
         Task::Discrimination { tracks: ids } => tracks(protocol, ids).map(track_trials).sum(),
     }
@@ -51,7 +62,7 @@ pub(super) fn trials(protocol: &Protocol, part: &Part) -> u32 {
 /// before each trial.
 pub(super) fn seconds(protocol: &Protocol, part: &Part, reference_s: f64) -> f64 {
     let intervals = match &part.task {
-        Task::Rating(_) | Task::Magnitude(_) => 1,
+        Task::Rating(_) | Task::Magnitude(_) | Task::Identification(_) => 1,
         Task::Mushra(own) => 1 + usize::from(own.reference.is_some()),
         Task::Pairs(_) => 2,
         Task::Discrimination { tracks: ids } => tracks(protocol, ids)
@@ -61,9 +72,11 @@ pub(super) fn seconds(protocol: &Protocol, part: &Part, reference_s: f64) -> f64
     } as f64;
     let free_s = match &part.task {
         Task::Rating(_) => pace::EXPLORE_S,
-        Task::Magnitude(_) | Task::Mushra(_) | Task::Pairs(_) | Task::Discrimination { .. } => {
-            pace::COMPARE_S
-        }
+        Task::Magnitude(_)
+        | Task::Mushra(_)
+        | Task::Identification(_)
+        | Task::Pairs(_)
+        | Task::Discrimination { .. } => pace::COMPARE_S,
     };
     let felt_s = part.exposure.max_s.map_or(free_s, |max| max.min(free_s));
     let load_s = match protocol.device.kind {
@@ -89,7 +102,11 @@ pub(super) fn warnings(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Faul
     }
     for (i, part) in protocol.parts.iter().enumerate() {
         let place = spans.get(&format!("parts[{i}].id")).cloned();
-        let doubts = [magnitudes(protocol, part), one_order(part)];
+        let doubts = [
+            magnitudes(protocol, part),
+            few_names(protocol, part),
+            one_order(part),
+        ];
         let doubts = doubts.into_iter().flatten();
         faults.extend(doubts.map(|fault| fault.at(place.clone())));
     }
@@ -126,7 +143,7 @@ fn presented(protocol: &Protocol, model: &ModelId) -> bool {
 /// Whether realizations are rated or compared, so that their number matters.
 pub fn is_about_realizations(protocol: &Protocol) -> bool {
     let about = |part: &Part| match &part.task {
-        Task::Discrimination { .. } => false,
+        Task::Discrimination { .. } | Task::Identification(_) => false,
         Task::Magnitude(own) => own.models.iter().all(|m| protocol.level_of(m).is_none()),
         Task::Rating(_) | Task::Mushra(_) | Task::Pairs(_) => true,
     };
@@ -154,6 +171,23 @@ fn magnitudes(protocol: &Protocol, part: &Part) -> Option<Fault> {
             "the part `{id}` has {} levels: an exponent of fewer than {MAGNITUDE_LEVELS} is uncertain",
             levels.len()
         ))
+    })
+}
+
+/// So few trials that information transfer is uncertain, although its bias is corrected.
+fn few_names(protocol: &Protocol, part: &Part) -> Option<Fault> {
+    let own = part.task.identification()?;
+    let (labels, presented) = (own.labels.len(), &own.presentations);
+    let of_each = presented.models.len() * presented.repetitions as usize;
+    let trials = of_each.saturating_mul(protocol.design.participants as usize);
+    let needed = TRIALS_OF_A_CELL * labels * labels;
+    (trials < needed).then(|| {
+        Fault::warning(format!(
+            "the part `{}` has {trials} trials over all participants: information transfer among {labels} labels takes \
+             {needed}, {TRIALS_OF_A_CELL} for each cell of the confusion matrix (Miller 1955)",
+            part.id
+        ))
+        .hint("raise repetitions or participants")
     })
 }
 

@@ -4,7 +4,7 @@ use super::agree::at;
 use crate::protocol::groups::{Assign, GroupRules, Groups, SessionPlan};
 use crate::protocol::keys::{Id, Key, Kind, Words as _, keys};
 use crate::protocol::section::Section;
-use crate::protocol::{FamilyRules, Part, Task};
+use crate::protocol::{FamilyRules, Identification, Mushra, Part, Task};
 use study_base::diagnostic::table::Document;
 use study_base::diagnostic::{Fault, did_you_mean};
 use study_base::text::{ModelId, PartId};
@@ -167,9 +167,10 @@ pub(super) fn agree(
                     own.keep(models);
                     (task.pairs.concat(), own.pairs.len())
                 }
-                Task::Mushra(task) => {
-                    let all = &task.presentations.models;
-                    let own = all.iter().filter(|m| models.contains(m));
+                Task::Mushra(Mushra { presentations, .. })
+                | Task::Identification(Identification { presentations, .. }) => {
+                    let all = &presentations.models;
+                    let own = all.iter().filter(|m| models.contains(m) || is_level(m));
                     (all.clone(), own.count())
                 }
                 Task::Discrimination { .. } => continue,

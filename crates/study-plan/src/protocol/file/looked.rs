@@ -1,9 +1,9 @@
 //! What the ids in parts and tracks stand for; every unknown one is reported.
 
 use super::agree::{Sections, at, unknown};
-use super::parts::RawPairs;
+use super::parts::{RawLabel, RawPairs};
 use crate::protocol::pairs::neighbors;
-use crate::protocol::{DeviceKind, FamilyRules, Presentations, Role};
+use crate::protocol::{Criterion, DeviceKind, FamilyRules, Label, Presentations, Role};
 use study_base::diagnostic::Fault;
 use study_base::diagnostic::table::Document;
 use study_base::text::{ModelId, PartId, QuestionId};
@@ -143,6 +143,67 @@ impl Looked<'_> {
     pub(super) fn practice(&self, raw: &Presentations, path: &str) {
         for (i, id) in raw.practice.iter().enumerate() {
             self.model(id, &format!("{path}.practice[{i}]"));
+        }
+    }
+
+    /// The labels with their realizations. Realizations that do not exist, those with two labels,
+    /// and practice trials with realizations that have none are reported.
+    pub(super) fn labels(
+        &self,
+        raw: &[RawLabel],
+        family: Option<&FamilyRules>,
+        practice: &[ModelId],
+        path: &str,
+    ) -> Option<Vec<Label>> {
+        let mut labels: Vec<Label> = Vec::new();
+        let is_labeled =
+            |labels: &[Label], id: &ModelId| labels.iter().any(|l| l.models.contains(id));
+        for (i, raw) in raw.iter().enumerate() {
+            let path = format!("{path}.answers[{i}]");
+            let levels = match (family, &raw.levels) {
+                (Some(family), Some(levels)) => self.levels(family, Some(levels), &path)?,
+                _ => Vec::new(),
+            };
+            for (j, id) in raw.models.iter().enumerate() {
+                self.model(id, &format!("{path}.models[{j}]"));
+            }
+            let models: Vec<ModelId> = raw.models.iter().cloned().chain(levels).collect();
+            for (j, id) in models.iter().enumerate() {
+                if models[..j].contains(id) || is_labeled(&labels, id) {
+                    let fault = Fault::error(format!("`{id}` is there twice"));
+                    self.fault_at(&path, fault);
+                }
+            }
+            let text = raw.text.clone();
+            labels.push(Label { text, models });
+        }
+        for (i, id) in practice.iter().enumerate() {
+            let place = format!("{path}.practice[{i}]");
+            if !is_labeled(&labels, id) && self.model(id, &place) {
+                let fault = Fault::error(format!("`{id}` has no label"));
+                self.fault_at(&place, fault.hint("its practice trial has no right answer"));
+            }
+        }
+        Some(labels)
+    }
+
+    /// Reports a criterion over more answers than practice has.
+    pub(super) fn reachable(
+        &self,
+        criterion: Option<&Criterion>,
+        practice: &[ModelId],
+        path: &str,
+    ) {
+        let Some(Criterion { of, rounds, .. }) = criterion else {
+            return;
+        };
+        let trials = practice.len() * *rounds as usize;
+        if !practice.is_empty() && (*of as usize) > trials {
+            let what = format!(
+                "`{path}.criterion` is never reached: practice has {trials} trials at most"
+            );
+            let fault = Fault::error(what).hint("raise rounds, or lower of");
+            self.fault(path, "criterion", fault);
         }
     }
 

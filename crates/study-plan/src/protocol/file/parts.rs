@@ -2,7 +2,7 @@
 
 use crate::protocol::keys::{Id, Key, Kind, Shape, Variants, Words as _, keys};
 use crate::protocol::section::{Section, Variant, shapes};
-use crate::protocol::{Exposure, IntervalOrder, Order, Presentations};
+use crate::protocol::{Criterion, Exposure, Feedback, IntervalOrder, Order, Presentations};
 use std::collections::BTreeMap;
 use study_base::diagnostic::Fault;
 use study_base::diagnostic::table::Value;
@@ -35,6 +35,24 @@ pub(super) const EXPOSURE: &[Key] = keys! {
     "replays": Kind::Whole(0, 100), "1", default("0");
 };
 
+const ANSWERS: &[Key] = keys! {
+    /// What the participant reads and chooses, in any language. No two are alike.
+    "label": Kind::Text, r#""one pulse""#, required;
+    /// The realizations of which it is the right answer, by id. Each has one label.
+    "models": Kind::ModelIds, r#"["lambda-0.9991"]"#;
+    /// The levels of the part's family of which it is the right answer.
+    "levels": Kind::NumberList, "[0.5]";
+};
+
+const CRITERION: &[Key] = keys! {
+    /// Practice ends once so many of the last answers are correct.
+    "correct": Kind::COUNT, "7", required;
+    /// How many of the last answers are counted; not fewer than `correct`.
+    "of": Kind::COUNT, "8", required;
+    /// How often the practice trials come at most, each time in an order that is drawn.
+    "rounds": Kind::Whole(1, 1000), "10", required;
+};
+
 static SHAPES: [Shape; KINDS.len()] = shapes(&KINDS);
 
 /// The words of `order`: a part has no file of orders.
@@ -58,7 +76,7 @@ macro_rules! presentation_keys {
 }
 
 /// The kinds of trial. A new one is declared here and in [`crate::protocol::Task`].
-pub(super) const KINDS: [Variant<RawTask>; 5] = [
+pub(super) const KINDS: [Variant<RawTask>; 6] = [
     Variant::new(
         "rating",
         "One realization is felt and rated.",
@@ -149,6 +167,26 @@ pub(super) const KINDS: [Variant<RawTask>; 5] = [
         },
         discrimination,
     ),
+    Variant::new(
+        "identification",
+        "One realization is felt, and the participant says which of several labels it has. Needs the format `study-protocol/3`.",
+        presentation_keys! {
+            /// What is asked, in any language.
+            "prompt": Kind::Text, r#""Which one was it?""#, required;
+            /// The labels, in their order on the page; at least two. Their realizations are felt.
+            "answers": Kind::Tables(ANSWERS), "", required;
+            /// One of `[[families]]`, of which labels have `levels`.
+            "family": Kind::Id(Id::Part), r#""detent""#;
+            /// When the participant is told whether the answer was correct, and which label was.
+            "feedback": Kind::Word(Feedback::WORDS), r#""always""#, default(r#""practice""#);
+            /// The realizations of the practice trials of the part, in this order. Each has a label. The
+            /// levels of a family are called `FAMILY.STEP`, from 1 for the lowest of its ladder.
+            "practice": Kind::ModelIds, r#"["lambda-0.9991", "lambda-0.9995"]"#;
+            /// When practice ends. Without it the practice trials come once, as listed.
+            "criterion": Kind::Table(CRITERION), "{ correct = 7, of = 8, rounds = 10 }";
+        },
+        identification,
+    ),
 ];
 
 /// A part as it was read; its ids are not looked up yet.
@@ -185,6 +223,15 @@ pub(super) enum RawTask {
         presentations: Presentations,
         gap_s: f64,
     },
+    Identification {
+        prompt: String,
+        family: Option<PartId>,
+        labels: Vec<RawLabel>,
+        feedback: Feedback,
+        criterion: Option<Criterion>,
+        /// Without models: they are those of the labels.
+        presentations: Presentations,
+    },
     Pairs {
         prompt: String,
         models: Option<Vec<ModelId>>,
@@ -200,6 +247,14 @@ pub(super) enum RawTask {
         tracks: Vec<PartId>,
         gap_s: f64,
     },
+}
+
+/// A label, and of what it is the right answer.
+#[derive(Debug)]
+pub(super) struct RawLabel {
+    pub(super) text: String,
+    pub(super) models: Vec<ModelId>,
+    pub(super) levels: Option<Vec<f64>>,
 }
 
 /// Which pairs are compared.
@@ -300,6 +355,92 @@ fn mushra(section: &mut Section<'_, '_>) -> Option<RawTask> {
         presentations: presentations?,
         gap_s: gap_s?,
     })
+}
+
+fn identification(section: &mut Section<'_, '_>) -> Option<RawTask> {
+    let (prompt, feedback) = (section.text("prompt"), section.word("feedback"));
+    let (family, labels) = (section.part_id("family"), labels(section));
+    let practice = section.model_ids("practice");
+    let criterion = match section.value("criterion") {
+        None => Some(None),
+        Some(_) => section.section("criterion").and_then(criterion).map(Some),
+    };
+    let path = section.path();
+    if let (Some(Some(_)), true) = (&criterion, practice.is_empty()) {
+        let what = format!("`{path}` has a criterion without practice trials");
+        let hint = "add practice = [\"a\", \"b\"], or leave the criterion out";
+        section.fault_at("criterion", Fault::error(what).hint(hint));
+    }
+    let has_levels = labels.iter().flatten().any(|l| l.levels.is_some());
+    if has_levels && family.is_none() {
+        let what = format!("`{path}` has labels of `levels` without a family");
+        section.fault_at("answers", Fault::error(what).hint("add family = \"…\""));
+    }
+    if family.is_some() && labels.is_some() && !has_levels {
+        let what = format!("no label of `{path}` has `levels` of its family");
+        section.fault_at("family", Fault::error(what).hint("leave the family out"));
+    }
+    let presentations = presentations(section, Vec::new(), practice);
+    Some(RawTask::Identification {
+        prompt: prompt?,
+        family,
+        labels: labels?,
+        feedback: feedback?,
+        criterion: criterion?,
+        presentations: presentations?,
+    })
+}
+
+/// Reads `answers`; `None` if one is faulty or they are too few.
+fn labels(section: &mut Section<'_, '_>) -> Option<Vec<RawLabel>> {
+    const SUCH_AS: &str = r#"such as answers = [{ label = "soft", models = ["a"] }, { label = "hard", models = ["b"] }]"#;
+    if section.value("answers").is_none() {
+        section.report_missing("answers", SUCH_AS.to_owned());
+        return None;
+    }
+    let mut labels: Vec<RawLabel> = Vec::new();
+    let entries = section.sections("answers");
+    let count = entries.len();
+    for mut entry in entries {
+        let (text, levels) = (entry.text("label"), entry.numbers("levels"));
+        let models = entry.model_ids("models");
+        let Some(text) = text else { continue };
+        if labels.iter().any(|l| l.text.trim() == text.trim()) {
+            let what = format!("the label `{}` is there twice", Untrusted(&text));
+            entry.fault_at("label", Fault::error(what));
+        }
+        if models.is_empty() && levels.is_none() {
+            let what = format!("no realization has the label `{}`", Untrusted(&text));
+            entry.fault_at("label", Fault::error(what).hint("such as models = [\"a\"]"));
+        }
+        labels.push(RawLabel {
+            text,
+            models,
+            levels,
+        });
+    }
+    if count < 2 {
+        let what = format!("`{}.answers` has fewer than two labels", section.path());
+        section.fault_at("answers", Fault::error(what).hint(SUCH_AS));
+        return None;
+    }
+    (labels.len() == count).then_some(labels)
+}
+
+fn criterion(mut section: Section<'_, '_>) -> Option<Criterion> {
+    let (correct, of) = (section.whole("correct"), section.whole("of"));
+    let rounds = section.whole("rounds");
+    let criterion = Criterion {
+        correct: correct?,
+        of: of?,
+        rounds: rounds?,
+    };
+    let Criterion { correct, of, .. } = criterion;
+    if correct > of {
+        let what = format!("`{}` is never reached: {correct} of {of}", section.path());
+        section.fault_at("correct", Fault::error(what));
+    }
+    Some(criterion)
 }
 
 fn pairs(section: &mut Section<'_, '_>) -> Option<RawTask> {

@@ -12,8 +12,8 @@ use super::{Content, Named};
 use crate::procedure::{Constant, Ladder, QuestPlus, Rule, Staircase, Track};
 use crate::protocol::relative::relative_ladder;
 use crate::protocol::{
-    Compared, FamilyRules, Method, Mushra, OrderVersion, Pairs, Part, Presentations, QuestionKind,
-    Relative, Task, TrackRules, kinds,
+    Compared, FamilyRules, Identification, Method, Mushra, OrderVersion, Pairs, Part,
+    Presentations, QuestionKind, Relative, Task, TrackRules, kinds,
 };
 use study_base::diagnostic::Fault;
 use study_base::diagnostic::table::Document;
@@ -84,6 +84,11 @@ impl Raw {
                         labels: labels.clone(),
                     });
                     Some(PartialQuestion::made(&part.path, id, prompt, scale))
+                }
+                RawTask::Identification { prompt, labels, .. } => {
+                    let labels: Vec<&str> = labels.iter().map(|l| l.text.as_str()).collect();
+                    let choice = one_of(&labels);
+                    Some(PartialQuestion::made(&part.path, id, prompt, choice))
                 }
                 RawTask::Pairs { prompt, tie, .. } => {
                     let options = &FIRST_OR_SECOND[..if *tie { 3 } else { 2 }];
@@ -236,8 +241,15 @@ impl Raw {
                 continue;
             };
             let of = |t: &RawTrack| matches!(&t.compared, Some(Compared::Levels { family, .. }) if family == id);
-            let estimated = |p: &RawPart| matches!(&p.task, Some(RawTask::Magnitude { family: Some((family, _)), .. }) if family == id);
-            if !self.tracks.iter().any(of) && !self.parts.iter().any(estimated) {
+            let felt = |p: &RawPart| match &p.task {
+                Some(RawTask::Magnitude {
+                    family: Some((family, _)),
+                    ..
+                }) => family == id,
+                Some(RawTask::Identification { family, .. }) => family.as_ref() == Some(id),
+                _ => false,
+            };
+            if !self.tracks.iter().any(of) && !self.parts.iter().any(felt) {
                 let fault = Fault::warning(format!("no track and no part has the family `{id}`"));
                 document.fault(fault.at(at(document, &family.path, "id")));
             }
@@ -305,6 +317,34 @@ impl Raw {
                 };
                 let gap_s = if reference.is_some() { *gap_s } else { 0.0 };
                 (Task::Mushra(task), gap_s)
+            }
+            RawTask::Identification {
+                family,
+                labels,
+                feedback,
+                criterion,
+                presentations,
+                ..
+            } => {
+                asks.push(QuestionId::new(id.as_str()).ok()?);
+                let practice = &presentations.practice;
+                let family = match family {
+                    Some(family) => Some(looked.family(family, families?, path)?),
+                    None => None,
+                };
+                let labels = looked.labels(labels, family, practice, path)?;
+                looked.reachable(criterion.as_ref(), practice, path);
+                let presentations = Presentations {
+                    models: labels.iter().flat_map(|l| l.models.clone()).collect(),
+                    ..presentations.clone()
+                };
+                let task = Identification {
+                    labels,
+                    feedback: *feedback,
+                    criterion: *criterion,
+                    presentations,
+                };
+                (Task::Identification(task), 0.0)
             }
             RawTask::Pairs {
                 models,

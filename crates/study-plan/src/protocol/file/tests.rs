@@ -567,6 +567,7 @@ fn any_text_is_read_without_a_panic() {
 
 mod factors;
 mod fits;
+mod identification;
 mod keys;
 mod parts;
 mod questionnaires;

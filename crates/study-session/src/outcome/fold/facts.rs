@@ -4,7 +4,7 @@ use super::trial::TrialHistory;
 use super::{Attempt, Completion, GivenAnswer, History, OpenAttempt};
 use crate::outcome::event::{FormId, Moment, Start, State};
 use study_base::text::{ModelId, PartId, QuestionId};
-use study_plan::protocol::{Answer, Trial};
+use study_plan::protocol::{Answer, Part, Trial};
 
 impl History {
     /// The first event, if the session has started.
@@ -37,15 +37,12 @@ impl History {
         self.schedule().iter().find(|t| t.trial == trial)
     }
 
-    /// Whether a trial is planned and of no track that ended before it.
+    /// Whether a trial is planned and of no track, and no practice, that ended before it.
     pub fn takes_place(&self, trial: u32) -> bool {
         let Some(planned) = self.planned(trial) else {
             return false;
         };
-        let ended = planned
-            .track()
-            .is_some_and(|t| self.ended_tracks.contains(t));
-        !ended || self.trials.contains_key(&trial)
+        !self.has_ended(planned) || self.trials.contains_key(&trial)
     }
 
     /// Number of planned trials that count, or of practice trials. Trials after the end of
@@ -55,9 +52,29 @@ impl History {
         count(planned.filter(|t| self.takes_place(t.trial)))
     }
 
-    /// Whether a track has ended.
-    pub fn has_ended(&self, track: &PartId) -> bool {
-        self.ended_tracks.contains(track)
+    /// Whether the track of a trial, or the practice to which it belongs, has ended.
+    pub fn has_ended(&self, trial: &Trial) -> bool {
+        let practice = trial.part.as_ref().filter(|_| trial.practice);
+        trial.track().is_some_and(|t| self.ended_tracks.contains(t))
+            || practice.is_some_and(|part| self.ended_practice.contains(part))
+    }
+
+    /// Whether the answers to the completed practice trials of a part of identification were
+    /// correct, in the order in which they were given. Declined ones are left out, and corrections change nothing.
+    pub fn practiced(&self, part: &Part) -> Vec<bool> {
+        let Some(own) = part.task.identification() else {
+            return Vec::new();
+        };
+        let correct = |(trial, attempt): &(u32, u32)| {
+            let planned = self.planned(*trial).filter(|t| t.practice)?;
+            let model = planned
+                .model()
+                .filter(|_| planned.part.as_ref() == Some(&part.id))?;
+            let attempts = &self.trials.get(trial)?.attempts;
+            let attempt = attempts.iter().find(|a| a.number == *attempt)?;
+            own.is_correct(model, attempt.told.as_ref()?)
+        };
+        self.told.iter().filter_map(correct).collect()
     }
 
     /// The completed trials of a track that count, in the order in which it was told.

@@ -153,19 +153,24 @@ fn asks(part: Option<&Part>, question: &QuestionId) -> bool {
     part.is_none_or(|part| part.asks.contains(question))
 }
 
-/// Whether the answer to a trial of a track is correct.
+/// Whether the answer to a trial of a track or of identification is correct.
 fn correct(
     trial: &Trial,
     track: Option<&TrackRules>,
     part: Option<&Part>,
     given: &[&GivenAnswer],
 ) -> Option<bool> {
-    let Stimuli::Track { intervals, .. } = &trial.stimuli else {
-        return None;
-    };
-    let question = part?.asks.first()?;
-    let answer = given.iter().find(|g| g.question == *question)?;
-    track?.is_correct(intervals, &answer.answer)
+    let part = part?;
+    let question = part.asks.first()?;
+    let given = given.iter().find(|g| g.question == *question)?;
+    match &trial.stimuli {
+        Stimuli::Track { intervals, .. } => track?.is_correct(intervals, &given.answer),
+        Stimuli::One { model } => {
+            let own = part.task.identification()?;
+            own.is_correct(model, &given.answer)
+        }
+        Stimuli::Rated { .. } | Stimuli::Pair { .. } => None,
+    }
 }
 
 fn is_rating(given: &GivenAnswer) -> bool {
