@@ -13,6 +13,7 @@ mod correct;
 mod device;
 mod device_selection;
 mod doctor;
+mod explore;
 mod export;
 mod help;
 mod identify;
@@ -56,6 +57,8 @@ enum Command {
     Rehearse(rehearse::Args),
     /// Analyze a study: statistics, figures, report
     Analyze(analyze::Args),
+    /// Show what a search found: maps, uncertainty, order of proposals
+    Explore(explore::Args),
     /// Check a protocol and its models
     Check(check::Args),
     /// How many participants, realizations and repetitions? Power of the planned design
@@ -117,6 +120,7 @@ pub fn run(cli: Cli, console: &mut Console) -> Result<(), Failure> {
         Command::Run(args) => run::run(&args, console),
         Command::Rehearse(args) => rehearse::run(&args, console),
         Command::Analyze(args) => analyze::run(&args, console),
+        Command::Explore(args) => explore::run(&args, console),
         Command::Check(args) => check::run(&args, console),
         Command::Power(args) => power::run(&args, console),
         Command::Export(args) => export::run(&args, console),

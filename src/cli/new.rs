@@ -80,6 +80,8 @@ enum TrialKind {
     /// A threshold by QUEST+
     #[value(name = "questplus")]
     QuestPlus,
+    /// A search for the best point of a space, by pairs
+    Search,
     /// A positive number for each level
     Magnitude,
     /// Ratings from 0 to 100 beside a reference
@@ -103,6 +105,7 @@ impl TrialKind {
             Self::TwoIntervals => (include_str!("new/constant.toml"), &[STATIC]),
             Self::Staircase => (include_str!("new/staircase.toml"), &[STATIC]),
             Self::QuestPlus => (include_str!("new/questplus.toml"), &[STATIC]),
+            Self::Search => (include_str!("new/search.toml"), &[STATIC]),
             Self::Magnitude => (include_str!("new/magnitude.toml"), &[STATIC]),
             Self::Mushra => (include_str!("new/mushra.toml"), &WITH_ANCHORS),
             Self::Identification => (include_str!("new/identification.toml"), &CROSSED),

@@ -62,7 +62,9 @@ impl From<RehearseError> for Failure {
 /// Runs the command.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let loaded = load::load(&args.protocol)?;
-    let without_tables = loaded.models.is_empty() && loaded.protocol.families.is_empty();
+    let without_tables = loaded.models.is_empty()
+        && loaded.protocol.families.is_empty()
+        && loaded.protocol.spaces.is_empty();
     let options = Options {
         participants: args.participants,
         seed: args.seed,

@@ -293,10 +293,14 @@ impl Rater {
         }
         let method = match &trial.stimuli {
             Stimuli::One { .. } | Stimuli::Rated { .. } => return None,
-            Stimuli::Pair { .. } => None,
+            Stimuli::Pair { .. } | Stimuli::Search { .. } => None,
             Stimuli::Track { track, .. } => Some(protocol.track(track)?.method),
         };
-        let options = method.map_or(&["first", "second", "tie"][..], Method::answers);
+        let options = match (&trial.stimuli, method) {
+            (_, Some(method)) => method.answers(),
+            (Stimuli::Search { .. }, None) => &["first", "second"][..],
+            (_, None) => &["first", "second", "tie"][..],
+        };
         let effect = self.effect;
         let Comparing {
             stream,

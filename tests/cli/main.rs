@@ -9,5 +9,6 @@ mod preregister;
 mod protocol_check;
 mod protocol_docs;
 mod protocol_schema;
+mod spaces;
 #[path = "../support/mod.rs"]
 mod support;

@@ -244,6 +244,7 @@ fn the_templates_of_parts_are_valid_and_broken_ones_are_not() {
         "identification",
         "yesno",
         "abx",
+        "search",
         "protocols/cloth/protocol.toml",
         "protocols/sounds/protocol.toml",
         "protocols/yes-no/protocol.toml",

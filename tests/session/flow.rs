@@ -16,6 +16,7 @@ mod refused;
 mod resume;
 mod rig;
 mod saving;
+mod search;
 mod studies;
 mod unasked;
 mod whole;

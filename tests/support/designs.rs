@@ -68,6 +68,7 @@ pub(crate) fn design(models: usize, repetitions: u32, order: Order) -> Protocol 
         setup: Vec::new(),
         parts: Vec::new(),
         families: Vec::new(),
+        spaces: Vec::new(),
         tracks: Vec::new(),
         groups: None,
         sessions: Vec::new(),

@@ -31,6 +31,7 @@ mod families;
 mod frozen;
 mod join;
 mod recordings;
+mod spaces;
 
 pub use frozen::{FrozenError, changes, damage, frozen, frozen_version, frozen_versions};
 pub use recordings::{Deliveries, RecordingError, deliveries};
@@ -103,7 +104,7 @@ pub struct Loaded {
     pub path: PathBuf,
     /// The table of each realization that has a file.
     pub models: BTreeMap<ModelId, Realization>,
-    /// The tables of all levels and standards of families.
+    /// The tables of all levels and standards of families, and of the points of spaces.
     pub levels: BTreeMap<ModelId, Realization>,
     /// The orders file, if the design has one.
     pub orders: Option<FileOrders>,
@@ -271,7 +272,9 @@ fn open(path: &Path, purpose: Purpose<'_>) -> (Option<Loaded>, Vec<Findings>) {
         join::certificates(&protocol, &others, &spans, &mut findings);
     }
     let played = purpose != Purpose::Data;
-    let levels = families::realizations(&protocol, &others, &spans, played, &mut findings);
+    let mut levels = families::realizations(&protocol, &others, &spans, played, &mut findings);
+    let points = spaces::realizations(&mut protocol, &others, &spans, played, &mut findings);
+    levels.extend(points);
     let orders = others.orders.take();
     // An order whose file is missing cannot be checked.
     if orders.is_some() || !matches!(protocol.design.order, Order::File(_)) {
@@ -322,7 +325,7 @@ struct OtherFiles<'f> {
     orders: Option<FileOrders>,
     /// Realization → index in `opened`.
     models: BTreeMap<ModelId, usize>,
-    /// The same for the ends of families.
+    /// The same for the ends of families and for spaces.
     ends: BTreeMap<ModelId, usize>,
 }
 
@@ -414,7 +417,7 @@ impl<'f> OtherFiles<'f> {
         }
     }
 
-    /// Assigns each realization and each end of a family its file.
+    /// Assigns each realization, each end of a family and each space its file.
     fn assign(&mut self, protocol: &Protocol) {
         let index = |file: Option<&String>| self.opened.iter().position(|o| Some(&o.file) == file);
         for model in &protocol.models {
@@ -427,6 +430,13 @@ impl<'f> OtherFiles<'f> {
                 if let (Some(id), Some(index)) = (family_file(&family.id, end), index(file)) {
                     self.ends.insert(id, index);
                 }
+            }
+        }
+        for space in &protocol.spaces {
+            if let (Some(id), Some(index)) =
+                (family_file(&space.id, "from"), index(Some(&space.from)))
+            {
+                self.ends.insert(id, index);
             }
         }
     }

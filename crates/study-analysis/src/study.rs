@@ -28,6 +28,7 @@ pub use pool::Pool;
 pub use source::{Site, SiteDevice, Source};
 pub use traces::Trace;
 
+use crate::analyze::psychophysics::search::{Exploration, explorations};
 use crate::analyze::psychophysics::{PartAnalysis, StudyData, parts};
 use crate::analyze::{
     self, Analysis, Deviation, Include, OrdinalEffort, Progress, Rules, Warning,
@@ -235,6 +236,15 @@ impl Study {
 
     /// The analysis of each part and questionnaire; none of a study without any.
     fn analyze_parts(&self, include: Include) -> Vec<PartAnalysis> {
+        self.with_data(|data| parts(data, include))
+    }
+
+    /// What each part that searches found; none of a study without one.
+    pub fn explore(&self, include: Include) -> Vec<Exploration> {
+        self.with_data(|data| explorations(data, include))
+    }
+
+    fn with_data<T>(&self, what: impl FnOnce(&StudyData<'_>) -> T) -> T {
         let sessions: Vec<_> = self.sessions.iter().map(|s| &s.history).collect();
         let data = StudyData {
             protocol: &self.loaded.protocol,
@@ -244,7 +254,7 @@ impl Study {
             sessions: &sessions,
             pools: true,
         };
-        parts(&data, include)
+        what(&data)
     }
 
     fn analyze_ratings(

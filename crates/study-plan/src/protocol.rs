@@ -33,6 +33,7 @@ pub mod rules;
 pub mod scale;
 pub mod schema;
 mod section;
+pub mod spaces;
 
 pub use answer::{Answer, Given, Refusal};
 pub use control::{Control, Pick};
@@ -51,6 +52,7 @@ pub use questionnaires::{Inventory, Questionnaire};
 pub use relative::Relative;
 pub use rules::Exclusion;
 pub use scale::Scale;
+pub use spaces::{Axis, SearchTask, SpaceRules};
 
 use keys::words;
 use serde::Serialize;
@@ -106,6 +108,9 @@ pub struct Protocol {
     /// `[[families]]`
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub families: Vec<FamilyRules>,
+    /// `[[spaces]]`
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub spaces: Vec<SpaceRules>,
     /// `[[tracks]]`
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub tracks: Vec<TrackRules>,

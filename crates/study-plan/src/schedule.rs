@@ -23,6 +23,7 @@ mod inclusion;
 pub mod orders;
 mod pairs;
 mod requeue;
+mod search;
 mod sequence;
 mod tracks;
 
@@ -32,6 +33,7 @@ pub use requeue::{Felt, Requeued, breaks_constraint, requeue};
 use crate::protocol::{FileOrders, Identification, Mushra, PartsOrder, Protocol, Stimuli, Task};
 use constraints::Violation;
 use pairs::PairOrders;
+use search::SearchOrders;
 use sequence::Sequence;
 use study_base::rng::Stream;
 use study_base::text::{ModelId, PartId};
@@ -242,6 +244,7 @@ enum Kind {
     Rating(Sequence),
     Pairs(PairOrders),
     Tracks(TrackOrders),
+    Search(SearchOrders),
 }
 
 /// A trial of a part before it is numbered.
@@ -306,6 +309,7 @@ impl Planner {
                 Task::Discrimination { tracks } => {
                     Kind::Tracks(TrackOrders::new(seed, &part.id, protocol, tracks)?)
                 }
+                Task::Search(own) => Kind::Search(SearchOrders::new(seed, &part.id, own)),
             };
             Ok(PartOrders {
                 part: id.cloned(),
@@ -376,7 +380,7 @@ impl Planner {
     pub fn verify(&self, participants: u32) -> Result<(), ScheduleError> {
         self.parts.iter().try_for_each(|part| match &part.kind {
             Kind::Rating(sequence) => sequence.verify(participants),
-            Kind::Pairs(_) | Kind::Tracks(_) => Ok(()),
+            Kind::Pairs(_) | Kind::Tracks(_) | Kind::Search(_) => Ok(()),
         })
     }
 }
@@ -388,6 +392,7 @@ impl PartOrders {
             Kind::Rating(sequence) => ratings(sequence, self.reference.as_ref(), seat)?,
             Kind::Pairs(pairs) => pairs.plan(seat)?,
             Kind::Tracks(tracks) => tracks.plan(seat),
+            Kind::Search(search) => search.plan(seat),
         };
         let last = |of: fn(&Trial) -> u32, practice: bool| {
             let same = trials.iter().filter(|t| t.practice == practice);

@@ -11,6 +11,7 @@ pub mod chart;
 pub mod commission;
 pub mod comparison;
 pub mod csv;
+pub mod explore;
 pub mod figures;
 pub mod html;
 pub mod identification;

@@ -1,7 +1,7 @@
 //! The preregistration as a document.
 
 use super::power::{Report, own_design};
-use super::study::track_in_words;
+use super::study::{search_rule, track_in_words};
 use super::{apa, sentences, wording};
 use chrono::NaiveDate;
 use serde_json::{Value, json};
@@ -408,6 +408,12 @@ fn trials(p: &Protocol, part: &Part) -> String {
                 ids.join(", ")
             )
         }
+        Task::Search(own) => format!(
+            "search in the space `{}`, {}, {}; it decides nothing",
+            own.space,
+            counted(own.rule.trials as usize, "pair", "pairs"),
+            search_rule(&own.rule)
+        ),
     }
 }
 

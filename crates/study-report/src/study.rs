@@ -4,7 +4,7 @@ mod details;
 mod parts;
 
 pub use details::details;
-pub use parts::track_in_words;
+pub use parts::{search_rule, track_in_words};
 
 use crate::csv::{self, TableFile};
 use crate::figures::{self, Drawn, Trace};

@@ -35,6 +35,7 @@ mod phase;
 mod project_view;
 pub mod roster;
 mod saving;
+mod search;
 mod tracks;
 mod trial;
 mod unsaved;
@@ -100,6 +101,8 @@ pub struct Session {
     parts_shown: BTreeSet<PartId>,
     /// Tracks in progress.
     running: Vec<tracks::Running>,
+    /// The last pair of a search, with the answers from which it follows.
+    searching: Option<search::Searching>,
     /// Whether the last answer was correct, until the participant is told.
     feedback: Option<Told>,
     /// Remarks of this process.
@@ -155,6 +158,7 @@ impl Session {
             passed: BTreeSet::new(),
             parts_shown: BTreeSet::new(),
             running: Vec::new(),
+            searching: None,
             feedback: None,
             remarks: Vec::new(),
             channel: None,

@@ -7,9 +7,10 @@ use std::fmt::Write as _;
 use study_base::text::{ModelId, PartId, Untrusted, counted};
 use study_plan::procedure::{Rule, Staircase};
 use study_plan::protocol::{
-    Identification, Interval, IntervalOrder, Mushra, Pairs, Part, PartsOrder, Protocol, Stimuli,
-    Task, TrackRules, Trial,
+    Identification, Interval, IntervalOrder, Mushra, Pairs, Part, PartsOrder, Protocol, SearchTask,
+    Stimuli, Task, TrackRules, Trial,
 };
+use study_report::study::search_rule;
 
 /// The orders of some rows.
 type Plans = [(u32, Vec<Trial>)];
@@ -74,6 +75,7 @@ pub(super) fn render(protocol: &Protocol, plans: &Plans, width: usize) -> String
                 let rules = ids.iter().filter_map(|id| protocol.track(id));
                 tracks(&mut out, &rules.collect::<Vec<_>>(), &own, width);
             }
+            Task::Search(task) => search(&mut out, task, &own, width),
         }
     }
     out
@@ -163,6 +165,24 @@ fn pairs(
         }
     };
     let _ = writeln!(out, "\n{words}");
+}
+
+/// Which point of each pair comes first; the pairs themselves follow from the answers.
+fn search(out: &mut String, task: &SearchTask, plans: &Plans, width: usize) {
+    let trials = counted(task.rule.trials as usize, "pair", "pairs");
+    let _ = writeln!(
+        out,
+        "{trials} of the space {}: {}",
+        task.space,
+        search_rule(&task.rule)
+    );
+    out.push_str("1 the point with the lower number comes first, 2 the other\n\n");
+    let code = |trial: &Trial| match &trial.stimuli {
+        Stimuli::Search { swapped, .. } => if *swapped { "2" } else { "1" }.to_owned(),
+        _ => String::new(),
+    };
+    orders(out, plans, 1, width, code);
+    out.push_str("\nPairs follow from the answers; docs/search.md says how.\n");
 }
 
 /// The order of tracks and of the intervals of their trials, and how often each sequence

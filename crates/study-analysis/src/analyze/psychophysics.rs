@@ -21,6 +21,7 @@ mod preferences;
 mod questionnaires;
 pub mod results;
 mod scales;
+pub mod search;
 mod sequential;
 mod standards;
 mod study;

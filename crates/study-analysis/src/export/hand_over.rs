@@ -295,6 +295,7 @@ fn settings(
             Task::Identification(_) => "identification",
             Task::Pairs(_) => "pairs",
             Task::Discrimination { .. } => "tracks",
+            Task::Search(_) => "search",
         };
         put(&format!("{kind} {}", part.id), question);
         for session in sessions_of(protocol, part).into_iter().flatten() {
@@ -329,7 +330,7 @@ fn settings(
                     put(&format!("label {} {model}", part.id), label);
                 }
             }
-            Task::Rating(_) | Task::Mushra(_) => {}
+            Task::Rating(_) | Task::Mushra(_) | Task::Search(_) => {}
         }
     }
     for (path, sum) in sums {

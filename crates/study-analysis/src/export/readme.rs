@@ -94,6 +94,11 @@ pub(super) fn methods(job: &Job<'_>) -> String {
                 "levels were told from a standard on {}",
                 counted(tracks.len(), "track", "tracks")
             ),
+            Task::Search(own) => format!(
+                "two points of the space {} were compared in {}, chosen from the answers before",
+                own.space,
+                counted(own.rule.trials as usize, "trial", "trials")
+            ),
         };
         text += &format!(" Part {}: {task}.", part.id);
     }

@@ -253,8 +253,8 @@ fn table<'a, R: Row>(
     }
 }
 
-/// Every realization of a study: those of the file, the levels of families, and the
-/// standards of tracks.
+/// Every realization of a study: those of the file, the levels of families, the points of
+/// spaces, and the standards of tracks.
 struct Realizations<'a> {
     protocol: &'a Protocol,
     ids: Vec<(ModelId, Option<(&'a str, f64)>)>,
@@ -270,6 +270,10 @@ impl<'a> Realizations<'a> {
         for family in &protocol.families {
             let levels = family.realizations();
             ids.extend(levels.map(|(id, level)| (id, Some((family.id.as_str(), level)))));
+        }
+        for space in &protocol.spaces {
+            let points = space.lattice.certified().iter();
+            ids.extend(points.map(|point| (space.realization(*point), None)));
         }
         for track in &protocol.tracks {
             let level = track.family().zip(track.standard_level());

@@ -129,7 +129,11 @@ fn plan(protocol: &Protocol, flags: &Overrides, part: &Part) -> Result<Plan, Pla
     let (world, spread, slope, own, repetitions) = match &part.task {
         Task::Pairs(pairs) => of_pairs(protocol, &stated, pairs, &mut defaults)?,
         Task::Discrimination { tracks } => of_tracks(protocol, &stated, tracks, &mut defaults)?,
-        Task::Rating(_) | Task::Magnitude(_) | Task::Mushra(_) | Task::Identification(_) => {
+        Task::Rating(_)
+        | Task::Magnitude(_)
+        | Task::Mushra(_)
+        | Task::Identification(_)
+        | Task::Search(_) => {
             return Err(PlanError::NoPower(part.id.clone()));
         }
     };

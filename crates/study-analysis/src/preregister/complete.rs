@@ -183,6 +183,8 @@ impl Made<'_> {
                     }
                 }
             }
+            // It has no test.
+            Task::Search(_) => {}
         }
     }
 

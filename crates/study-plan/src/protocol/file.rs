@@ -25,6 +25,7 @@ mod power;
 mod questionnaires;
 mod questions;
 mod resolve;
+mod spaces;
 mod tracks;
 
 pub use orders::parse_orders;
@@ -60,7 +61,7 @@ pub const ROOT: &[Key] = keys! {
     /// How a trial goes.
     "trial": Kind::Table(general::TRIAL), "";
     /// The realizations; at least one whose role is not `practice`.
-    "models": Kind::Tables(models::MODELS), "", derived("required, unless every part takes its levels from families");
+    "models": Kind::Tables(models::MODELS), "", derived("required, unless every part takes its levels from families or spaces");
     /// The factors of a factorial design: what is varied within participants. Every combination of
     /// their levels has a realization. Needs the format `study-protocol/3`.
     "factors": Kind::Tables(factors::FACTORS), "";
@@ -70,6 +71,9 @@ pub const ROOT: &[Key] = keys! {
     /// Dimensions of the stimulus: each is a ladder of levels, and each level a table of its
     /// own, certified and hashed before the session. Needs the format `study-protocol/2`.
     "families": Kind::Tables(families::FAMILIES), "";
+    /// Spaces of the parts of kind `search`: several dimensions of the stimulus at once, on a finite lattice whose points are
+    /// certified before the session. Needs the format `study-protocol/3`.
+    "spaces": Kind::Tables(spaces::SPACES), "";
     /// Tracks of the parts of kind `discrimination`. Needs the format `study-protocol/2`.
     "tracks": Kind::Tables(tracks::TRACKS), "";
     /// Groups of participants: each belongs to one for good. Needs the format
@@ -113,9 +117,10 @@ const FORMATS: &[Word] = &[
 const OF_FORMAT_2: [&str; 5] = ["parts", "families", "tracks", "groups", "sessions"];
 
 /// Keys that need [`FORMAT_3`], without the places in lists.
-pub const OF_FORMAT_3: [&str; 8] = [
+pub const OF_FORMAT_3: [&str; 9] = [
     "design.order_version",
     "factors",
+    "spaces",
     "models.levels",
     "parts.answers",
     "analysis.model",
@@ -305,6 +310,9 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
         families: (root.sections("families").into_iter())
             .map(families::read)
             .collect(),
+        spaces: (root.sections("spaces").into_iter())
+            .map(spaces::read)
+            .collect(),
         tracks: root
             .sections("tracks")
             .into_iter()
@@ -397,6 +405,7 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
         analysis: analysis?,
         parts: resolved.parts?,
         families: resolved.families?,
+        spaces: resolved.spaces?,
         tracks: resolved.tracks?,
         groups: match groups {
             None => None,

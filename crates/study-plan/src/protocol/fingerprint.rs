@@ -13,14 +13,17 @@
 //!   `uncertified`; each realization's id, role, device, `duplicate_of` and the
 //!   SHA-256 of its file; minimum strokes, exposure, duration of the reference; id,
 //!   scale and `required` of the questions after a trial; the orders file; parts
-//!   without their texts, tracks, groups, repeated sessions, and families with the SHA-256 of their files.
+//!   without their texts, tracks, groups, repeated sessions, and families and spaces with the SHA-256 of their
+//!   files; of spaces also which points are certified.
 //! * wording: title, authors and the like; all texts, prompts and labels; consent;
 //!   questions asked once (setup, intake, outro); who types, and when a session
 //!   can be resumed.
 //! * analysis: `[analysis]`, planned participants, VAF and covariates, `[device.rendering]`.
 
 use super::keys::word;
-use super::{FamilyRules, FileOrders, FitRules, Order, Part, Protocol, Question, TrackRules};
+use super::{
+    FamilyRules, FileOrders, FitRules, Order, Part, Protocol, Question, SpaceRules, TrackRules,
+};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -95,6 +98,7 @@ pub fn parts(
         analysis,
         parts,
         families,
+        spaces,
         tracks,
         groups,
         sessions,
@@ -180,6 +184,9 @@ pub fn parts(
         stimulus["tracks"] = json!(tracks);
     }
     // Absent from the fingerprints of protocols without them.
+    if !spaces.is_empty() {
+        stimulus["spaces"] = spaces.iter().map(|s| points(s, model_bytes)).collect();
+    }
     if groups.is_some() {
         stimulus["groups"] = json!(groups);
     }
@@ -283,6 +290,23 @@ fn levels(family: &FamilyRules, model_bytes: &BTreeMap<ModelId, Vec<u8>>) -> Val
     })
 }
 
+/// What of a space determines its points.
+fn points(space: &SpaceRules, model_bytes: &BTreeMap<ModelId, Vec<u8>>) -> Value {
+    let SpaceRules {
+        id,
+        from: _,
+        axes,
+        lattice,
+    } = space;
+    let bytes = family_file(id, "from").and_then(|id| model_bytes.get(&id));
+    json!({
+        "id": id,
+        "axes": axes,
+        "lattice": lattice,
+        "from": bytes.map(sha256),
+    })
+}
+
 /// How the functions of a track are fitted, as far as the protocol says it.
 fn fit(track: &TrackRules) -> Value {
     let FitRules { scale, core, lapse } = track.fit;
@@ -292,7 +316,7 @@ fn fit(track: &TrackRules) -> Value {
     })
 }
 
-/// Under which id the bytes of a family's file are passed to [`parts`]: `id.from`, `id.to`.
+/// Under which id the bytes of a file of a family or a space are passed to [`parts`]: `id.from`, `id.to`.
 pub fn family_file(family: &PartId, end: &str) -> Option<ModelId> {
     ModelId::new(format!("{family}.{end}")).ok()
 }

@@ -134,7 +134,7 @@ impl Protocol {
                         let stays = |m: &ModelId| models.contains(m) || self.level_of(m).is_some();
                         task.presentations.models.retain(stays);
                     }
-                    Task::Discrimination { .. } => {}
+                    Task::Discrimination { .. } | Task::Search(_) => {}
                 }
             }
         }

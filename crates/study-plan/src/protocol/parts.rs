@@ -6,7 +6,7 @@
 //! [`crate::procedure`].
 
 use super::keys::words;
-use super::{Answer, Design, Identification, Order, Pairs, Protocol, Relative, Seat};
+use super::{Answer, Design, Identification, Order, Pairs, Protocol, Relative, SearchTask, Seat};
 use crate::procedure::{Ladder, ProcedureError, Rule, Track};
 use serde::{Deserialize, Serialize};
 use study_base::rng::Stream;
@@ -49,6 +49,8 @@ pub enum Task {
         /// `[[tracks]]`, by id.
         tracks: Vec<PartId>,
     },
+    /// Two points of a space are felt, and one is chosen; which come next follows from the answers.
+    Search(SearchTask),
 }
 
 /// Which realizations a part with one rating a trial presents, and in which order.
@@ -85,7 +87,7 @@ impl Task {
             Self::Rating(own) | Self::Magnitude(own) => Some(own),
             Self::Mushra(own) => Some(&own.presentations),
             Self::Identification(own) => Some(&own.presentations),
-            Self::Pairs(_) | Self::Discrimination { .. } => None,
+            Self::Pairs(_) | Self::Discrimination { .. } | Self::Search(_) => None,
         }
     }
 
@@ -97,7 +99,8 @@ impl Task {
             | Self::Magnitude(_)
             | Self::Identification(_)
             | Self::Pairs(_)
-            | Self::Discrimination { .. } => None,
+            | Self::Discrimination { .. }
+            | Self::Search(_) => None,
         }
     }
 
@@ -375,7 +378,7 @@ impl FamilyRules {
 pub const MAX_LEVELS: usize = 999;
 
 /// `name.of` as the id of a realization. Both are short enough.
-fn named(name: &PartId, of: &str) -> ModelId {
+pub(super) fn named(name: &PartId, of: &str) -> ModelId {
     let id = ModelId::new(format!("{name}.{of}"));
     id.expect("a part id has at most 20 characters and those of a model id")
 }

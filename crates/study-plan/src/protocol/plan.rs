@@ -61,6 +61,13 @@ pub enum Stimuli {
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         easy: bool,
     },
+    /// A trial of a search. Its two points follow from the answers before it.
+    Search {
+        /// The space.
+        space: PartId,
+        /// Whether the point with the higher number comes first.
+        swapped: bool,
+    },
 }
 
 impl Stimuli {
@@ -79,7 +86,7 @@ impl Trial {
     pub fn model(&self) -> Option<&ModelId> {
         match &self.stimuli {
             Stimuli::One { model } | Stimuli::Rated { model, .. } => Some(model),
-            Stimuli::Pair { .. } | Stimuli::Track { .. } => None,
+            Stimuli::Pair { .. } | Stimuli::Track { .. } | Stimuli::Search { .. } => None,
         }
     }
 
@@ -87,8 +94,16 @@ impl Trial {
     pub fn track(&self) -> Option<&PartId> {
         match &self.stimuli {
             Stimuli::Track { track, .. } => Some(track),
-            Stimuli::One { .. } | Stimuli::Rated { .. } | Stimuli::Pair { .. } => None,
+            Stimuli::One { .. }
+            | Stimuli::Rated { .. }
+            | Stimuli::Pair { .. }
+            | Stimuli::Search { .. } => None,
         }
+    }
+
+    /// Whether what it presents follows from the answers before it.
+    pub fn follows_from_answers(&self) -> bool {
+        matches!(self.stimuli, Stimuli::Track { .. } | Stimuli::Search { .. })
     }
 }
 

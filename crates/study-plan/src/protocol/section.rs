@@ -122,7 +122,9 @@ impl<'d, 't> Section<'d, 't> {
         let array = matches!(key.kind, Kind::Tables(_) | Kind::Variants(_));
         if value.is_none() && key.absent == Absent::Error && !array {
             let hint = match key.kind {
-                Kind::Table(keys) => needed(keys),
+                Kind::Table(keys) if keys.iter().any(|key| key.absent == Absent::Error) => {
+                    needed(keys)
+                }
                 Kind::Word(_) | Kind::WordOrTable(..) => key.kind.describe(),
                 _ => key.such_as(),
             };

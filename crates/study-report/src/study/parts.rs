@@ -4,7 +4,7 @@ use crate::figures::of_part;
 use crate::html::PartReport;
 use study_analysis::analyze::psychophysics::PartAnalysis;
 use study_base::text::counted;
-use study_plan::procedure::Rule;
+use study_plan::procedure::{Choose, Rule, SearchRule};
 use study_plan::protocol::identification::{Criterion, Feedback};
 use study_plan::protocol::pairs::IntervalOrder;
 use study_plan::protocol::parts::{Compared, Part, Task, TrackRules};
@@ -105,6 +105,13 @@ fn trials(protocol: &Protocol, part: &Part) -> String {
             let tracks = tracks.iter().filter_map(|id| protocol.track(id));
             text.extend(tracks.map(|track| track_in_words(protocol, track)));
         }
+        Task::Search(own) => text.push(format!(
+            "In each of {} two points of the space {} were felt one after the other and one was chosen; the pairs were {}. \
+             Which of the two came first was drawn for each trial.",
+            counted(own.rule.trials as usize, "trial", "trials"),
+            own.space,
+            search_rule(&own.rule)
+        )),
     }
     let exposure = &part.exposure;
     let mut felt = match part.gap_s > 0.0 {
@@ -129,6 +136,18 @@ fn trials(protocol: &Protocol, part: &Part) -> String {
     };
     text.push(felt.trim_start().to_owned());
     text.join(" ")
+}
+
+/// How the pairs of a search are chosen.
+pub fn search_rule(rule: &SearchRule) -> String {
+    match rule.choose {
+        Choose::PreferenceGp { start } => format!(
+            "the first {start} of a Sobol sequence, then those with the largest expected utility of the better point by a \
+             Gaussian process of the participant's answers (EUBO)"
+        ),
+        Choose::Sobol => "those of a Sobol sequence".to_owned(),
+        Choose::Random => "drawn at random".to_owned(),
+    }
 }
 
 /// What a track compares, and by which rule.

@@ -20,6 +20,7 @@ mod attempt_log;
 mod facts;
 mod interval_log;
 mod rows;
+mod search;
 mod tracks;
 mod trial;
 
@@ -64,7 +65,7 @@ pub struct History {
     ended_tracks: BTreeSet<PartId>,
     /// Parts whose practice reached its criterion.
     ended_practice: BTreeSet<PartId>,
-    /// Completed trials of tracks and of practice, in the order in which tracks and criteria were told.
+    /// Completed trials of tracks, searches and practice, in the order in which these were told.
     told: Vec<(u32, u32)>,
     /// Numbers of closed trials after which a break began.
     pub breaks: BTreeSet<u32>,
@@ -446,7 +447,7 @@ impl History {
                 number,
             });
         }
-        if practice || self.planned(trial).is_some_and(|t| t.track().is_some()) {
+        if practice || self.planned(trial).is_some_and(Trial::follows_from_answers) {
             self.told.push((trial, attempt));
         }
         self.queue.retain(|t| *t != trial);

@@ -235,7 +235,7 @@ impl Session {
                 let label = own.label_of(model).map(str::to_owned);
                 Some(Told { correct, label })
             }
-            Stimuli::Rated { .. } | Stimuli::Pair { .. } => None,
+            Stimuli::Rated { .. } | Stimuli::Pair { .. } | Stimuli::Search { .. } => None,
         }
     }
 

@@ -291,6 +291,7 @@ impl Session {
         self.current_device() != DeviceKind::Process
             || protocol.models.iter().any(|m| m.file.is_some())
             || !protocol.families.is_empty()
+            || !protocol.spaces.is_empty()
     }
 
     /// A device problem does not hide a form; it is shown as a notice while it lasts.
@@ -399,8 +400,11 @@ impl Session {
                     .flatten()
                     .any(|file| name.contains(file.as_str()))
         });
+        let of_space = self.protocol.spaces.iter().any(|space| {
+            name.contains(&format!("{}.", space.id)) || name.contains(space.from.as_str())
+        });
         let standard = |t: &TrackRules| name.contains(&format!("{}.standard", t.id));
-        if of_family || self.protocol.tracks.iter().any(standard) {
+        if of_family || of_space || self.protocol.tracks.iter().any(standard) {
             return true;
         }
         self.protocol.models.iter().any(|model| {

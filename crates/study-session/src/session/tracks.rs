@@ -1,5 +1,5 @@
 //! What the next attempt presents: of a track, the level that follows from the answers so
-//! far. Which practice has reached its criterion.
+//! far; of a search, its two points (`search`). Which practice has reached its criterion.
 
 use super::Session;
 use crate::outcome::{Event, Moment, TrackLevel};
@@ -37,6 +37,10 @@ impl Session {
                 return Some(Presenting::of(vec![reference.clone(), model.clone()]));
             }
             Stimuli::Pair { pair } => return Some(Presenting::of(pair.to_vec())),
+            Stimuli::Search { swapped, .. } => {
+                let models = self.searched(trial, *swapped)?;
+                return Some(Presenting::of(models));
+            }
             Stimuli::Track {
                 track,
                 intervals,

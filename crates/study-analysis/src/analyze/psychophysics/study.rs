@@ -88,7 +88,10 @@ pub fn parts(study: &StudyData<'_>, include: Include) -> Vec<PartAnalysis> {
                 "groups and sessions are not compared in this part: its means are those of all participants \
                  together",
             ),
-            Task::Rating(_) | Task::Discrimination { .. } | Task::Identification(_) => None,
+            Task::Rating(_)
+            | Task::Discrimination { .. }
+            | Task::Identification(_)
+            | Task::Search(_) => None,
         };
         let several = protocol.groups.is_some() || sessions_of(protocol, part).len() > 1;
         if let Some(text) = uncompared.filter(|_| several) {
@@ -172,6 +175,24 @@ fn of_part_task(
             }
             Some(found)
         }
+        Task::Search(_) => Some(of_search(rows)),
+    }
+}
+
+/// A search has no test: what it found is confirmed with participants who did not search.
+fn of_search(rows: &[&RatingRow]) -> Found {
+    Found {
+        task: "search",
+        trials: rows.len(),
+        results: PartResults::undefined("a search has no statistics that decide anything"),
+        warnings: vec![Warning {
+            code: "search",
+            text: "pairs were chosen by the answers before them, so that no test of them has its level; what a search \
+                   found has to be confirmed with participants who did not take part in it"
+                .to_owned(),
+        }],
+        data: PartData::default(),
+        names: Vec::new(),
     }
 }
 

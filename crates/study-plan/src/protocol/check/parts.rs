@@ -7,7 +7,7 @@ use crate::protocol::{
     Task, TrackRules,
 };
 use study_base::diagnostic::Fault;
-use study_base::text::{ModelId, PartId};
+use study_base::text::{ModelId, PartId, counted};
 
 /// Fewest levels of a magnitude estimation that need no warning.
 const MAGNITUDE_LEVELS: usize = 5;
@@ -20,6 +20,8 @@ const TRACK_TRIALS: u32 = 30;
 const TRIALS_OF_A_LEVEL: u32 = 20;
 /// The same for the catch trials of a track.
 const CATCH_TRIALS: f64 = 10.0;
+/// The same for each axis of a search.
+const PAIRS_OF_AN_AXIS: u32 = 10;
 /// The same for the reversals of a staircase.
 const REVERSALS: u32 = 6;
 
@@ -55,6 +57,7 @@ pub(super) fn trials(protocol: &Protocol, part: &Part) -> u32 {
         }
         Task::Pairs(own) => all(own.pairs.len(), own.repetitions),
         Task::Discrimination { tracks: ids } => tracks(protocol, ids).map(track_trials).sum(),
+        Task::Search(own) => own.rule.trials,
     }
 }
 
@@ -64,7 +67,7 @@ pub(super) fn seconds(protocol: &Protocol, part: &Part, reference_s: f64) -> f64
     let intervals = match &part.task {
         Task::Rating(_) | Task::Magnitude(_) | Task::Identification(_) => 1,
         Task::Mushra(own) => 1 + usize::from(own.reference.is_some()),
-        Task::Pairs(_) => 2,
+        Task::Pairs(_) | Task::Search(_) => 2,
         Task::Discrimination { tracks: ids } => tracks(protocol, ids)
             .map(|track| track.method.sequences()[0].len())
             .max()
@@ -76,7 +79,8 @@ pub(super) fn seconds(protocol: &Protocol, part: &Part, reference_s: f64) -> f64
         | Task::Mushra(_)
         | Task::Identification(_)
         | Task::Pairs(_)
-        | Task::Discrimination { .. } => pace::COMPARE_S,
+        | Task::Discrimination { .. }
+        | Task::Search(_) => pace::COMPARE_S,
     };
     let felt_s = part.exposure.max_s.map_or(free_s, |max| max.min(free_s));
     let load_s = match protocol.device.kind {
@@ -106,6 +110,7 @@ pub(super) fn warnings(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Faul
             magnitudes(protocol, part),
             few_names(protocol, part),
             one_order(part),
+            few_pairs(protocol, part),
         ];
         let doubts = doubts.into_iter().flatten();
         faults.extend(doubts.map(|fault| fault.at(place.clone())));
@@ -143,7 +148,7 @@ fn presented(protocol: &Protocol, model: &ModelId) -> bool {
 /// Whether realizations are rated or compared, so that their number matters.
 pub fn is_about_realizations(protocol: &Protocol) -> bool {
     let about = |part: &Part| match &part.task {
-        Task::Discrimination { .. } | Task::Identification(_) => false,
+        Task::Discrimination { .. } | Task::Identification(_) | Task::Search(_) => false,
         Task::Magnitude(own) => own.models.iter().all(|m| protocol.level_of(m).is_none()),
         Task::Rating(_) | Task::Mushra(_) | Task::Pairs(_) => true,
     };
@@ -203,6 +208,21 @@ fn one_order(part: &Part) -> Option<Fault> {
             own.repetitions, part.id
         );
         Fault::warning(what).hint("take an even number; the orders are balanced over two rows")
+    })
+}
+
+/// A search that ends before its model has learned anything of the space.
+fn few_pairs(protocol: &Protocol, part: &Part) -> Option<Fault> {
+    let (space, rule) = protocol.searched(part)?;
+    let least = PAIRS_OF_AN_AXIS * space.axes.len() as u32;
+    (rule.trials < least).then(|| {
+        Fault::warning(format!(
+            "the search `{}` has {} trials: {least} and more are needed for {}",
+            part.id,
+            rule.trials,
+            counted(space.axes.len(), "axis", "axes")
+        ))
+        .hint("docs/search.md shows how near the best point a search comes")
     })
 }
 

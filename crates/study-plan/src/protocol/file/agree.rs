@@ -210,9 +210,11 @@ impl Sections<'_> {
                 );
             }
         }
+        let has = |list| document.span_of(list).is_some();
         let plays = self.models.iter().any(|m| m.file.is_some())
-            || document.span_of("families").is_some()
-            || document.span_of("families[0]").is_some();
+            || ["families", "families[0]", "spaces", "spaces[0]"]
+                .into_iter()
+                .any(has);
         if device.kind == DeviceKind::Process
             && plays
             && document.span_of("device.limits").is_none()

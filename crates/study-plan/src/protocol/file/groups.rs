@@ -173,7 +173,7 @@ pub(super) fn agree(
                     let own = all.iter().filter(|m| models.contains(m) || is_level(m));
                     (all.clone(), own.count())
                 }
-                Task::Discrimination { .. } => continue,
+                Task::Discrimination { .. } | Task::Search(_) => continue,
             };
             if left == 0 {
                 let what = format!(

@@ -2,6 +2,7 @@
 
 use super::agree::{Sections, at, unknown};
 use super::parts::{RawLabel, RawPairs};
+use super::spaces::PartialSpace;
 use crate::protocol::pairs::neighbors;
 use crate::protocol::{Criterion, DeviceKind, FamilyRules, Label, Presentations, Role};
 use study_base::diagnostic::Fault;
@@ -66,6 +67,30 @@ impl Looked<'_> {
             self.fault(path, "family", unknown("family", id.as_str(), known));
         }
         found
+    }
+
+    /// Reports a space that there is not. Samples mounted by hand have none.
+    pub(super) fn space(&self, id: &PartId, spaces: &[PartialSpace], path: &str) {
+        let device = self.sections.device;
+        if device.is_some_and(|d| d.kind == DeviceKind::Manual) {
+            let fault = Fault::error("samples mounted by hand are no points of a space");
+            let hint = "a part of kind \"pairs\" compares samples";
+            self.fault(path, "space", fault.hint(hint));
+        }
+        // One with a fault of its own may be the one that is meant.
+        if spaces.iter().any(|space| space.space.is_none()) {
+            return;
+        }
+        let known = || {
+            spaces
+                .iter()
+                .filter_map(|s| s.space.as_ref())
+                .map(|s| &s.id)
+        };
+        if !known().any(|known| known == id) {
+            let known = known().map(PartId::as_str);
+            self.fault(path, "space", unknown("space", id.as_str(), known));
+        }
     }
 
     /// The realizations of some levels of a family, or of all.

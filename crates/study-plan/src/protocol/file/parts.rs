@@ -1,5 +1,7 @@
 //! `[[parts]]`: trials of one kind each.
 
+use super::spaces::RULES;
+use crate::procedure::SearchRule;
 use crate::protocol::keys::{Id, Key, Kind, Shape, Variants, Words as _, keys};
 use crate::protocol::section::{Section, Variant, shapes};
 use crate::protocol::{Criterion, Exposure, Feedback, IntervalOrder, Order, Presentations};
@@ -75,8 +77,21 @@ macro_rules! presentation_keys {
     };
 }
 
+/// Keys of a part that searches.
+const SEARCH: &[Key] = keys! {
+    /// What is asked, in any language.
+    "prompt": Kind::Text, r#""Which one felt more real?""#, required;
+    /// One of `[[spaces]]`. It needs the format `study-protocol/3`.
+    "space": Kind::Id(Id::Part), r#""switch""#, required;
+    /// Which pairs are presented, and how many.
+    "rule": Kind::Variant(&super::spaces::RULE), "", required;
+    /// From the end of the first interval to the start of the second. Both are loaded
+    /// anew in this time.
+    "gap_s": Kind::positive("s"), "1.5", default("1");
+};
+
 /// The kinds of trial. A new one is declared here and in [`crate::protocol::Task`].
-pub(super) const KINDS: [Variant<RawTask>; 6] = [
+pub(super) const KINDS: [Variant<RawTask>; 7] = [
     Variant::new(
         "rating",
         "One realization is felt and rated.",
@@ -187,6 +202,12 @@ pub(super) const KINDS: [Variant<RawTask>; 6] = [
         },
         identification,
     ),
+    Variant::new(
+        "search",
+        "Two points of a space are felt one after the other, and one is chosen: `first` or `second`. Which two come next follows from the answers.",
+        SEARCH,
+        search,
+    ),
 ];
 
 /// A part as it was read; its ids are not looked up yet.
@@ -245,6 +266,12 @@ pub(super) enum RawTask {
     Discrimination {
         prompt: String,
         tracks: Vec<PartId>,
+        gap_s: f64,
+    },
+    Search {
+        prompt: String,
+        space: PartId,
+        rule: SearchRule,
         gap_s: f64,
     },
 }
@@ -507,6 +534,23 @@ fn discrimination(section: &mut Section<'_, '_>) -> Option<RawTask> {
     Some(RawTask::Discrimination {
         prompt: prompt?,
         tracks: tracks?,
+        gap_s: gap_s?,
+    })
+}
+
+fn search(section: &mut Section<'_, '_>) -> Option<RawTask> {
+    let (prompt, space) = (section.text("prompt"), section.part_id("space"));
+    let rule = section.variant("rule", &RULES);
+    if rule.is_none() && section.value("rule").is_none() {
+        let hint = "such as rule = { name = \"preference-gp\", trials = 40 }";
+        section.report_missing("rule", hint.to_owned());
+    }
+    let rule = rule.and_then(|(mut section, rule)| (rule?.read)(&mut section));
+    let gap_s = section.number("gap_s");
+    Some(RawTask::Search {
+        prompt: prompt?,
+        space: space?,
+        rule: rule?,
         gap_s: gap_s?,
     })
 }

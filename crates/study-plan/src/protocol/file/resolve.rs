@@ -7,13 +7,14 @@ use super::grids::Grids;
 use super::looked::Looked;
 use super::parts::{RawPairs, RawPart, RawTask};
 use super::questions::PartialQuestion;
+use super::spaces::PartialSpace;
 use super::tracks::{RawRule, RawTrack};
 use super::{Content, Named};
 use crate::procedure::{Constant, Ladder, QuestPlus, Rule, Staircase, Track};
 use crate::protocol::relative::relative_ladder;
 use crate::protocol::{
     Compared, FamilyRules, Identification, Method, Mushra, OrderVersion, Pairs, Part,
-    Presentations, QuestionKind, Relative, Task, TrackRules, kinds,
+    Presentations, QuestionKind, Relative, SearchTask, SpaceRules, Task, TrackRules, kinds,
 };
 use study_base::diagnostic::Fault;
 use study_base::diagnostic::table::Document;
@@ -36,6 +37,7 @@ fn one_of(options: &[&str]) -> QuestionKind {
 pub(super) struct Raw {
     pub(super) parts: Vec<RawPart>,
     pub(super) families: Vec<PartialFamily>,
+    pub(super) spaces: Vec<PartialSpace>,
     pub(super) tracks: Vec<RawTrack>,
 }
 
@@ -44,11 +46,12 @@ pub(super) struct Raw {
 pub(super) struct Resolved {
     pub(super) parts: Option<Vec<Part>>,
     pub(super) families: Option<Vec<FamilyRules>>,
+    pub(super) spaces: Option<Vec<SpaceRules>>,
     pub(super) tracks: Option<Vec<TrackRules>>,
 }
 
 impl Raw {
-    /// The files that families name.
+    /// The files that families and spaces name.
     pub(super) fn files(&self) -> Vec<Named> {
         let of = |family: &PartialFamily| {
             let named = family.files.iter().map(|(key, file)| Named {
@@ -58,7 +61,14 @@ impl Raw {
             });
             named.collect::<Vec<_>>()
         };
-        self.families.iter().flat_map(of).collect()
+        let spaces = self.spaces.iter().filter_map(|space| {
+            Some(Named {
+                place: format!("{}.from", space.path),
+                file: space.file.clone()?,
+                content: Content::Model,
+            })
+        });
+        self.families.iter().flat_map(of).chain(spaces).collect()
     }
 
     /// The questions with which trials of pairs and of discrimination begin.
@@ -99,6 +109,12 @@ impl Raw {
                         one_of(options),
                     ))
                 }
+                RawTask::Search { prompt, .. } => Some(PartialQuestion::made(
+                    &part.path,
+                    id,
+                    prompt,
+                    one_of(&FIRST_OR_SECOND[..2]),
+                )),
                 RawTask::Discrimination { prompt, tracks, .. } => {
                     let first = self.track(tracks.first()?)?;
                     let options = first.method?.answers();
@@ -135,6 +151,7 @@ impl Raw {
             return Resolved {
                 parts: None,
                 families: None,
+                spaces: None,
                 tracks: None,
             };
         }
@@ -149,9 +166,11 @@ impl Raw {
         self.conditions(tracks.as_deref().unwrap_or_default(), &looked);
         let parts = self.parts.iter().map(|p| self.part(p, known, &looked));
         let parts = parts.collect();
+        let spaces = self.spaces.iter().map(|s| s.space.clone()).collect();
         Resolved {
             parts,
             families,
+            spaces,
             tracks,
         }
     }
@@ -195,10 +214,13 @@ impl Raw {
         let parts = self.parts.iter().map(|p| (p.id.clone(), p.path.as_str()));
         let families = (self.families.iter())
             .map(|f| (f.family.as_ref().map(|f| f.id.clone()), f.path.as_str()));
+        // Levels of both have the same kind of names.
+        let spaces =
+            (self.spaces.iter()).map(|s| (s.space.as_ref().map(|s| s.id.clone()), s.path.as_str()));
         let tracks = self.tracks.iter().map(|t| (t.id.clone(), t.path.as_str()));
         for list in [
             parts.collect::<Vec<_>>(),
-            families.collect(),
+            families.chain(spaces).collect(),
             tracks.collect(),
         ] {
             for (i, (id, path)) in list.iter().enumerate() {
@@ -222,7 +244,7 @@ impl Raw {
         }
     }
 
-    /// Reports tracks and families that no part uses.
+    /// Reports tracks, families and spaces that no part uses.
     fn unused(&self, document: &Document<'_>) {
         let named = |part: &RawPart| match &part.task {
             Some(RawTask::Discrimination { tracks, .. }) => tracks.clone(),
@@ -252,6 +274,17 @@ impl Raw {
             if !self.tracks.iter().any(of) && !self.parts.iter().any(felt) {
                 let fault = Fault::warning(format!("no track and no part has the family `{id}`"));
                 document.fault(fault.at(at(document, &family.path, "id")));
+            }
+        }
+        for space in &self.spaces {
+            let Some(id) = space.space.as_ref().map(|s| &s.id) else {
+                continue;
+            };
+            let searched =
+                |p: &RawPart| matches!(&p.task, Some(RawTask::Search { space, .. }) if space == id);
+            if !self.parts.iter().any(searched) {
+                let fault = Fault::warning(format!("no part searches in the space `{id}`"));
+                document.fault(fault.at(at(document, &space.path, "id")));
             }
         }
     }
@@ -375,6 +408,14 @@ impl Raw {
                 self.tracks_of(tracks, path, looked)?;
                 let tracks = tracks.clone();
                 (Task::Discrimination { tracks }, *gap_s)
+            }
+            RawTask::Search {
+                space, rule, gap_s, ..
+            } => {
+                asks.push(QuestionId::new(id.as_str()).ok()?);
+                looked.space(space, &self.spaces, path);
+                let (space, rule) = (space.clone(), *rule);
+                (Task::Search(SearchTask { space, rule }), *gap_s)
             }
         };
         if !matches!(task, Task::Rating(_)) {

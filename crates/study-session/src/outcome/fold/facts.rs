@@ -82,8 +82,16 @@ impl History {
         &'a self,
         track: &'a PartId,
     ) -> impl Iterator<Item = (&'a Trial, &'a Attempt)> + 'a {
+        self.told_of(move |trial| trial.track() == Some(track))
+    }
+
+    /// The completed trials that count of those that follow from answers, in the order in which these were told.
+    pub(super) fn told_of<'a>(
+        &'a self,
+        which: impl Fn(&Trial) -> bool + 'a,
+    ) -> impl Iterator<Item = (&'a Trial, &'a Attempt)> + 'a {
         self.told.iter().filter_map(move |(trial, attempt)| {
-            let planned = self.planned(*trial).filter(|t| t.track() == Some(track))?;
+            let planned = self.planned(*trial).filter(|t| which(t))?;
             let attempts = &self.trials.get(trial)?.attempts;
             Some((planned, attempts.iter().find(|a| a.number == *attempt)?))
         })

@@ -34,7 +34,10 @@ fn row(
     let track = trial.track().and_then(|id| protocol.track(id));
     let intervals: Option<&[Interval]> = match &trial.stimuli {
         Stimuli::Track { intervals, .. } => Some(intervals),
-        Stimuli::One { .. } | Stimuli::Rated { .. } | Stimuli::Pair { .. } => None,
+        Stimuli::One { .. }
+        | Stimuli::Rated { .. }
+        | Stimuli::Pair { .. }
+        | Stimuli::Search { .. } => None,
     };
     let playback = presentation.ended.map(|(_, ended)| ended.playback);
     IntervalRow {

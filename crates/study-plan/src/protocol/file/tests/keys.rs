@@ -111,9 +111,11 @@ fn table_at<'t>(document: &'t mut Table, path: &[&str]) -> &'t mut Table {
 fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
     let mut whole = least();
-    // Keys of parts exclude each other; `parts` tests them. Factors need levels of all realizations.
+    // Keys of parts exclude each other; `parts` tests them. Factors need levels of all
+    // realizations, spaces a part.
     let elsewhere = |key: &&Key| {
-        crate::protocol::file::OF_FORMAT_2.contains(&key.name) || key.name == "factors"
+        crate::protocol::file::OF_FORMAT_2.contains(&key.name)
+            || ["factors", "spaces"].contains(&key.name)
     };
     let root = || ROOT.iter().filter(|key| !elsewhere(key));
     for key in root() {

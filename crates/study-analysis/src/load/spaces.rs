@@ -1,0 +1,193 @@
+//! The tables of spaces: every point is built and certified before the session, and only those that pass can be presented.
+
+use super::OtherFiles;
+use super::families::forces;
+use std::collections::BTreeMap;
+use study_base::diagnostic::{Fault, Findings};
+use study_base::text::ModelId;
+use study_haptics::family::{self, Family, FamilyError};
+use study_haptics::model::Realization;
+use study_plan::protocol::check::Spans;
+use study_plan::protocol::fingerprint::family_file;
+use study_plan::protocol::{Axis, Protocol, SpaceRules, Vary};
+
+/// A space of which less than this share of the points can be presented is refused.
+const LEAST_SHARE: f64 = 0.25;
+
+/// What becomes of a point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Point {
+    Good,
+    /// It can put energy into a hand.
+    Active,
+    /// It needs more force than the device has.
+    Strong,
+}
+
+/// The realizations of all points that can be presented, which the lattices of the protocol then have. Spaces of which
+/// too few can, or which these do not connect, are reported if they are to be `played`.
+pub(super) fn realizations(
+    protocol: &mut Protocol,
+    others: &OtherFiles<'_>,
+    spans: &Spans,
+    played: bool,
+    findings: &mut Findings,
+) -> BTreeMap<ModelId, Realization> {
+    let limit_n = protocol.device.limits.force_n.get();
+    let mut levels = BTreeMap::new();
+    for (i, space) in protocol.spaces.iter_mut().enumerate() {
+        let path = format!("spaces[{i}]");
+        let place = || {
+            let span = spans.get(&format!("{path}.axes"));
+            span.or_else(|| spans.get(&path)).cloned()
+        };
+        let file = family_file(&space.id, "from");
+        let Some(from) = file.and_then(|id| others.realization(&id)) else {
+            continue;
+        };
+        let tables = match built(from, &space.axes) {
+            Ok(tables) => tables,
+            Err(why) => {
+                let fault = Fault::error(why.to_string());
+                findings.faults.push(fault.at(place()));
+                continue;
+            }
+        };
+        let points: Vec<Point> = tables.iter().map(|table| judged(table, limit_n)).collect();
+        let full = space.lattice.clone();
+        // Of a space with fewer than two good points the lattice stays; it is refused below.
+        let _ = space.certify(|at| points[full.point(at)] == Point::Good);
+        if played {
+            let fault =
+                refused(space, &points, limit_n).or_else(|| partial(space, &points, limit_n));
+            findings.faults.extend(fault.map(|fault| fault.at(place())));
+        }
+        let tables = tables.into_iter().enumerate();
+        levels.extend(
+            tables
+                .filter(|(point, _)| points[*point] == Point::Good)
+                .map(|(point, table)| (space.realization(point), table)),
+        );
+    }
+    levels
+}
+
+/// The table of every point, in their order.
+fn built(from: &Realization, axes: &[Axis]) -> Result<Vec<Realization>, FamilyError> {
+    axes.iter().try_fold(vec![from.clone()], |tables, axis| {
+        let mut longer = Vec::with_capacity(tables.len() * axis.levels.levels().len());
+        for table in tables {
+            let vary = match axis.vary {
+                // No axis: the reader has none.
+                Vary::Blend => return Err(FamilyError::Elements),
+                Vary::Damping => family::Vary::Damping,
+                Vary::Mass => family::Vary::Mass,
+                Vary::Detent => family::Vary::Elastic,
+                Vary::Friction => family::Vary::Friction,
+            };
+            let family = Family::new(table, vary)?;
+            longer.extend(axis.levels.levels().iter().map(|level| family.at(*level)));
+        }
+        Ok(longer)
+    })
+}
+
+fn judged(table: &Realization, limit_n: f64) -> Point {
+    let strongest = forces(table, table, 0.0).into_iter();
+    let peak_n = strongest.fold(0.0, |most: f64, f| most.max(f.abs()));
+    if !table.certificate().passes() {
+        Point::Active
+    } else if peak_n > limit_n {
+        Point::Strong
+    } else {
+        Point::Good
+    }
+}
+
+/// The fault of a space in which there is nothing to search.
+fn refused(space: &SpaceRules, points: &[Point], limit_n: f64) -> Option<Fault> {
+    let id = &space.id;
+    let (all, good) = (points.len(), count(points, Point::Good));
+    if good < 2 || (good as f64) < LEAST_SHARE * all as f64 {
+        let only = if good == 0 { "none" } else { "only a few" };
+        let what = format!(
+            "{only} of the {all} points of the space `{id}` can be presented: {good}; {}",
+            why(points, limit_n)
+        );
+        return Some(
+            Fault::error(what).hint(format!("take smaller ranges: {}", map(space, points))),
+        );
+    }
+    let groups = space.lattice.groups();
+    (groups.len() > 1).then(|| {
+        let sizes: Vec<String> = groups.iter().map(|g| g.len().to_string()).collect();
+        let what = format!(
+            "the points of the space `{id}` that can be presented are in {} groups that no step along an axis joins: {}",
+            groups.len(),
+            sizes.join(", ")
+        );
+        Fault::error(what).hint(format!("take ranges around one of them: {}", map(space, points)))
+    })
+}
+
+/// The warning of a space of which some points are left out.
+fn partial(space: &SpaceRules, points: &[Point], limit_n: f64) -> Option<Fault> {
+    let (all, good) = (points.len(), count(points, Point::Good));
+    (good < all).then(|| {
+        let what = format!(
+            "{} of the {all} points of the space `{}` are never presented: {}",
+            all - good,
+            space.id,
+            why(points, limit_n)
+        );
+        Fault::warning(what).hint(map(space, points))
+    })
+}
+
+fn count(points: &[Point], which: Point) -> usize {
+    points.iter().filter(|point| **point == which).count()
+}
+
+fn why(points: &[Point], limit_n: f64) -> String {
+    let (active, strong) = (count(points, Point::Active), count(points, Point::Strong));
+    let mut reasons = Vec::new();
+    if active > 0 {
+        reasons.push(format!("{active} can put energy into a hand"));
+    }
+    if strong > 0 {
+        reasons.push(format!("{strong} need more than {limit_n} N at rest"));
+    }
+    reasons.join(", ")
+}
+
+/// The first two axes as rows of signs: whether all points, some or none there can be presented.
+fn map(space: &SpaceRules, points: &[Point]) -> String {
+    let steps = space.lattice.steps();
+    let (rows, columns) = (steps[0], steps.get(1).copied().unwrap_or(1));
+    let sign = |row: usize, column: usize| {
+        let here = points.iter().enumerate().filter(|(point, _)| {
+            let at = space.lattice.at(*point);
+            at[0] == row && at.get(1).copied().unwrap_or(0) == column
+        });
+        let good: Vec<bool> = here.map(|(_, point)| *point == Point::Good).collect();
+        match (good.iter().all(|g| *g), good.contains(&true)) {
+            (true, _) => '#',
+            (false, true) => '+',
+            (false, false) => '.',
+        }
+    };
+    let lines: Vec<String> = (0..rows)
+        .map(|row| (0..columns).map(|column| sign(row, column)).collect())
+        .collect();
+    let name = |axis: usize| {
+        let axis = space.axes.get(axis)?;
+        let (first, last) = (axis.levels.first(), axis.levels.last());
+        Some(format!("{} {first} to {last}", axis.vary.as_str()))
+    };
+    let across = name(1).map_or_else(String::new, |name| format!(", {name} within a row"));
+    format!(
+        "{}{across} (# all, + some, . none): {}",
+        name(0).map_or_else(String::new, |name| format!("rows from {name}")),
+        lines.join(" ")
+    )
+}

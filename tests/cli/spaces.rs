@@ -1,0 +1,171 @@
+//! What `study check` says of a space, and a search from its template to its maps.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use crate::support::study;
+use std::fs;
+use std::path::Path;
+
+/// The template with one thing changed; what `study check` says of it.
+fn checked(from: &str, to: &str) -> (i32, String) {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let (code, _, said) = study(&["new", "--seed", "20261123", "s", "--kind", "search"], at);
+    assert_eq!(code, 0, "{said}");
+    let path = at.join("s/protocol.toml");
+    let text = fs::read_to_string(&path).unwrap();
+    assert!(text.contains(from), "{from}");
+    fs::write(&path, text.replacen(from, to, 1)).unwrap();
+    let (code, out, err) = study(&["check", "s"], at);
+    (code, out + &err)
+}
+
+const AXES: &str = "detent = [0.4, 1.2], friction = [0.0, 1.6]";
+
+#[test]
+fn a_space_of_which_some_points_pass_is_used_and_drawn() {
+    let (code, said) = checked("", "");
+    assert_eq!(code, 0, "{said}");
+    assert!(!said.contains("of the 81 points"), "{said}");
+    // 12 N are not enough for the strongest detents.
+    let (code, said) = checked(AXES, "detent = [0.4, 2.4], friction = [0.0, 1.6]");
+    assert_eq!(code, 0, "{said}");
+    assert!(
+        said.contains("of the 81 points of the space `switch` are never presented"),
+        "{said}"
+    );
+    assert!(said.contains("need more than 12 N at rest"), "{said}");
+    assert!(
+        said.contains("rows from detent 0.4 to 2.4, friction 0 to 1.6 within a row"),
+        "{said}"
+    );
+    assert!(said.contains("######### #########"), "{said}");
+    assert!(said.contains("........."), "{said}");
+}
+
+#[test]
+fn a_space_with_nothing_to_search_is_refused_with_a_map() {
+    let (code, said) = checked(AXES, "detent = [4.0, 9.0]");
+    assert_ne!(code, 0, "{said}");
+    assert!(
+        said.contains("none of the 9 points of the space `switch` can be presented: 0"),
+        "{said}"
+    );
+    assert!(
+        said.contains("(# all, + some, . none): . . . . . . . . ."),
+        "{said}"
+    );
+    for (from, to, expected) in [
+        (AXES, "", "`spaces[0].axes` has no axis"),
+        (
+            AXES,
+            "detent = [1.5, 0.5]",
+            "`spaces[0].axes.detent` does not rise: 1.5 to 0.5",
+        ),
+        (
+            AXES,
+            "friction = [-0.1, 0.5]",
+            "`spaces[0].axes.friction` has to begin at 0 or more, not at -0.1",
+        ),
+        (
+            AXES,
+            "detent = [1.0]",
+            "`spaces[0].axes.detent` has to be two numbers",
+        ),
+        (AXES, "detents = [0.5, 1.0]", "did you mean `detent`?"),
+        (
+            "grid = 9",
+            "grid = 40",
+            "the space has 1600 points; at most 999 are possible",
+        ),
+        (
+            "space = \"switch\"",
+            "space = \"other\"",
+            "there is no space `other`",
+        ),
+        (
+            "trials = 40, start = 8",
+            "trials = 4, start = 8",
+            "`parts[0].rule.start` is above `trials`: 8 > 4",
+        ),
+        (
+            "\"preference-gp\", trials",
+            "\"preferencegp\", trials",
+            "did you mean `preference-gp`?",
+        ),
+        (
+            "study-protocol/3",
+            "study-protocol/2",
+            "needs the format `study-protocol/3`",
+        ),
+        (
+            "kind = \"simulated\"",
+            "kind = \"manual\"",
+            "samples mounted by hand are no points of a space",
+        ),
+    ] {
+        let (code, said) = checked(from, to);
+        assert!(code != 0 && said.contains(expected), "{to}: {said}");
+    }
+}
+
+/// Simulated participants search; journals are replayed; maps and tables have every point.
+#[test]
+fn a_search_is_rehearsed_verified_and_explored() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let run = |arguments: &[&str]| {
+        let (code, out, err) = study(arguments, at);
+        assert_eq!(code, 0, "{arguments:?}: {out}{err}");
+        out + &err
+    };
+    run(&["new", "--seed", "20261123", "s", "--kind", "search"]);
+    let path = at.join("s/protocol.toml");
+    let text = fs::read_to_string(&path).unwrap();
+    let text = text.replace("grid = 9", "grid = 5");
+    fs::write(&path, text.replace("trials = 40", "trials = 20")).unwrap();
+    run(&["rehearse", "s", "--participants", "2", "--out", "r"]);
+    let said = run(&["verify", "r"]);
+    assert!(said.contains("no problems found"), "{said}");
+    let said = run(&["explore", "r", "--include", "simulated", "--out", "maps"]);
+    for expected in [
+        "Part better: the space switch, 25 of 25 points can be presented",
+        "2 participants: best at detent ",
+        "SD between people",
+        "posterior SD",
+        "20 pairs: best at detent ",
+    ] {
+        assert!(said.contains(expected), "{expected}: {said}");
+    }
+    assert!(!said.contains("p ="), "{said}");
+    let rows = |name: &str| fs::read_to_string(at.join("maps").join(name)).unwrap();
+    assert_eq!(rows("better-points.csv").lines().count(), 1 + 3 * 25);
+    assert_eq!(rows("better-pairs.csv").lines().count(), 1 + 2 * 20);
+    let head = "participant,session,point,model,detent,friction,mean,sd,best\n,,1,switch.1,0.4,0,";
+    assert!(
+        rows("better-points.csv").starts_with(head),
+        "{}",
+        rows("better-points.csv")
+    );
+    // Without those who are simulated nobody has searched.
+    assert!(run(&["explore", "r"]).contains("posterior SD"));
+    let said = run(&["analyze", "r", "--include", "simulated"]);
+    assert!(
+        said.contains("confirmed with participants who did not take part in it"),
+        "{said}"
+    );
+    no_search(at);
+}
+
+fn no_search(at: &Path) {
+    let (code, _, said) = study(&["new", "--seed", "20261123", "o", "--kind", "pairs"], at);
+    assert_eq!(code, 0, "{said}");
+    let (code, _, said) = study(&["rehearse", "o", "--participants", "1", "--out", "q"], at);
+    assert_eq!(code, 0, "{said}");
+    let (code, _, said) = study(&["explore", "q", "--include", "simulated"], at);
+    assert_eq!(code, 1);
+    assert!(
+        said.contains("the study `o` has no part of kind \"search\""),
+        "{said}"
+    );
+}
