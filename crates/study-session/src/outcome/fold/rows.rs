@@ -169,7 +169,7 @@ fn correct(
             let own = part.task.identification()?;
             own.is_correct(model, &given.answer)
         }
-        Stimuli::Rated { .. } | Stimuli::Pair { .. } => None,
+        Stimuli::Rated { .. } | Stimuli::Pair { .. } | Stimuli::Search { .. } => None,
     }
 }
 
