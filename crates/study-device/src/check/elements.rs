@@ -6,7 +6,7 @@ use super::{ClauseResult, FORCE_N, fail};
 use crate::host::upload::{Upload, elements_requests};
 use study_wire::elements::{MAX_SPRINGS, Spring};
 use study_wire::message::{
-    Commit, DeviceState, ElementsBegin, FixedVec, Identity, MINOR, Node, Refusal, Request,
+    Commit, ElementsBegin, FixedVec, Identity, MINOR, Node, Refusal, Request,
 };
 
 /// Nodes of the realization.
@@ -66,17 +66,17 @@ pub(super) fn plays(exchange: &mut Exchange<'_>) -> ClauseResult {
     ];
     for (refusal, what, change) in refused {
         let upload = upload(&device, change);
-        send(exchange, &upload)?;
+        exchange.expect_sent(&upload)?;
         let found = exchange.ack(commit(&upload))?.refusal;
         if found != refusal {
             return fail(format!("{what}: {found} instead of {refusal}"));
         }
     }
     let upload = upload(&device, |_, _| ());
-    send(exchange, &upload)?;
+    exchange.expect_sent(&upload)?;
     let wrong = Request::TableCommit(Commit { crc: !upload.crc });
     exchange.expect_refusal(wrong, Refusal::Checksum)?;
-    send(exchange, &upload)?;
+    exchange.expect_sent(&upload)?;
     exchange.expect_done(commit(&upload))?;
     let peak_n = peak_of(exchange, upload.crc, FORCE_N.min(device.force_n))?;
     Ok(format!(
@@ -87,18 +87,6 @@ pub(super) fn plays(exchange: &mut Exchange<'_>) -> ClauseResult {
 
 fn commit(upload: &Upload) -> Request {
     Request::TableCommit(Commit { crc: upload.crc })
-}
-
-/// Sends everything except COMMIT.
-fn send(exchange: &mut Exchange<'_>, upload: &Upload) -> Result<(), super::CheckFailure> {
-    let (_, requests) = (upload.requests.split_last()).unwrap_or((&Request::State, &[]));
-    for request in requests {
-        let ack = exchange.expect_done(*request)?;
-        if ack.state != DeviceState::Idle {
-            return fail(format!("during an upload: {}", ack.state));
-        }
-    }
-    Ok(())
 }
 
 /// Elements of every kind, within the device's limits, after a change.

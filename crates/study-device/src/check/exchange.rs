@@ -1,6 +1,7 @@
 //! An exchange of messages with a device whose answers may be wrong.
 
 use super::{CheckFailure, Connection, fail, strange};
+use crate::host::upload::Upload;
 use crate::host::{DeviceClock, HEARTBEAT_INTERVAL, MAX_TRIES, RETRY_INTERVAL};
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -279,6 +280,21 @@ impl<'w> Exchange<'w> {
                 fail(format!("{what} is refused: {refusal} ({detail})"))
             }
         }
+    }
+
+    /// Sends everything of an upload except COMMIT. All of it has to be executed, and nothing may begin.
+    pub(crate) fn expect_sent(&mut self, upload: &Upload) -> Result<(), CheckFailure> {
+        let (_, requests) = upload
+            .requests
+            .split_last()
+            .unwrap_or((&Request::State, &[]));
+        for request in requests {
+            let ack = self.expect_done(*request)?;
+            if ack.state != DeviceState::Idle {
+                return fail(format!("during an upload: {}", ack.state));
+            }
+        }
+        Ok(())
     }
 
     /// Sends a request that has to be refused for the given reason.

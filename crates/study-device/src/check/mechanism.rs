@@ -5,7 +5,7 @@ use super::playing::peak_of;
 use super::{ClauseResult, FORCE_N, fail};
 use crate::host::upload::{Upload, mechanism_requests};
 use study_wire::mechanism::Scalars;
-use study_wire::message::{Commit, DeviceState, Identity, MINOR, MechanismBegin, Refusal, Request};
+use study_wire::message::{Commit, Identity, MINOR, MechanismBegin, Refusal, Request};
 
 /// Intervals of both profiles.
 const INTERVALS: u16 = 8;
@@ -56,17 +56,17 @@ pub(super) fn plays(exchange: &mut Exchange<'_>) -> ClauseResult {
     ];
     for (refusal, what, change) in refused {
         let upload = upload(&device, change);
-        send(exchange, &upload)?;
+        exchange.expect_sent(&upload)?;
         let found = exchange.ack(commit(&upload))?.refusal;
         if found != refusal {
             return fail(format!("{what}: {found} instead of {refusal}"));
         }
     }
     let upload = upload(&device, |_, _| ());
-    send(exchange, &upload)?;
+    exchange.expect_sent(&upload)?;
     let wrong = Request::MechanismCommit(Commit { crc: !upload.crc });
     exchange.expect_refusal(wrong, Refusal::Checksum)?;
-    send(exchange, &upload)?;
+    exchange.expect_sent(&upload)?;
     exchange.expect_done(commit(&upload))?;
     let peak_n = peak_of(exchange, upload.crc, FORCE_N.min(device.force_n))?;
     Ok(format!(
@@ -80,18 +80,6 @@ type Change = fn(&mut MechanismBegin, &mut [f64]);
 
 fn commit(upload: &Upload) -> Request {
     Request::MechanismCommit(Commit { crc: upload.crc })
-}
-
-/// Sends everything except COMMIT.
-fn send(exchange: &mut Exchange<'_>, upload: &Upload) -> Result<(), super::CheckFailure> {
-    let (_, requests) = (upload.requests.split_last()).unwrap_or((&Request::State, &[]));
-    for request in requests {
-        let ack = exchange.expect_done(*request)?;
-        if ack.state != DeviceState::Idle {
-            return fail(format!("during an upload: {}", ack.state));
-        }
-    }
-    Ok(())
 }
 
 /// A mechanism of friction alone, within the device's limits, after a change.
