@@ -39,17 +39,7 @@ impl PairOrders {
     /// The trials of a seat.
     pub(super) fn plan(&self, seat: Seat) -> Result<Vec<Planned>, ScheduleError> {
         let order = self.sequence.valid_order(seat)?;
-        let number = seat.number().to_string();
-        let part = self.part.as_str();
-        let path = [
-            "schedule",
-            "part",
-            part,
-            seat.stream(),
-            &number,
-            "intervals",
-        ];
-        let mut drawn = Stream::new(self.seed, &path);
+        let mut drawn = interval_stream(self.seed, &self.part, seat);
         let first = self.first(seat);
         let mut repetitions = vec![0u32; self.pairs.len()];
         let trial = |at: usize| {
@@ -114,6 +104,21 @@ impl PairOrders {
             }
         }
     }
+}
+
+/// The stream that draws for each trial of a seat which of the two intervals comes first.
+pub(super) fn interval_stream(seed: u64, part: &PartId, seat: Seat) -> Stream {
+    let number = seat.number().to_string();
+    let part = part.as_str();
+    let path = [
+        "schedule",
+        "part",
+        part,
+        seat.stream(),
+        &number,
+        "intervals",
+    ];
+    Stream::new(seed, &path)
 }
 
 #[cfg(test)]

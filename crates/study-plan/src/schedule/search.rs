@@ -1,8 +1,8 @@
 //! The trials of a part that searches: only which of the two points comes first is drawn before the session.
 
 use super::Planned;
+use super::pairs::interval_stream;
 use crate::protocol::{SearchTask, Seat, Stimuli};
-use study_base::rng::Stream;
 use study_base::text::PartId;
 
 /// Makes the orders of a part that searches.
@@ -24,17 +24,7 @@ impl SearchOrders {
 
     /// The trials of a seat. The order of each two intervals is drawn for itself, so that nobody can guess it.
     pub(super) fn plan(&self, seat: Seat) -> Vec<Planned> {
-        let number = seat.number().to_string();
-        let part = self.part.as_str();
-        let path = [
-            "schedule",
-            "part",
-            part,
-            seat.stream(),
-            &number,
-            "intervals",
-        ];
-        let mut drawn = Stream::new(self.seed, &path);
+        let mut drawn = interval_stream(self.seed, &self.part, seat);
         (1..=self.task.rule.trials)
             .map(|trial| Planned {
                 block: 1,
