@@ -18,6 +18,7 @@ mod export;
 mod help;
 mod identify;
 mod import;
+mod include;
 mod new;
 mod participant;
 mod power;

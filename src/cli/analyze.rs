@@ -3,6 +3,7 @@
 mod grim;
 mod trials;
 
+use super::include::{Who, include};
 use super::progress::{self, shown};
 use super::{Console, Failure, Kind, study_folder};
 use rayon::prelude::*;
@@ -20,7 +21,7 @@ use study_plan::protocol::Factor;
 use study_report::figures::Trace;
 use study_report::html::Details;
 use study_report::study::{self as report, Output};
-use study_report::text::{Page, comments, page, part, preregistered};
+use study_report::text::{Page, comments, confirms, page, part, preregistered};
 use study_session::store::disk::{Disk as _, RealDisk};
 use study_session::store::{self, StoreError, StudyFolder};
 
@@ -83,12 +84,6 @@ pub(super) struct Args {
     comments: bool,
     #[command(flatten, next_help_heading = "Thresholds and comparisons")]
     trials: trials::TrialArgs,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Who {
-    Pilot,
-    Simulated,
 }
 
 /// Which ratings are better.
@@ -256,10 +251,7 @@ fn of_csv(path: &Path, args: &Args, console: &mut Console) -> Result<(), Failure
 
 impl Args {
     fn include(&self) -> Include {
-        Include {
-            pilot: self.include.contains(&Who::Pilot),
-            simulated: self.include.contains(&Who::Simulated),
-        }
+        include(&self.include)
     }
 
     fn effort(&self) -> Option<OrdinalEffort> {
@@ -367,7 +359,11 @@ fn print(args: &Args, analyzed: &Analyzed, console: &mut Console) -> Result<(), 
             return console.out(comments(analysis, terminal));
         }
         Results::Ratings(analysis) => console.out(page(source, analysis, terminal))?,
-        Results::Parts(_) => {}
+        Results::Parts(_) => {
+            if let Some(search) = &source.confirms {
+                console.out(format!("{}\n", confirms(search, terminal)))?;
+            }
+        }
     }
     for analysis in analyzed.parts() {
         let title = format!("{}: {}", source.title, analysis.part.as_str());

@@ -1,18 +1,12 @@
 //! `study explore`: what a search found.
 
+use super::include::{Who, include};
 use super::{Console, Failure};
 use std::fs;
 use std::path::PathBuf;
-use study_analysis::analyze::Include;
 use study_analysis::study::Study;
 use study_base::text::Untrusted;
 use study_report::explore;
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Who {
-    Pilot,
-    Simulated,
-}
 
 /// Arguments of `study explore`.
 #[derive(Debug, clap::Args)]
@@ -30,11 +24,7 @@ pub(super) struct Args {
 /// Prints the maps, and writes the tables.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let study = Study::open(&args.results)?;
-    let include = Include {
-        pilot: args.include.contains(&Who::Pilot),
-        simulated: args.include.contains(&Who::Simulated),
-    };
-    let found = study.explore(include);
+    let found = study.explore(include(&args.include));
     if found.is_empty() {
         let id = &study.loaded.protocol.study.id;
         return Err(Failure::input(explore::none(id)).hint(

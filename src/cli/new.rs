@@ -1,5 +1,8 @@
-//! `study new`: a commented protocol to start from, or a replication of a study.
+//! `study new`: a commented protocol to start from, a replication of a study, or the confirmation of a search.
 
+mod confirm;
+
+use super::include::{Who, include};
 use super::{Console, Failure};
 use std::fs;
 use std::io::Write as _;
@@ -123,6 +126,12 @@ pub(super) struct Args {
     /// Start a replication of the study in this results folder
     #[arg(long, value_name = "RESULTS")]
     from: Option<PathBuf>,
+    /// Instead of a replication, confirm what the search in that folder found, on other participants
+    #[arg(long, requires = "from")]
+    confirm: bool,
+    /// Also include these sessions of the search
+    #[arg(long, value_name = "WHO", value_delimiter = ',', requires = "confirm")]
+    include: Vec<Who>,
     /// What a trial is
     #[arg(long, value_enum, default_value_t = TrialKind::Rating, conflicts_with = "from")]
     kind: TrialKind,
@@ -142,6 +151,9 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let of_today = || today.format("%Y%m%d").to_string().parse().unwrap_or(1);
     let seed = args.seed.unwrap_or_else(of_today);
     let files = match &args.from {
+        Some(results) if args.confirm => {
+            confirm::confirmation(results, include(&args.include), (&today.to_string(), seed))?
+        }
         Some(results) => replication(results, &today.to_string(), seed)?,
         None => starter(dir, seed, args.kind)?,
     };

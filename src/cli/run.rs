@@ -301,6 +301,13 @@ fn roster(
         SeatKind::Simulated => Newcomer::Simulated,
     };
     let mut roster = Roster::new(&participants(sessions), newcomer);
+    if let Some(search) = plan
+        .confirms
+        .as_ref()
+        .filter(|_| kind != SeatKind::Simulated)
+    {
+        roster.confirms(search.clone());
+    }
     let of_one = sessions.chunk_by(|a, b| a.participant == b.participant);
     for own in of_one.filter(|_| !plan.sessions.is_empty()) {
         let own: Vec<&SessionData> = own.iter().collect();

@@ -154,7 +154,61 @@ fn a_search_is_rehearsed_verified_and_explored() {
         said.contains("confirmed with participants who did not take part in it"),
         "{said}"
     );
+    confirmed(at, &rows("better-pairs.csv"));
     no_search(at);
+}
+
+/// A second study has the best point and the table with which the search began, and names the search.
+fn confirmed(at: &Path, pairs: &str) {
+    let run = |arguments: &[&str]| {
+        let (code, out, err) = study(arguments, at);
+        assert_eq!(code, 0, "{arguments:?}: {out}{err}");
+        out + &err
+    };
+    let arguments = [
+        "new",
+        "c",
+        "--from",
+        "r",
+        "--confirm",
+        "--include",
+        "simulated",
+        "--seed",
+        "7",
+    ];
+    run(&arguments);
+    let said = run(&["check", "c"]);
+    assert!(!said.contains("warning"), "{said}");
+    let text = fs::read_to_string(at.join("c/protocol.toml")).unwrap();
+    let hash = format!("pairs_sha256 = \"{}\"", study_base::hex::sha256(pairs));
+    assert!(text.contains(&hash), "{hash}: {text}");
+    for expected in [
+        "id = \"s-confirmation\"",
+        "seed = 7",
+        "study = \"s\"",
+        "searchers = []",
+        "force_n = 12.0",
+    ] {
+        assert!(text.contains(expected), "{expected}: {text}");
+    }
+    let file = |path: &str| fs::read(at.join(path)).unwrap();
+    assert_eq!(
+        file("c/models/reference.toml"),
+        file("s/models/static.toml")
+    );
+    run(&["rehearse", "c", "--participants", "2", "--out", "k"]);
+    let said = run(&["analyze", "k", "--include", "simulated"]);
+    let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
+    let sentence = "confirms, on participants who did not search, what the part better of the study s found to be best: switch.";
+    assert!(said.contains(sentence), "{said}");
+    let page = fs::read_to_string(at.join("k/s-confirmation/analysis/report.html")).unwrap();
+    assert!(page.contains("No answer of the search is in this analysis"));
+    run(&["preregister", "c", "--date", "2026-11-27"]);
+    let declared = fs::read_to_string(at.join("c/preregistration.md")).unwrap();
+    assert!(
+        declared.contains("on participants who did not search"),
+        "{declared}"
+    );
 }
 
 fn no_search(at: &Path) {
@@ -168,4 +222,11 @@ fn no_search(at: &Path) {
         said.contains("the study `o` has no part of kind \"search\""),
         "{said}"
     );
+    let (code, _, said) = study(&["new", "n", "--from", "q", "--confirm"], at);
+    assert_eq!(code, 1);
+    assert!(
+        said.contains("the study `o` has no part of kind \"search\""),
+        "{said}"
+    );
+    assert!(!at.join("n").exists());
 }

@@ -5,8 +5,8 @@
 use crate::world::*;
 use chrono::{DateTime, FixedOffset};
 use std::path::Path;
-use study_base::text::PartId;
-use study_plan::protocol::{Assign, GroupRules, Groups, Seat, SessionPlan};
+use study_base::text::{ModelId, PartId, ParticipantId};
+use study_plan::protocol::{Assign, Confirms, GroupRules, Groups, Seat, SessionPlan};
 use study_session::store::{
     ClaimRequest, Next, Plan, SeatKind, StoreError, StudyFolder, next_session,
 };
@@ -100,6 +100,43 @@ fn the_next_session_has_the_same_row_and_group_and_comes_after_the_gap() {
     let new = study.claim(&request("P03", by_row(30.0))).unwrap();
     assert_eq!(new.seat, Seat::Row(3));
     assert_eq!(new.assigned.session_id, Some(id("one")));
+}
+
+/// Who took part in a search does not confirm it, whatever the case of the id; simulated participants are nobody.
+#[test]
+fn searchers_do_not_confirm_their_search() {
+    let results = tempfile::tempdir().unwrap();
+    let study = open(results.path());
+    let plan = Plan {
+        confirms: Some(Confirms {
+            study: "s".to_owned(),
+            part: id("better"),
+            pairs_sha256: "0".repeat(64),
+            best: ModelId::new("switch.7").unwrap(),
+            searchers: vec![ParticipantId::new("P01").unwrap()],
+        }),
+        ..Plan::default()
+    };
+    for who in ["P01", "p01"] {
+        for kind in [SeatKind::Real, SeatKind::Pilot] {
+            let asked = ClaimRequest {
+                kind,
+                ..request(who, plan.clone())
+            };
+            let error = study.claim(&asked).unwrap_err();
+            assert!(matches!(error, StoreError::Searcher { .. }), "{error}");
+            assert!(error.is_request() && error.hint().is_some());
+            assert!(error.to_string().contains("took part in the search `s`"));
+        }
+    }
+    // Nothing was begun.
+    assert_eq!(study.sessions().unwrap().len(), 0);
+    assert_eq!(run(&study, &request("P02", plan.clone())), Seat::Row(1));
+    let simulated = ClaimRequest {
+        kind: SeatKind::Simulated,
+        ..request("P01", plan)
+    };
+    assert!(study.claim(&simulated).is_ok());
 }
 
 fn early_is_kind(error: &StoreError) -> bool {

@@ -230,6 +230,7 @@ impl Study {
             study: Some(study.id.clone()),
             protocol_version: Some(self.folder.version()),
             path: self.folder.path().display().to_string(),
+            confirms: self.loaded.protocol.confirms.clone(),
             ..Source::default()
         }
     }

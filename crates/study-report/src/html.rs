@@ -208,6 +208,9 @@ fn head(source: &Source, details: &Details, a: &Analysis, lang: Option<&str>) ->
                     span { (counted(a.realizations.len(), "realization", "realizations")) }
                 }
             }
+            @if let Some(search) = &source.confirms {
+                p { (safe(&crate::confirmation::sentence(search))) }
+            }
             (notes::banners(a))
         }
     }

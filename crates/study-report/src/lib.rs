@@ -10,6 +10,7 @@ pub mod catalogue;
 pub mod chart;
 pub mod commission;
 pub mod comparison;
+pub mod confirmation;
 pub mod csv;
 pub mod explore;
 pub mod figures;

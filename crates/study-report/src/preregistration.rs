@@ -2,7 +2,7 @@
 
 use super::power::{Report, own_design};
 use super::study::{search_rule, track_in_words};
-use super::{apa, sentences, wording};
+use super::{apa, confirmation, sentences, wording};
 use chrono::NaiveDate;
 use serde_json::{Value, json};
 use study_analysis::analyze::psychophysics::PartAnalysis;
@@ -245,6 +245,11 @@ fn design(c: &Content<'_>) -> Vec<String> {
         ),
         false => format!("{people}."),
     }];
+    lines.extend(
+        p.confirms
+            .as_ref()
+            .map(|search| text(&confirmation::sentence(search))),
+    );
     lines.extend(groups(p));
     let session = |s: &SessionPlan| {
         let gap = match s.min_gap_h > 0.0 {

@@ -8,15 +8,16 @@ pub(super) mod layout;
 mod trials;
 
 use super::answers::{answers, conditional};
-use super::comparison;
 use super::plot::Axis;
 use super::tables::{self, with_role};
 use super::{Source, apa, sentences};
+use super::{comparison, confirmation};
 use layout::{Grid, Paint, pad, wrap};
 use study_analysis::analyze::results::Number as _;
 use study_analysis::analyze::{Analysis, RealizationSummary};
 use study_analysis::preregister::Comparison;
 use study_base::text::{Untrusted, counted, cut_middle};
+use study_plan::protocol::Confirms;
 pub use trials::{part, trials};
 use unicode_width::UnicodeWidthStr as _;
 
@@ -55,6 +56,10 @@ pub fn page(source: &Source, a: &Analysis, page: Page) -> String {
         out += &paint.warn("No rating is included: there is nothing to analyze.\n\n");
     }
     out += &all_answers(a, width, paint);
+    if let Some(search) = &source.confirms {
+        out += &confirms(search, page);
+        out.push('\n');
+    }
     if let Some(found) = &source.preregistration {
         out += &preregistered(found, page);
         out.push('\n');
@@ -84,6 +89,12 @@ pub fn page(source: &Source, a: &Analysis, page: Page) -> String {
     }
     out += &counts(a, width);
     out
+}
+
+/// Which search the study confirms.
+pub fn confirms(search: &Confirms, page: Page) -> String {
+    let text = Untrusted(&confirmation::sentence(search)).to_string();
+    wrap(&text, page.width.clamp(60, 100), "", "")
 }
 
 /// How the study compares with its preregistration.

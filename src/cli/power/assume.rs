@@ -1,9 +1,10 @@
 //! What is assumed: flags, and a pilot's results.
 
+use super::super::include::{Who, include};
 use super::super::{Console, Failure};
 use clap::Args;
 use std::path::{Path, PathBuf};
-use study_analysis::analyze::{Include, Rules, analyze};
+use study_analysis::analyze::{Rules, analyze};
 use study_analysis::load;
 use study_analysis::power::{Link, Overrides, Pilot, Plan, PlanError, Test, Vaf};
 use study_base::text::PartId;
@@ -94,12 +95,6 @@ pub(super) struct Assume {
     /// Whose results --from reads, besides those of participants
     #[arg(long, value_name = "WHO", value_delimiter = ',', requires = "from")]
     include: Vec<Who>,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Who {
-    Pilot,
-    Simulated,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -333,10 +328,7 @@ fn pilot(
     (seed, ends): (u64, Option<(i64, i64)>),
     console: &mut Console,
 ) -> Result<Pilot, Failure> {
-    let include = Include {
-        pilot: given.include.contains(&Who::Pilot),
-        simulated: given.include.contains(&Who::Simulated),
-    };
+    let include = include(&given.include);
     let shown = super::shown(path);
     let (ratings, rules) = if path.is_file() {
         let file = std::fs::File::open(path).map_err(|e| Failure::file(path, &e))?;

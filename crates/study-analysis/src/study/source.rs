@@ -1,6 +1,7 @@
 //! What was analyzed, for the head of a report.
 
 use crate::preregister::Comparison;
+use study_plan::protocol::Confirms;
 
 /// What was analyzed, for the head of a report.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -17,6 +18,8 @@ pub struct Source {
     pub sites: Vec<Site>,
     /// How the study compares with its preregistration, if it has one.
     pub preregistration: Option<Comparison>,
+    /// The search that the study confirms.
+    pub confirms: Option<Confirms>,
 }
 
 /// A site of a pooled analysis. All text is untrusted.

@@ -10,6 +10,7 @@
 
 mod agree;
 mod analysis;
+mod confirms;
 mod design;
 mod device;
 mod factors;
@@ -52,6 +53,9 @@ pub const ROOT: &[Key] = keys! {
     "text": Kind::Table(general::TEXT), "";
     /// The document that the participant agrees to before the session.
     "consent": Kind::Table(general::CONSENT), "";
+    /// The search whose result this study confirms, on people who did not take part in it. `study new --from RESULTS
+    /// --confirm` writes it. Needs the format `study-protocol/3`.
+    "confirms": Kind::Table(confirms::CONFIRMS), "";
     /// The trials of a participant and their order.
     "design": Kind::Table(design::DESIGN), "", required;
     /// How a session goes.
@@ -117,7 +121,8 @@ const FORMATS: &[Word] = &[
 const OF_FORMAT_2: [&str; 5] = ["parts", "families", "tracks", "groups", "sessions"];
 
 /// Keys that need [`FORMAT_3`], without the places in lists.
-pub const OF_FORMAT_3: [&str; 9] = [
+pub const OF_FORMAT_3: [&str; 10] = [
+    "confirms",
     "design.order_version",
     "factors",
     "spaces",
@@ -305,6 +310,7 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
     let study = root.section("study").and_then(general::study);
     let text = root.section("text").map(general::text);
     let consent = root.section("consent").and_then(general::consent);
+    let confirms = root.section("confirms").and_then(confirms::read);
     let raw = resolve::Raw {
         parts: parts::read(&mut root),
         families: (root.sections("families").into_iter())
@@ -389,6 +395,7 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
         study: study?,
         text: text?,
         consent,
+        confirms,
         session: session?,
         trial: trial?,
         models: models?,

@@ -14,7 +14,7 @@
 //!   SHA-256 of its file; minimum strokes, exposure, duration of the reference; id,
 //!   scale and `required` of the questions after a trial; the orders file; parts
 //!   without their texts, tracks, groups, repeated sessions, and families and spaces with the SHA-256 of their
-//!   files; of spaces also which points are certified.
+//!   files; of spaces also which points are certified; the search that is confirmed.
 //! * wording: title, authors and the like; all texts, prompts and labels; consent;
 //!   questions asked once (setup, intake, outro); who types, and when a session
 //!   can be resumed.
@@ -84,6 +84,7 @@ pub fn parts(
         study,
         text,
         consent,
+        confirms,
         design,
         session,
         device,
@@ -184,6 +185,9 @@ pub fn parts(
         stimulus["tracks"] = json!(tracks);
     }
     // Absent from the fingerprints of protocols without them.
+    if confirms.is_some() {
+        stimulus["confirms"] = json!(confirms);
+    }
     if !spaces.is_empty() {
         stimulus["spaces"] = spaces.iter().map(|s| points(s, model_bytes)).collect();
     }

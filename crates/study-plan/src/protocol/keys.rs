@@ -128,6 +128,8 @@ pub enum Id {
     Question,
     /// A part, family or track.
     Part,
+    /// A participant.
+    Participant,
 }
 
 /// A range of numbers.
@@ -139,7 +141,7 @@ impl Id {
         match self {
             Self::Study => "^[a-z0-9-]{1,64}$",
             Self::Model => "^[A-Za-z0-9._-]{1,32}$",
-            Self::Question => "^[A-Za-z0-9_-]{1,32}$",
+            Self::Question | Self::Participant => "^[A-Za-z0-9_-]{1,32}$",
             Self::Part => "^[A-Za-z0-9_-]{1,20}$",
         }
     }
@@ -180,7 +182,7 @@ impl Kind {
             Self::Texts(_) => "a list of texts, not empty".to_owned(),
             Self::Id(Id::Study) => "text: 1 to 64 of `a-z 0-9 -`".to_owned(),
             Self::Id(Id::Model) => format!("text: {ids} . _ -`"),
-            Self::Id(Id::Question) => format!("text: {ids} _ -`"),
+            Self::Id(Id::Question | Id::Participant) => format!("text: {ids} _ -`"),
             Self::Id(Id::Part) => "text: 1 to 20 of `A-Z a-z 0-9 _ -`".to_owned(),
             Self::ModelIds | Self::Ids(Id::Model) => "a list of ids of realizations".to_owned(),
             Self::Ids(_) => "a list of ids".to_owned(),

@@ -44,6 +44,9 @@ pub(super) fn head(
                 span { (counted(trials, "trial", "trials")) } " "
                 span { (counted(parts.len(), "part", "parts")) }
             }
+            @if let Some(search) = &source.confirms {
+                p { (safe(&crate::confirmation::sentence(search))) }
+            }
             @if let Some(comparison) = &source.preregistration {
                 p { (safe(&crate::comparison::sentence(comparison))) }
             }

@@ -3,6 +3,7 @@
 use crate::outcome::{ParticipantRow, State};
 use std::collections::BTreeMap;
 use study_base::text::ParticipantId;
+use study_plan::protocol::Confirms;
 
 /// The participants of the study when the program started.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -12,6 +13,8 @@ pub struct Roster {
     again: BTreeMap<ParticipantId, String>,
     /// Those who began last, the latest first.
     recent: Vec<ParticipantId>,
+    /// The search that the study confirms.
+    search: Option<Confirms>,
     newcomer: Newcomer,
 }
 
@@ -59,6 +62,7 @@ impl Roster {
             recent: recent.map(|row| row.participant.clone()).collect(),
             known: known.collect(),
             again: BTreeMap::new(),
+            search: None,
             newcomer,
         }
     }
@@ -66,6 +70,15 @@ impl Roster {
     /// Says of a participant who has finished a session when the next one is.
     pub fn comes_again(&mut self, participant: &ParticipantId, words: String) {
         self.again.insert(participant.clone(), words);
+    }
+
+    /// Says which search the study confirms: who took part in it cannot take part here.
+    pub fn confirms(&mut self, search: Confirms) {
+        self.search = Some(search);
+    }
+
+    fn was_searcher(&self, id: &ParticipantId) -> bool {
+        (self.search.as_ref()).is_some_and(|search| search.was_searcher(id))
     }
 
     /// The participants who began last, the latest first, with who they are.
@@ -84,12 +97,16 @@ impl Roster {
         let width = digits.len();
         (number..number.saturating_add(1000))
             .filter_map(|n| ParticipantId::new(format!("{name}{:0width$}", n.checked_add(1)?)).ok())
+            .filter(|id| !self.was_searcher(id))
             .find(|id| !self.known.keys().any(|k| k == id || k.collides_with(id)))
     }
 
     /// Who a typed id is; `None` if it is no id.
     pub fn who(&self, typed: &str) -> Option<String> {
         let id = ParticipantId::new(typed.trim()).ok()?;
+        if self.was_searcher(&id) {
+            return Some("took part in the search".to_owned());
+        }
         if let Some(other) = self
             .known
             .keys()

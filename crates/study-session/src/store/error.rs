@@ -139,6 +139,14 @@ pub enum StoreError {
         /// When the gap is over.
         from: chrono::DateTime<chrono::FixedOffset>,
     },
+    /// The participant took part in the search that the study confirms.
+    #[error("{participant} took part in the search `{}`, which this study confirms", Untrusted(.search))]
+    Searcher {
+        /// Participant.
+        participant: ParticipantId,
+        /// The study that searched. Untrusted.
+        search: String,
+    },
     /// The participant belongs to another group.
     #[error("{participant} belongs to group {had}")]
     OtherGroup {
@@ -367,6 +375,9 @@ impl StoreError {
             }
             Self::AmendedMeanwhile { .. } => "start again with the amended protocol".to_owned(),
             Self::TooEarly { .. } => "the participant can come again then; the gap is in the protocol, [[sessions]]".to_owned(),
+            Self::Searcher { .. } => {
+                "a search is confirmed by people who did not choose in it; if this is somebody else, give them an id of their own".to_owned()
+            }
             Self::OtherGroup { .. } => "leave out --group: a participant stays in one group".to_owned(),
             Self::Group { by_experimenter: true, .. } => "say which with --group".to_owned(),
             Self::Group { .. } => "leave out --group".to_owned(),
@@ -413,6 +424,7 @@ impl StoreError {
                 | Self::NoRow { .. }
                 | Self::TooEarly { .. }
                 | Self::OtherGroup { .. }
+                | Self::Searcher { .. }
                 | Self::Group { .. }
                 | Self::Unknown { .. }
                 | Self::StateRefused { .. }

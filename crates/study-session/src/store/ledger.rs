@@ -114,6 +114,7 @@ impl StudyFolder {
             });
         }
         self.check_id(&request.participant)?;
+        check_searchers(request)?;
         let all = self.sessions()?;
         let own: Vec<&SessionData> = all
             .iter()
@@ -364,6 +365,20 @@ fn write_reserve(disk: &dyn Disk, path: &Path) -> io::Result<()> {
 }
 
 /// Refuses a session that is not unfinished.
+
+/// Refuses whoever took part in the search that the study confirms. Simulated participants are nobody.
+fn check_searchers(request: &ClaimRequest) -> Result<(), StoreError> {
+    let confirms = request.plan.confirms.as_ref();
+    let of_search = confirms.filter(|search| search.was_searcher(&request.participant));
+    match of_search.filter(|_| request.kind != SeatKind::Simulated) {
+        None => Ok(()),
+        Some(search) => Err(StoreError::Searcher {
+            participant: request.participant.clone(),
+            search: search.study.clone(),
+        }),
+    }
+}
+
 fn check_standing(
     request: &ClaimRequest,
     session: u32,

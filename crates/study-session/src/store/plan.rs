@@ -6,9 +6,9 @@ use super::sessions::SessionData;
 use crate::outcome::State;
 use chrono::{DateTime, FixedOffset};
 use study_base::text::{PartId, ParticipantId};
-use study_plan::protocol::{Assign, Assigned, Groups, Protocol, Seat, SessionPlan};
+use study_plan::protocol::{Assign, Assigned, Confirms, Groups, Protocol, Seat, SessionPlan};
 
-/// What a claim needs of groups and repeated sessions.
+/// What a claim needs of the protocol: groups, repeated sessions, and who cannot take part.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Plan {
     /// The seed of the study.
@@ -17,6 +17,8 @@ pub struct Plan {
     pub groups: Option<Groups>,
     /// `[[sessions]]`
     pub sessions: Vec<SessionPlan>,
+    /// `[confirms]`
+    pub confirms: Option<Confirms>,
     /// The group that the experimenter gives to a new participant.
     pub given: Option<PartId>,
     /// The time of the claim; `None`: gaps are not known.
@@ -30,6 +32,7 @@ impl Plan {
             seed: protocol.study.seed,
             groups: protocol.groups.clone(),
             sessions: protocol.sessions.clone(),
+            confirms: protocol.confirms.clone(),
             given,
             now: Some(now),
         }

@@ -26,10 +26,10 @@ use crate::analyze::results::Correlation;
 use crate::analyze::select::{Include, Whose, state_counts};
 use crate::analyze::warning::Warning;
 use std::collections::{BTreeMap, BTreeSet};
-use study_base::text::{ModelId, PartId, ParticipantId};
+use study_base::text::{ModelId, PartId, ParticipantId, counted};
 use study_plan::protocol::pairs::Pairs;
 use study_plan::protocol::parts::{Part, Presentations, Task, TrackRules};
-use study_plan::protocol::{Answer, Role};
+use study_plan::protocol::{Answer, Protocol, Role};
 use study_session::outcome::ratings::Origin;
 use study_session::outcome::{RatingRow, Status};
 use study_stats::describe::{is_constant, mean};
@@ -70,6 +70,7 @@ pub fn parts(study: &StudyData<'_>, include: Include) -> Vec<PartAnalysis> {
             own.results.before_exclusion = Some(found(&all)?.results.before_exclusion());
         }
         let who: BTreeSet<_> = rows.iter().map(|r| &r.participant).collect();
+        own.warnings.extend(searchers(protocol, &rows));
         let facts = PartFacts {
             alpha: rules.alpha,
             participants: who.len(),
@@ -177,6 +178,22 @@ fn of_part_task(
         }
         Task::Search(_) => Some(of_search(rows)),
     }
+}
+
+/// Participants who took part in the search that the study confirms, such as after the correction of an id.
+fn searchers(protocol: &Protocol, rows: &[&RatingRow]) -> Option<Warning> {
+    let search = protocol.confirms.as_ref()?;
+    let both = |row: &&&RatingRow| !row.simulated && search.was_searcher(&row.participant);
+    let both: BTreeSet<_> = rows.iter().filter(both).map(|r| &r.participant).collect();
+    let names: Vec<&str> = both.iter().map(|id| id.as_str()).collect();
+    (!names.is_empty()).then(|| Warning {
+        code: "searchers",
+        text: format!(
+            "{} took part in the search that this study confirms, and judge again what they chose: {}",
+            counted(names.len(), "participant", "participants"),
+            names.join(", ")
+        ),
+    })
 }
 
 /// A search has no test: what it found is confirmed with participants who did not search.

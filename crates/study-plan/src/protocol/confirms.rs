@@ -1,0 +1,28 @@
+//! `[confirms]`: a study that confirms on other participants what a search found.
+
+use serde::Serialize;
+use study_base::text::{ModelId, PartId, ParticipantId};
+
+/// The search whose result a study confirms. Its own participants would judge again what they chose themselves, so
+/// that they are refused.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Confirms {
+    /// Identifier of the study that searched.
+    pub study: String,
+    /// Its part of kind `search`.
+    pub part: PartId,
+    /// SHA-256 of the pairs and answers of the search, as `study explore --out` writes them.
+    pub pairs_sha256: String,
+    /// The point that it found to be best, a realization of that study.
+    pub best: ModelId,
+    /// Who took part in it.
+    pub searchers: Vec<ParticipantId>,
+}
+
+impl Confirms {
+    /// Whether somebody took part in the search. Ids that differ in case alone are the same person's.
+    pub fn was_searcher(&self, participant: &ParticipantId) -> bool {
+        let same = |id: &ParticipantId| id == participant || id.collides_with(participant);
+        self.searchers.iter().any(same)
+    }
+}
