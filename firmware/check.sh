@@ -49,7 +49,7 @@ for _ in $(seq 100); do
   sleep 0.1
 done
 [ -n "$port" ] || { echo "the device did not start:" >&2; cat "$work/said" >&2; exit 1; }
-cargo build --locked -q -p study
+cargo build --locked -q -p haptic-study
 # An emulator looks once a second whether somebody has opened its port, and drops what is
 # written before: hold it open for the check.
 exec 7<>"$port"
