@@ -10,6 +10,7 @@
 use rayon::prelude::*;
 use std::time::Instant;
 use study_base::rng::Stream;
+use study_plan::procedure::search::Acquire;
 use study_plan::procedure::{Choose, Lattice, Preferred, Search, SearchRule};
 use study_stats::describe;
 
@@ -39,7 +40,10 @@ fn time() {
     ] {
         let lattice = Lattice::new(steps, |_| true).expect("a lattice");
         let rule = SearchRule {
-            choose: Choose::PreferenceGp { start: 100 },
+            choose: Choose::PreferenceGp {
+                start: 100,
+                acquire: Acquire::Eubo,
+            },
             trials: 200,
         };
         let person = Person::new(Kind::Peaked, lattice.steps().len(), 1);
@@ -47,7 +51,10 @@ fn time() {
         let mut search = Search::new(&rule, &lattice, &mut stream).expect("a rule");
         let mut answered = Search::new(
             &SearchRule {
-                choose: Choose::PreferenceGp { start: 0 },
+                choose: Choose::PreferenceGp {
+                    start: 0,
+                    acquire: Acquire::Eubo,
+                },
                 ..rule
             },
             &lattice,
@@ -168,12 +175,17 @@ enum Way {
     Model(Choose),
 }
 
-const WAYS: [(Way, &str); 4] = [
+const WAYS: [(Way, &str); 5] = [
     (Way::FivePoints, "five fixed points"),
     (Way::Model(Choose::Random), "random pairs"),
     (Way::Model(Choose::Sobol), "Sobol pairs"),
-    (Way::Model(Choose::PreferenceGp { start: 8 }), "EUBO"),
+    (model(Acquire::Eubo), "EUBO"),
+    (model(Acquire::Challenger), "challenger"),
 ];
+
+const fn model(acquire: Acquire) -> Way {
+    Way::Model(Choose::PreferenceGp { start: 8, acquire })
+}
 
 /// The regret after each number of answers.
 fn found(way: Way, lattice: &Lattice, person: &Person, number: u64) -> [f64; 3] {

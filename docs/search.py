@@ -145,13 +145,26 @@ class Model:
         quadratic = sum(x * y for x, y in zip(s, g))
         self.evidence = log - 0.5 * quadratic - sum(math.log(l[i][i]) for i in range(m))
 
-    def best_pair(self):
+    def next_pair(self, acquire):
         rows = [[self.k(a, j) - self.k(b, j) for j in range(self.n)] for a, b in self.answers]
         mean = [sum(s * row[j] for s, row in zip(self.s, rows)) for j in range(self.n)]
         whitened = [forward(self.l, [r * row[j] for r, row in zip(self.root, rows)]) for j in range(self.n)]
 
         def covariance(i, j):
             return self.k(i, j) - sum(x * y for x, y in zip(whitened[i], whitened[j]))
+
+        if acquire == "challenger":
+            most = max(mean)
+            best = next(i for i, m in enumerate(mean) if m >= most - 1e-9 * max(abs(most), 1.0))
+            others = [j for j in range(self.n) if j != best]
+            promises = []
+            for j in others:
+                variance = covariance(best, best) + covariance(j, j) - 2 * covariance(best, j)
+                promises.append(mean[j] - mean[best] + 2.0 * math.sqrt(max(0.0, variance)))
+            most = max(promises)
+            tied = most - 1e-9 * max(abs(most), 1.0)
+            other = others[next(i for i, promise in enumerate(promises) if promise >= tied)]
+            return min(best, other), max(best, other)
 
         pairs = [(a, b) for b in range(self.n) for a in range(b)]
         values = []
@@ -174,7 +187,7 @@ def kernels(dimensions):
             yield length * root, sd, -0.5 * ((length != 0.4) + (sd != 2.0))
 
 
-def next_pair(lattice, answers):
+def next_pair(lattice, answers, acquire):
     index = {point: i for i, point in enumerate(lattice.certified)}
     coordinates = [lattice.coordinates(point) for point in lattice.certified]
     inner = [(index[a], index[b]) for a, b in answers]
@@ -183,7 +196,7 @@ def next_pair(lattice, answers):
         model = Model(coordinates, length, sd, inner)
         if model.evidence + weight > best_value + 1e-9:
             best, best_value = model, model.evidence + weight
-    a, b = best.best_pair()
+    a, b = best.next_pair(acquire)
     return lattice.certified[a], lattice.certified[b]
 
 
@@ -194,6 +207,7 @@ def main():
     parser.add_argument("--steps", required=True, help="steps of each axis, separated by commas")
     parser.add_argument("--without", default="", help="points that are not certified")
     parser.add_argument("--start", type=int, required=True)
+    parser.add_argument("--acquire", choices=["challenger", "eubo"], default="challenger")
     parser.add_argument("--trials", type=int, required=True)
     parser.add_argument("--answers", help="a file with the preferred point of each trial, one a line")
     arguments = parser.parse_args()
@@ -207,7 +221,7 @@ def main():
             preferred = [int(line) for line in file if line.strip()]
     answers = []
     for trial in range(arguments.trials):
-        pair = planned[trial] if trial < arguments.start else next_pair(lattice, answers)
+        pair = planned[trial] if trial < arguments.start else next_pair(lattice, answers, arguments.acquire)
         print(f"{trial + 1},{pair[0]},{pair[1]}")
         if preferred is None:
             answers.append(pair)

@@ -3,6 +3,7 @@
 use std::fs;
 use std::process::Command;
 use study_base::rng::Stream;
+use study_plan::procedure::search::Acquire;
 use study_plan::procedure::{Choose, Lattice, Preferred, Search, SearchRule};
 
 /// Seed, steps, points that are not certified, first pairs, trials; how somebody answers.
@@ -35,9 +36,13 @@ fn a_script_written_from_the_document_proposes_the_same_pairs() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
-    for (seed, steps, without, start, trials, answer) in CASES {
+    let words = [(Acquire::Challenger, "challenger"), (Acquire::Eubo, "eubo")];
+    let all = CASES
+        .iter()
+        .flat_map(|case| words.map(|word| (*case, word)));
+    for ((seed, steps, without, start, trials, answer), (acquire, word)) in all {
         let rule = SearchRule {
-            choose: Choose::PreferenceGp { start },
+            choose: Choose::PreferenceGp { start, acquire },
             trials,
         };
         let first = Lattice::new(steps.to_vec(), |_| true).unwrap();
@@ -75,6 +80,7 @@ fn a_script_written_from_the_document_proposes_the_same_pairs() {
                 "--trials",
                 &trials.to_string(),
             ])
+            .args(["--acquire", word])
             .arg("--answers")
             .arg(&file)
             .output()
@@ -84,6 +90,7 @@ fn a_script_written_from_the_document_proposes_the_same_pairs() {
             "{}",
             String::from_utf8_lossy(&said.stderr)
         );
-        assert_eq!(String::from_utf8_lossy(&said.stdout), lines, "{steps:?}");
+        let printed = String::from_utf8_lossy(&said.stdout);
+        assert_eq!(printed, lines, "{steps:?} {word}");
     }
 }

@@ -36,6 +36,7 @@ fn plan(assign: Assign, hours: f64) -> Plan {
             list: vec![group("novices"), group("experts")],
         }),
         sessions: vec![session("one"), session("two")],
+        confirms: None,
         given: None,
         now: Some(after(hours)),
     }

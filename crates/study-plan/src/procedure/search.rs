@@ -35,11 +35,12 @@ pub struct SearchRule {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "name", rename_all = "kebab-case")]
 pub enum Choose {
-    /// The pair with the largest expected utility of the better point (EUBO), by the Gaussian process that is learned
-    /// from the answers.
+    /// Pairs that follow from the Gaussian process that is learned from the answers.
     PreferenceGp {
         /// So many first pairs are those of `Sobol`.
         start: u32,
+        /// Which pair comes after them.
+        acquire: Acquire,
     },
     /// Pairs of a shifted Sobol sequence, which fill the space evenly.
     Sobol,
@@ -47,11 +48,24 @@ pub enum Choose {
     Random,
 }
 
+/// Which pair is compared, given what is known of all utilities.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Acquire {
+    /// The best point so far, and the one that may be better by most: [`Posterior::challenge`].
+    Challenger,
+    /// The pair with the largest expected utility of the better point: [`Posterior::best_pair`].
+    Eubo,
+}
+
+/// Standard deviations by which a challenger may be better than it is expected to be.
+const CHALLENGE_SDS: f64 = 2.0;
+
 impl SearchRule {
     /// How many first pairs do not depend on answers.
     pub fn planned(&self) -> u32 {
         match self.choose {
-            Choose::PreferenceGp { start } => start.min(self.trials),
+            Choose::PreferenceGp { start, .. } => start.min(self.trials),
             Choose::Sobol | Choose::Random => self.trials,
         }
     }
@@ -99,7 +113,7 @@ impl Search {
         if rule.trials == 0 || rule.trials > MAX_TRIALS {
             return range("trials", rule.trials, "1 to 500");
         }
-        if let Choose::PreferenceGp { start } = rule.choose
+        if let Choose::PreferenceGp { start, .. } = rule.choose
             && start > rule.trials
         {
             return range("start", start, "at most `trials`");
@@ -128,7 +142,13 @@ impl Search {
         if self.choices.len() < self.rule.planned() as usize {
             return Some(planned);
         }
-        let found = self.posterior().and_then(|p| p.best_pair());
+        let found = self.posterior().and_then(|p| match self.rule.choose {
+            Choose::PreferenceGp {
+                acquire: Acquire::Challenger,
+                ..
+            } => p.challenge(CHALLENGE_SDS),
+            _ => p.best_pair(),
+        });
         Some(found.map_or(planned, |(a, b)| {
             [a, b].map(|index| self.lattice.certified()[index])
         }))

@@ -4,6 +4,7 @@ use crate::figures::of_part;
 use crate::html::PartReport;
 use study_analysis::analyze::psychophysics::PartAnalysis;
 use study_base::text::counted;
+use study_plan::procedure::search::Acquire;
 use study_plan::procedure::{Choose, Rule, SearchRule};
 use study_plan::protocol::identification::{Criterion, Feedback};
 use study_plan::protocol::pairs::IntervalOrder;
@@ -141,10 +142,19 @@ fn trials(protocol: &Protocol, part: &Part) -> String {
 /// How the pairs of a search are chosen.
 pub fn search_rule(rule: &SearchRule) -> String {
     match rule.choose {
-        Choose::PreferenceGp { start } => format!(
-            "the first {start} of a Sobol sequence, then those with the largest expected utility of the better point by a \
-             Gaussian process of the participant's answers (EUBO)"
-        ),
+        Choose::PreferenceGp { start, acquire } => {
+            let then = match acquire {
+                Acquire::Challenger => {
+                    "the best point so far and the one that may be better by most"
+                }
+                Acquire::Eubo => {
+                    "those with the largest expected utility of the better point (EUBO)"
+                }
+            };
+            format!(
+                "the first {start} of a Sobol sequence, then {then}, by a Gaussian process of the participant's answers"
+            )
+        }
         Choose::Sobol => "those of a Sobol sequence".to_owned(),
         Choose::Random => "drawn at random".to_owned(),
     }

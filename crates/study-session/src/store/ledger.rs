@@ -364,8 +364,6 @@ fn write_reserve(disk: &dyn Disk, path: &Path) -> io::Result<()> {
     file.sync()
 }
 
-/// Refuses a session that is not unfinished.
-
 /// Refuses whoever took part in the search that the study confirms. Simulated participants are nobody.
 fn check_searchers(request: &ClaimRequest) -> Result<(), StoreError> {
     let confirms = request.plan.confirms.as_ref();
@@ -379,6 +377,7 @@ fn check_searchers(request: &ClaimRequest) -> Result<(), StoreError> {
     }
 }
 
+/// Refuses a session that is not unfinished.
 fn check_standing(
     request: &ClaimRequest,
     session: u32,

@@ -1,4 +1,4 @@
-//! The best point so far, and the pair whose comparison is expected to lead to the best one.
+//! The best point so far, and pairs whose comparison leads to the best one.
 
 use super::probit::{DENSITY_AT_0, cumulative, density};
 use super::{Posterior, TIE};
@@ -32,6 +32,26 @@ impl Posterior {
         let tied = most - TIE * most.abs().max(1.0);
         let mut pairs = self.pairs();
         pairs.find(|(a, b)| self.bound(*a, *b) >= tied && self.expected_best(*a, *b) >= tied)
+    }
+
+    /// The best point so far and its challenger, the lower index first: of all others the point that may be better by most, in
+    /// the sense that the mean of its advantage over the best point plus `sds` of its standard deviations is largest; of points
+    /// within [`TIE`] of that, the first. `None` with fewer than two points.
+    ///
+    /// Pairs by [`best_pair`](Self::best_pair) are the best ones if the next answer is the last. Challenges look further ahead: a
+    /// region of which nothing is known is visited even if one answer could not make it the best.
+    pub fn challenge(&self, sds: f64) -> Option<(usize, usize)> {
+        let best = self.best_point();
+        let promise = |other: usize| {
+            let variance = self.covariance(best, best) + self.covariance(other, other)
+                - 2.0 * self.covariance(best, other);
+            self.mean()[other] - self.mean()[best] + sds * variance.max(0.0).sqrt()
+        };
+        let others = || (0..self.mean().len()).filter(|other| *other != best);
+        let most = others().map(promise).fold(f64::NEG_INFINITY, f64::max);
+        let tied = most - TIE * most.abs().max(1.0);
+        let other = others().find(|other| promise(*other) >= tied)?;
+        Some((best.min(other), best.max(other)))
     }
 
     /// The point with the largest mean; of points within [`TIE`] of it, the first.

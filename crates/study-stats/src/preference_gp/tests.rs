@@ -31,6 +31,30 @@ fn without_answers_the_posterior_is_the_prior() {
     assert_eq!(prior.best_point(), 0);
 }
 
+/// After one answer the middle of three points is half as far from the best one as the other end, by symmetry.
+#[test]
+fn a_challenger_is_the_point_that_may_be_better_by_most() {
+    let posterior = Posterior::new(&line(3), &kernel(), &[choice(2, 0)]).unwrap();
+    let advantage = |other: usize| {
+        let mean = posterior.mean()[other] - posterior.mean()[2];
+        let variance = posterior.covariance(2, 2) + posterior.covariance(other, other)
+            - 2.0 * posterior.covariance(2, other);
+        (mean, variance.sqrt())
+    };
+    let (near, far) = (advantage(1), advantage(0));
+    assert!((2.0 * near.0 - far.0).abs() < 1e-12);
+    // With few standard deviations the nearer one, of which less is lost; the difference changes sign in between.
+    let turn = (near.0 - far.0) / (far.1 - near.1);
+    assert!(turn > 0.0, "{turn}");
+    assert_eq!(posterior.challenge(0.99 * turn), Some((1, 2)));
+    assert_eq!(posterior.challenge(1.01 * turn), Some((0, 2)));
+    // Of points that are tied by symmetry, the first.
+    let prior = Posterior::new(&line(3), &kernel(), &[choice(1, 0), choice(1, 2)]).unwrap();
+    assert_eq!(prior.challenge(2.0), Some((0, 1)));
+    let alone = Posterior::new(&[vec![0.5]], &kernel(), &[]).unwrap();
+    assert_eq!(alone.challenge(2.0), None);
+}
+
 /// One answer: the difference g of the two points solves g = c φ(z)/(√2 Φ(z)), z = g/√2, found by bisection.
 #[test]
 fn one_answer_is_solved_by_bisection() {

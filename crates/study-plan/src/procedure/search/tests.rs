@@ -12,7 +12,12 @@ fn rule(choose: Choose, trials: u32) -> SearchRule {
     SearchRule { choose, trials }
 }
 
-const MODEL: Choose = Choose::PreferenceGp { start: 4 };
+const fn model(acquire: Acquire) -> Choose {
+    Choose::PreferenceGp { start: 4, acquire }
+}
+
+const MODELS: [Choose; 2] = [model(Acquire::Challenger), model(Acquire::Eubo)];
+const MODEL: Choose = MODELS[0];
 
 /// Prefers the point that is nearer to a place, without noise.
 fn nearer(lattice: &Lattice, place: &[f64], pair: [usize; 2]) -> Preferred {
@@ -42,8 +47,12 @@ fn run(rule: &SearchRule, lattice: &Lattice, place: &[f64]) -> Vec<RecordedPair>
 #[test]
 fn a_search_finds_the_point_that_is_preferred() {
     let lattice = square(5);
-    for place in [[0.75, 0.25], [0.0, 1.0], [0.5, 0.5]] {
-        let mut search = Search::new(&rule(MODEL, 30), &lattice, &mut stream()).unwrap();
+    let places = [[0.75, 0.25], [0.0, 1.0], [0.5, 0.5]];
+    let all = MODELS
+        .iter()
+        .flat_map(|model| places.map(|place| (*model, place)));
+    for (model, place) in all {
+        let mut search = Search::new(&rule(model, 30), &lattice, &mut stream()).unwrap();
         while let Some(pair) = search.next() {
             search.answer(&nearer(&lattice, &place, pair));
         }
@@ -58,17 +67,35 @@ fn a_search_finds_the_point_that_is_preferred() {
 #[test]
 fn pairs_are_the_same_everywhere() {
     let lattice = Lattice::new(vec![5, 4], |at| at[0] + at[1] < 7).unwrap();
-    let mut search = Search::new(&rule(MODEL, 12), &lattice, &mut stream()).unwrap();
-    let mut pairs = Vec::new();
-    while let Some([preferred, other]) = search.next() {
-        pairs.push((preferred, other));
-        search.answer(&Preferred { preferred, other });
+    for (model, expected) in MODELS.iter().zip([CHALLENGES, EUBO]) {
+        let mut search = Search::new(&rule(*model, 12), &lattice, &mut stream()).unwrap();
+        let mut pairs = Vec::new();
+        while let Some([preferred, other]) = search.next() {
+            pairs.push((preferred, other));
+            search.answer(&Preferred { preferred, other });
+        }
+        assert_eq!(pairs, expected);
     }
-    assert_eq!(pairs, PAIRS);
 }
 
 /// From `docs/search.py --seed 5 --stream search --steps 5,4 --without 19 --start 4 --trials 12`.
-const PAIRS: [(usize, usize); 12] = [
+const CHALLENGES: [(usize, usize); 12] = [
+    (0, 17),
+    (7, 10),
+    (12, 17),
+    (2, 7),
+    (2, 4),
+    (2, 16),
+    (1, 2),
+    (1, 3),
+    (1, 15),
+    (0, 1),
+    (0, 2),
+    (0, 1),
+];
+
+/// The same with `--acquire eubo`.
+const EUBO: [(usize, usize); 12] = [
     (0, 17),
     (7, 10),
     (12, 17),
@@ -86,7 +113,7 @@ const PAIRS: [(usize, usize); 12] = [
 #[test]
 fn a_journal_that_its_rule_would_not_give_is_found() {
     let lattice = square(4);
-    for choose in [MODEL, Choose::Sobol, Choose::Random] {
+    for choose in [MODELS[0], MODELS[1], Choose::Sobol, Choose::Random] {
         let rule = rule(choose, 9);
         let trials = run(&rule, &lattice, &[0.3, 0.9]);
         let search = || Search::new(&rule, &lattice, &mut stream()).unwrap();

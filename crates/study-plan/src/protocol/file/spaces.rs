@@ -1,9 +1,10 @@
 //! `[[spaces]]`: several dimensions of the stimulus at once.
 
+use crate::procedure::search::Acquire;
 use crate::procedure::search::{MAX_POINTS, MAX_TRIALS};
 use crate::procedure::{Choose, Ladder, Lattice, SearchRule};
 use crate::protocol::Vary;
-use crate::protocol::keys::{Id, Key, Kind, Shape, Variants, keys};
+use crate::protocol::keys::{Id, Key, Kind, Shape, Variants, Word, Words, keys};
 use crate::protocol::section::{Section, Variant, shapes};
 use crate::protocol::spaces::{Axis, SpaceRules};
 use study_base::diagnostic::Fault;
@@ -158,13 +159,30 @@ pub(super) static RULE: Variants = Variants {
 
 static SHAPES: [Shape; RULES.len()] = shapes(&RULES);
 
+impl Words for Acquire {
+    const VALUES: &'static [(&'static str, Self)] =
+        &[("challenger", Self::Challenger), ("eubo", Self::Eubo)];
+    const WORDS: &'static [Word] = &[
+        Word::new(
+            "challenger",
+            "The best point so far, and of all others the one that may be better by most.",
+        ),
+        Word::new(
+            "eubo",
+            "The pair with the largest expected utility of the better point (Lin et al. 2022).",
+        ),
+    ];
+}
+
 pub(super) const RULES: [Variant<SearchRule>; 3] = [
     Variant::new(
         "preference-gp",
-        "A Gaussian process learns the utility of every point from the participant's own answers in the session, and the pair with the largest expected utility of the better point comes next (EUBO). docs/search.md defines it.",
+        "A Gaussian process learns the utility of every point from the participant's own answers in the session, and the next pair follows from it. docs/search.md defines it.",
         keys! {
             /// So many first pairs fill the space evenly, as those of `sobol`.
             "start": Kind::Whole(1, MAX_TRIALS as i64), "6", default("8");
+            /// Which pair comes after them.
+            "acquire": Kind::Word(Acquire::WORDS), r#""eubo""#, default(r#""challenger""#);
         },
         preference_gp,
     ),
@@ -179,6 +197,7 @@ pub(super) const RULES: [Variant<SearchRule>; 3] = [
 
 fn preference_gp(section: &mut Section<'_, '_>) -> Option<SearchRule> {
     let (trials, start) = (section.whole("trials"), section.whole("start"));
+    let acquire = section.word("acquire");
     if let (Some(trials), Some(start)) = (trials, start)
         && start > trials
     {
@@ -190,7 +209,10 @@ fn preference_gp(section: &mut Section<'_, '_>) -> Option<SearchRule> {
         return None;
     }
     Some(SearchRule {
-        choose: Choose::PreferenceGp { start: start? },
+        choose: Choose::PreferenceGp {
+            start: start?,
+            acquire: acquire?,
+        },
         trials: trials?,
     })
 }
