@@ -768,4 +768,8 @@ compared$agrees <- !is.na(compared$difference) & compared$difference <= compared
 if (nrow(compared) > 0) print(compared, row.names = FALSE)
 print(sessionInfo())
 if (!all(compared$agrees)) stop("some numbers differ from those of `study analyze`")
-cat("all ", nrow(compared), " numbers agree\n", sep = "")
+if (nrow(compared) == 0) {
+  cat("no number is computed again here: R has no test of this study's answers\n")
+} else {
+  cat("all ", nrow(compared), " numbers agree\n", sep = "")
+}

@@ -27,6 +27,7 @@ mod questionnaires;
 mod questions;
 mod resolve;
 mod spaces;
+mod track_rules;
 mod tracks;
 
 pub use orders::parse_orders;

@@ -1,7 +1,7 @@
 //! Identification: which of several labels belongs to what is felt.
 
 use super::keys::words;
-use super::{Answer, Presentations};
+use super::{Answer, Presentations, Protocol};
 use serde::Serialize;
 use study_base::text::ModelId;
 
@@ -84,5 +84,13 @@ impl Identification {
             Feedback::Always => true,
             Feedback::Never => false,
         }
+    }
+}
+
+impl Protocol {
+    /// Whether the number of practice trials depends on the answers.
+    pub fn practices_to_a_criterion(&self) -> bool {
+        let mut named = self.parts.iter().filter_map(|p| p.task.identification());
+        named.any(|own| own.criterion.is_some())
     }
 }

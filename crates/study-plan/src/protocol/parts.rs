@@ -498,12 +498,6 @@ impl Protocol {
         })
     }
 
-    /// Whether the number of practice trials depends on the answers.
-    pub fn practices_to_a_criterion(&self) -> bool {
-        let named = self.parts.iter().filter_map(|p| p.task.identification());
-        named.into_iter().any(|own| own.criterion.is_some())
-    }
-
     /// The rules of order that apply to the trials of a part: its own, or `[design]`'s
     /// without parts.
     pub fn design_of(&self, part: Option<&PartId>) -> Design {

@@ -145,7 +145,8 @@ fn presented(protocol: &Protocol, model: &ModelId) -> bool {
     by_track || by_part
 }
 
-/// Whether realizations are rated or compared, so that their number matters.
+/// Whether realizations are rated or compared, so that their number matters. A study that confirms what a search found is
+/// about those two.
 pub fn is_about_realizations(protocol: &Protocol) -> bool {
     let about = |part: &Part| match &part.task {
         Task::Discrimination { .. } | Task::Identification(_) | Task::Search(_) => false,
@@ -153,7 +154,8 @@ pub fn is_about_realizations(protocol: &Protocol) -> bool {
         Task::Rating(_) | Task::Mushra(_) | Task::Pairs(_) => true,
     };
     let tested = protocol.models.iter().any(|m| m.role == Role::Test);
-    protocol.parts.is_empty() || (protocol.parts.iter().any(about) && tested)
+    let compares = protocol.parts.is_empty() || (protocol.parts.iter().any(about) && tested);
+    compares && protocol.confirms.is_none()
 }
 
 /// Too few levels for an exponent, or levels that it leaves out.
