@@ -169,7 +169,7 @@ fn comments_stay_away_if_asked() {
         assert!(!said.contains("may identify"), "{said}");
         for (name, bytes) in files(&out) {
             let text = String::from_utf8_lossy(&bytes);
-            for gone in ["HYPERLINK", "Miller", "simulated-1"] {
+            for gone in ["HYPERLINK", "Okafor", "simulated-1"] {
                 assert!(!text.contains(gone), "{to}: {name}: {gone}");
             }
         }
@@ -362,7 +362,7 @@ fn who_withdrew_is_in_no_data_set_and_who_is_excluded_is() {
             "--state",
             state,
             "--reason",
-            "asked Dr. Miller",
+            "asked Dr. Okafor",
         ];
         let (code, _, err) = study(&arguments, home.path());
         assert_eq!(code, 0, "{err}");

@@ -48,7 +48,7 @@ pub(crate) fn real_study(
             if let Event::SessionStarted(start) = &mut event {
                 start.participant = study_base::text::ParticipantId::new(*id).unwrap();
                 start.seat = claimed.seat;
-                start.operator = "Miller".to_owned();
+                start.operator = "Okafor".to_owned();
             }
             if change(who, &mut event) {
                 journal.append(entry.at, &event).unwrap();
