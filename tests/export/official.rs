@@ -225,8 +225,8 @@ fn each_validator_refuses_planted_errors() {
         (
             Bids,
             beh,
-            "simulated-1\tOkafor\t0.1.0\t1\t",
-            "simulated-1\tOkafor\t0.1.0\t1\t9",
+            concat!("simulated-1\tOkafor\t", env!("CARGO_PKG_VERSION"), "\t1\t"),
+            concat!("simulated-1\tOkafor\t", env!("CARGO_PKG_VERSION"), "\t1\t9"),
             "TSV_VALUE_INCORRECT_TYPE",
         ),
         (
@@ -282,8 +282,8 @@ fn each_validator_refuses_planted_errors() {
         (
             Frictionless,
             "ratings.csv",
-            "simulated-1,Okafor,0.1.0,1,",
-            "simulated-1,Okafor,0.1.0,1,9",
+            concat!("simulated-1,Okafor,", env!("CARGO_PKG_VERSION"), ",1,"),
+            concat!("simulated-1,Okafor,", env!("CARGO_PKG_VERSION"), ",1,9"),
             "constraint-error",
         ),
         (
