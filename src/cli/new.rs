@@ -3,7 +3,7 @@
 mod confirm;
 
 use super::include::{Who, include};
-use super::{Console, Failure};
+use super::{Console, Failure, schema};
 use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -150,13 +150,14 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let today = chrono::Local::now().date_naive();
     let of_today = || today.format("%Y%m%d").to_string().parse().unwrap_or(1);
     let seed = args.seed.unwrap_or_else(of_today);
-    let files = match &args.from {
+    let mut files = match &args.from {
         Some(results) if args.confirm => {
             confirm::confirmation(results, include(&args.include), (&today.to_string(), seed))?
         }
         Some(results) => replication(results, &today.to_string(), seed)?,
         None => starter(dir, seed, args.kind)?,
     };
+    add_schema(&mut files);
     write(dir, &files)?;
     let shown = dir.display().to_string();
     let shown = Untrusted(&shown);
@@ -180,6 +181,17 @@ fn starter(dir: &Path, seed: u64, kind: TrialKind) -> Result<Files, Failure> {
         files.push(((*path).to_owned(), text.as_bytes().to_vec()));
     }
     Ok(files)
+}
+
+/// Adds the JSON Schema, which the first line of the protocol names for editors.
+fn add_schema(files: &mut Files) {
+    if let Some((_, protocol)) = files.first_mut() {
+        *protocol = schema::with_schema(&String::from_utf8_lossy(protocol)).into_bytes();
+    }
+    files.push((
+        schema::FILE_NAME.to_owned(),
+        schema::document().into_bytes(),
+    ));
 }
 
 /// The newest frozen protocol of a study, with a new id and a new seed, which make it

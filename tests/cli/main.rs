@@ -9,6 +9,7 @@ mod preregister;
 mod protocol_check;
 mod protocol_docs;
 mod protocol_schema;
+mod schema_install;
 mod spaces;
 #[path = "../support/mod.rs"]
 mod support;

@@ -537,7 +537,9 @@ fn a_replication_takes_the_newest_frozen_protocol_with_a_seed_of_its_own() {
         let (code, _, err) = run(dir.path(), &["new", &name, "--from", results]);
         assert_eq!((code, err.as_str()), (0, ""));
         let text = fs::read_to_string(dir.path().join(&name).join("protocol.toml")).unwrap();
-        assert!(text.starts_with("# A replication of the study `turn-signal`, version 2"));
+        let head =
+            "#:schema protocol.schema.json\n# A replication of the study `turn-signal`, version 2";
+        assert!(text.starts_with(head), "{text}");
         assert!(text.contains("title = \"2 Realism"));
         assert!(text.contains("id = \"turn-signal-replication\""));
         assert!(!text.contains("seed = 2007 "));

@@ -16,8 +16,12 @@ const HEAD: &str = "\
 
 A study is described by a file `protocol.toml` in [TOML](https://toml.io). This page lists every key that it can
 have; it is generated from the declarations that the program reads the file with. `study new DIR` writes a
-commented protocol to start from, `study check PROTOCOL` reports every fault of one, and `study schema` prints a
-JSON Schema with which editors complete and check keys.
+commented protocol to start from, and `study check PROTOCOL` reports every fault of one.
+
+Editors complete and check keys by a JSON Schema. `study new` writes it beside the protocol, whose first line names
+it (`#:schema protocol.schema.json`), and `study schema --install PROTOCOL` does so with a protocol that has none or
+an older one. Visual Studio Code with Even Better TOML and other editors with Taplo follow that line; for the others
+`study schema` prints the schema. The program itself reads neither.
 
 Reading is strict. An unknown key, a wrong type, a value out of range, an empty text and a missing key are errors,
 each with its line and, where there is one, a suggestion. Paths are relative to the protocol and stay inside its

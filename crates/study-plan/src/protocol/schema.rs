@@ -8,6 +8,9 @@ use super::keys::{Absent, Id, Key, Kind, NumberRange, Shape, Variants, Word};
 use serde_json::{Map, Value, json};
 use std::ops::Bound;
 
+/// What tells this schema from those of other files.
+pub const TITLE: &str = "study protocol";
+
 /// The JSON Schema, draft 2020-12.
 ///
 /// ```
@@ -30,7 +33,7 @@ pub fn json_schema() -> Value {
         }
     }
     schema["$schema"] = json!("https://json-schema.org/draft/2020-12/schema");
-    schema["title"] = json!("study protocol");
+    schema["title"] = json!(TITLE);
     schema["description"] = json!(format!(
         "The protocol file of a study, {}, {} or {}.",
         super::FORMAT,
