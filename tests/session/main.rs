@@ -27,7 +27,7 @@ mod parts_by_keys;
 mod plain;
 mod programs;
 mod rehearsed;
-mod release_0_1;
+mod releases;
 mod screen;
 #[path = "../support/mod.rs"]
 mod support;
