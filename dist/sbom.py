@@ -19,6 +19,7 @@ import uuid
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 PROGRAM = "haptic-study"
+STANDARD_LIBRARY = "rust-std"
 LICENSE_FILE = re.compile(r"^(licen[cs]e|copying|notice|unlicense)", re.IGNORECASE)
 
 
@@ -78,6 +79,23 @@ def component(package: dict, known: dict) -> dict:
     return found
 
 
+def standard_library() -> dict:
+    """Linked into the program as well, and in no lock file."""
+    printed = subprocess.run(["rustc", "-vV"], cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    release = next(line.split()[1] for line in printed.splitlines() if line.startswith("release: "))
+    purl = f"pkg:generic/{STANDARD_LIBRARY}@{release}"
+    return {
+        "type": "library",
+        "bom-ref": purl,
+        "name": STANDARD_LIBRARY,
+        "version": release,
+        "description": "The standard library of Rust, with the crates that it uses",
+        "purl": purl,
+        "licenses": [{"expression": "MIT OR Apache-2.0"}],
+        "externalReferences": [{"type": "vcs", "url": "https://github.com/rust-lang/rust"}],
+    }
+
+
 def sbom(target: str) -> dict:
     packages, uses, program = crates(target)
     known = checksums()
@@ -91,7 +109,7 @@ def sbom(target: str) -> dict:
             "component": own,
             "properties": [{"name": "study:target", "value": target}],
         },
-        "components": [component(packages[i], known) for i in order if i != program],
+        "components": [component(packages[i], known) for i in order if i != program] + [standard_library()],
         "dependencies": [
             {"ref": reference(packages[i]), "dependsOn": sorted({reference(packages[d]) for d in uses[i]})}
             for i in order
@@ -147,6 +165,7 @@ def check(target: str, messages: str) -> None:
             built.add((name or place.rsplit("/", 1)[-1], version))
     document = sbom(target)
     listed = [document["metadata"]["component"], *document["components"]]
+    listed = [one for one in listed if one["name"] != STANDARD_LIBRARY]
     found = {(one["name"], one["version"]) for one in listed}
     for missing in sorted(built - found):
         print("built, and not in the list:", *missing)
