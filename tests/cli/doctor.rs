@@ -246,3 +246,62 @@ fn a_terminal_is_seen_and_ctrl_c_leaves_nothing() {
     assert_eq!(ended.exit_code(), 3);
     assert_eq!(names(home.path()), Vec::<String>::new());
 }
+
+/// A library for `LD_PRELOAD` with which every sync takes as long as `SYNC_MS` says; none without a C compiler.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+fn slow_syncs(folder: &Path) -> Option<std::path::PathBuf> {
+    let source = "#include <stdlib.h>\n#include <unistd.h>\n\
+                  int fsync(int file) { (void)file; usleep(1000 * atoi(getenv(\"SYNC_MS\"))); return 0; }\n\
+                  int fdatasync(int file) { return fsync(file); }\n";
+    let (from, library) = (folder.join("slow.c"), folder.join("slow.so"));
+    fs::write(&from, source).unwrap();
+    let mut compiler = std::process::Command::new("cc");
+    compiler
+        .args(["-shared", "-fPIC", "-o"])
+        .args([&library, &from]);
+    compiler.status().ok()?.success().then_some(library)
+}
+
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+#[test]
+fn a_slow_disk_is_measured_and_said_in_words() {
+    let home = tempfile::tempdir().unwrap();
+    let Some(library) = slow_syncs(home.path()) else {
+        return eprintln!("SKIPPED: no C compiler here, so no slow disk");
+    };
+    let results = home.path().join("results");
+    fs::create_dir(&results).unwrap();
+    // A record takes three syncs or more.
+    for (sync_ms, least_ms, fit) in [(100, 300.0, "with-limits"), (800, 2400.0, "not-fit")] {
+        let output = std::process::Command::new(env!("CARGO_BIN_EXE_study"))
+            .args(["doctor", "--json"])
+            .current_dir(home.path())
+            .env("LD_PRELOAD", &library)
+            .env("SYNC_MS", sync_ms.to_string())
+            .output()
+            .unwrap();
+        let document: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let record = &document["measured"]["disk"]["record"];
+        assert!(
+            record["median_ms"].as_f64().unwrap() >= least_ms,
+            "{record:#}"
+        );
+        let findings = document["findings"].as_array().unwrap();
+        let saving = findings.iter().find(|finding| finding["id"] == "saving");
+        let saving = saving.unwrap();
+        assert_eq!(saving["fit"], fit, "{saving:#}");
+        assert!(
+            says(&document, "saving").contains("A record is saved within"),
+            "{saving:#}"
+        );
+        assert!(
+            saving["advice"].as_str().unwrap().contains("disk"),
+            "{saving:#}"
+        );
+        assert!(document["seconds"].as_f64().unwrap() < 20.0, "{document:#}");
+        if fit == "not-fit" {
+            assert_eq!(output.status.code(), Some(4), "{document:#}");
+        }
+        assert_eq!(names(&results), Vec::<String>::new());
+    }
+}
