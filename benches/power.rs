@@ -1,8 +1,8 @@
-//! Processor time of `study power`: the numbers in docs/measured.md.
+//! Processor time of `study power`: the numbers in lab/measured.md.
 //!
 //! `cargo bench --bench power` simulates studies of 10 × 8 × 3 (participants × realizations
 //! × repetitions) on one thread, as `study power` does: the headline tests by their closed
-//! forms, and the verdict rule of the analysis. `docs/power-peers.R` times lmer and simr
+//! forms, and the verdict rule of the analysis. `lab/power-peers.R` times lmer and simr
 //! beside it.
 #![allow(clippy::print_stdout)]
 

@@ -12,7 +12,7 @@ printf '\n`study power protocols/turn-signal --closed` as a process, processor t
 (i=0; while [ $i -lt 20 ]; do "$study" power protocols/turn-signal --closed >/dev/null; i=$((i + 1)); done; times | tail -1)
 printf '\nPeers:\n'
 if command -v Rscript >/dev/null && Rscript -e 'library(lme4); library(lmerTest)' >/dev/null 2>&1; then
-  Rscript docs/power-peers.R "${1:-100}"
+  Rscript lab/power-peers.R "${1:-100}"
 else
   echo "SKIPPED: no R with lme4 and lmerTest here" >&2
 fi

@@ -34,6 +34,7 @@ pub fn all_pages() -> Vec<String> {
         "firmware",
         "firmware/c",
         "dist",
+        "lab",
     ];
     let folders = folders
         .into_iter()

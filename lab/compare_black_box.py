@@ -1,7 +1,7 @@
 """Two black boxes on the recordings of switch A, for the table in docs/estimators.md.
 
     python3 -m venv venv && venv/bin/pip install numpy scikit-learn
-    venv/bin/python docs/compare_black_box.py tests/data/recordings/training_a.csv \
+    venv/bin/python lab/compare_black_box.py tests/data/recordings/training_a.csv \
         tests/data/recordings/validation_a.csv
 
 * narx: nonlinear autoregression with exogenous inputs, a multilayer perceptron (two layers of

@@ -2,7 +2,7 @@
 # repetitions), each drawn and tested by lmer with Satterthwaite's degrees of freedom,
 # and by simr where it is installed. Prints seconds of processor time and versions.
 #
-#   Rscript docs/power-peers.R [STUDIES]        (default 100, scaled to 1,000)
+#   Rscript lab/power-peers.R [STUDIES]        (default 100, scaled to 1,000)
 #
 # `cargo bench --bench power` beside it simulates the same design.
 suppressPackageStartupMessages({ library(lme4); library(lmerTest) })

@@ -1,7 +1,7 @@
 # An independent simulation of designs of docs/power.md: exact permutation test of Pearson's r over
 # six evenly spaced realizations, rejecting at p <= .05. Prints the share of 20,000 studies.
 #
-#   Rscript docs/power-check.R
+#   Rscript lab/power-check.R
 set.seed(11)
 orders <- function(x) {
   if (length(x) < 2) return(list(x))
