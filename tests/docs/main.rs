@@ -22,9 +22,12 @@
 
 mod book;
 mod command_lines;
+mod first_study;
 mod markdown;
 mod pages;
+mod pictures;
 mod recording;
+mod screen_picture;
 mod steps;
 #[path = "../support/mod.rs"]
 mod support;

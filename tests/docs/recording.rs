@@ -1,8 +1,8 @@
 //! docs/tutorial-recording.md: beside its commands, its picture, and the pages that repeat them.
 
 use crate::markdown::page;
+use crate::pictures::is_stored;
 use crate::steps::Shell;
-use crate::support::repository;
 use std::fs;
 
 pub const PAGE: &str = "docs/tutorial-recording.md";
@@ -14,14 +14,8 @@ fn the_tutorial_says_what_its_commands_do() {
     let mut shell = Shell::new();
     shell.follow(&page(PAGE));
     let drawn = shell.folder().join("figures/force-displacement.svg");
-    let picture = repository("docs/tutorial-recording.svg");
-    if std::env::var_os("UPDATE_DOCS").is_some() {
-        fs::copy(&drawn, &picture).unwrap();
-    }
-    assert!(
-        fs::read(drawn).unwrap() == fs::read(picture).unwrap(),
-        "the picture is another one: UPDATE_DOCS=1 writes it"
-    );
+    let drawn = fs::read_to_string(drawn).unwrap();
+    is_stored("docs/pictures/recording-fit.svg", &drawn);
 }
 
 /// docs/identification.md has the tutorial's own commands, without the example's file.

@@ -189,6 +189,18 @@ impl Terminal {
         self.shown().text
     }
 
+    /// The cells of the last complete page, with their colors.
+    pub fn cells(&self) -> vt100::Screen {
+        loop {
+            let emulator = self.screen.lock().unwrap();
+            if !emulator.updating {
+                return emulator.parser.screen().clone();
+            }
+            drop(emulator);
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
     /// Whether the program is on the alternate screen.
     pub fn alternate(&self) -> bool {
         self.shown().alternate
