@@ -11,7 +11,7 @@ pub struct Design {
     /// Planned participants; an analysis with fewer is interim.
     pub participants: u32,
     /// Trials of each realization that is not for practice. With parts, each part has
-    /// this and the next four for itself, see [`Protocol::design_of`].
+    /// this and the next four for itself, see [`design_of`](super::Protocol::design_of).
     pub repetitions: u32,
     /// How orders are made.
     pub order: Order,

@@ -31,23 +31,29 @@ fn without_answers_the_posterior_is_the_prior() {
     assert_eq!(prior.best_point(), 0);
 }
 
-/// After one answer the middle of three points is half as far from the best one as the other end, by symmetry.
+/// Of five points on a line, 2 was preferred to 1: 3 is the best, 2 is close to it, and of 0 little is known.
 #[test]
 fn a_challenger_is_the_point_that_may_be_better_by_most() {
-    let posterior = Posterior::new(&line(3), &kernel(), &[choice(2, 0)]).unwrap();
+    let posterior = Posterior::new(&line(5), &kernel(), &[choice(2, 1)]).unwrap();
+    assert_eq!(posterior.best_point(), 3);
     let advantage = |other: usize| {
-        let mean = posterior.mean()[other] - posterior.mean()[2];
-        let variance = posterior.covariance(2, 2) + posterior.covariance(other, other)
-            - 2.0 * posterior.covariance(2, other);
+        let mean = posterior.mean()[other] - posterior.mean()[3];
+        let variance = posterior.covariance(3, 3) + posterior.covariance(other, other)
+            - 2.0 * posterior.covariance(3, other);
         (mean, variance.sqrt())
     };
-    let (near, far) = (advantage(1), advantage(0));
-    assert!((2.0 * near.0 - far.0).abs() < 1e-12);
-    // With few standard deviations the nearer one, of which less is lost; the difference changes sign in between.
+    let (near, far) = (advantage(2), advantage(0));
+    // By numpy: (−0.1671, 1.3908) and (−1.0430, 2.2869).
+    let expected = [
+        near.0 + 0.1671,
+        near.1 - 1.3908,
+        far.0 + 1.043,
+        far.1 - 2.2869,
+    ];
+    assert!(expected.iter().all(|off| off.abs() < 1e-4), "{expected:?}");
     let turn = (near.0 - far.0) / (far.1 - near.1);
-    assert!(turn > 0.0, "{turn}");
-    assert_eq!(posterior.challenge(0.99 * turn), Some((1, 2)));
-    assert_eq!(posterior.challenge(1.01 * turn), Some((0, 2)));
+    assert_eq!(posterior.challenge(0.99 * turn), Some((2, 3)));
+    assert_eq!(posterior.challenge(1.01 * turn), Some((0, 3)));
     // Of points that are tied by symmetry, the first.
     let prior = Posterior::new(&line(3), &kernel(), &[choice(1, 0), choice(1, 2)]).unwrap();
     assert_eq!(prior.challenge(2.0), Some((0, 1)));
