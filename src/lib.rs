@@ -38,6 +38,7 @@
 //!   which each realization comes once. **trial**: one planned presentation.
 //!   **attempt**: one try at a trial; a failed one is repeated.
 //! * **answer**: to one question; **outcome**: everything known about a trial.
+//!   **measured outcome**: a number that is measured in a trial besides its questions, such as a time.
 //! * **recording**: what a probe measured. **telemetry**: what a device reports.
 //! * **limp**: a device that produces no force.
 //! * **VAF**: variance accounted for, 1 − var(F − F̂)/var(F), of a realization on

@@ -15,6 +15,7 @@ mod missing;
 mod mixed;
 mod nist;
 mod odd;
+mod outcomes;
 mod parts;
 mod pool;
 mod possible;

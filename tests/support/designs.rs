@@ -76,6 +76,7 @@ pub(crate) fn design(models: usize, repetitions: u32, order: Order) -> Protocol 
         intake: Vec::new(),
         outro: Vec::new(),
         questionnaires: Vec::new(),
+        outcomes: Vec::new(),
         power: Default::default(),
         analysis: AnalysisRules {
             primary: QuestionId::new("realism").expect("an identifier"),

@@ -29,11 +29,13 @@ mod headline;
 mod identifiers;
 mod influence;
 mod keys;
+mod measured;
 mod memory;
 mod missing;
 mod mixed;
 mod order;
 mod ordinal;
+mod outcomes;
 mod overflow;
 mod pairs;
 mod posterior;
@@ -62,6 +64,7 @@ pub use effects::MAX_PAIRED;
 pub use exclude::Applied;
 pub use findings::{Finding, Pair, Question, Test, TestKind, Verdict};
 pub use identifiers::{group_id, pair_id};
+pub use outcomes::OutcomeAnswer;
 pub use select::{Counts, Include, Reason};
 pub use study_plan::protocol::{ALPHA, Exclusion};
 pub use values::{Value, Values};
@@ -74,7 +77,9 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use study_plan::protocol::{Crossing, Protocol, Role, Unfinished};
+use study_plan::protocol::{
+    BetterEnd, Crossing, OutcomeRules, Protocol, Role, Transform, Unfinished,
+};
 pub use study_session::outcome::ratings::Felt;
 use study_session::outcome::ratings::{Practice, Ratings};
 pub use study_stats::ordinal_hierarchy::OrdinalEffort;
@@ -113,6 +118,8 @@ pub struct Rules {
     pub better: Better,
     /// The factors of the realizations; `None` in a study without.
     pub crossing: Option<Crossing>,
+    /// The measured outcomes.
+    pub outcomes: Vec<OutcomeRules>,
     /// The draws of the ordinal hierarchical model, which takes seconds and decides nothing; `None`: it is left out.
     pub posterior: Option<OrdinalEffort>,
 }
@@ -135,14 +142,15 @@ impl Default for Rules {
             construct: None,
             better: Better::default(),
             crossing: None,
+            outcomes: Vec::new(),
             posterior: None,
         }
     }
 }
 
 impl Rules {
-    /// The rules of a protocol. `realistic_from` and the equivalence margin apply
-    /// to the primary question only.
+    /// The rules of a protocol. `realistic_from`, the equivalence margin and the measured outcomes
+    /// belong to the primary question only.
     pub fn of(protocol: &Protocol, question: &str, include: Include) -> Self {
         use study_plan::protocol::Scale;
         let primary = protocol.analysis.primary.as_str() == question;
@@ -150,6 +158,11 @@ impl Rules {
             .questions
             .iter()
             .find(|q| q.id.as_str() == question);
+        let outcome = (protocol.outcomes.iter()).find(|outcome| outcome.id.as_str() == question);
+        let construct = outcome.map(|outcome| match outcome.transform {
+            Transform::Identity => outcome.measure.noun().into_owned(),
+            Transform::Log => format!("logarithm of the {}", outcome.measure.noun()),
+        });
         Self {
             planned: Some(protocol.design.participants),
             realistic_from: protocol.analysis.realistic_from.filter(|_| primary),
@@ -167,9 +180,16 @@ impl Rules {
             equivalence_r: protocol.analysis.equivalence_r.filter(|_| primary),
             deviations: Vec::new(),
             alpha: protocol.analysis.alpha(),
-            construct: protocol.analysis.construct.clone().filter(|_| primary),
-            better: Better::default(),
+            construct: construct.or(protocol.analysis.construct.clone().filter(|_| primary)),
+            better: match outcome.and_then(|outcome| outcome.better) {
+                Some(BetterEnd::Lower) => Better::Lower,
+                Some(BetterEnd::Higher) | None => Better::Higher,
+            },
             crossing: protocol.crossing(),
+            outcomes: match primary {
+                true => protocol.outcomes.clone(),
+                false => Vec::new(),
+            },
             posterior: None,
         }
     }
@@ -277,6 +297,8 @@ pub struct Analysis {
     pub findings: Vec<Finding>,
     /// The comparisons of pairs of realizations on which the findings rest.
     pub pairs: Vec<Pair>,
+    /// What is said of the measured outcomes, in the order of the protocol.
+    pub outcomes: Vec<OutcomeAnswer>,
     /// The parts of the study that are not ratings; [`psychophysics::parts`] analyzes them.
     pub parts: Vec<psychophysics::PartAnalysis>,
 }
@@ -346,6 +368,8 @@ pub fn analyze_with_progress(ratings: &Ratings, rules: &Rules, progress: &Progre
         results.before_exclusion = Some(Box::new(all.before_exclusion()));
     }
     results.posterior = (rules.posterior).map(|effort| posterior::posterior(&cells, rules, effort));
+    let (measured, outcomes) = outcomes::outcomes(&used, rules);
+    results.outcomes = measured;
     let design = Design::of(&cells);
     let (findings, pairs) = findings::findings(&cells, design, rules, &results.evidence);
     results.finding = findings::numbers(&findings);
@@ -384,6 +408,7 @@ pub fn analyze_with_progress(ratings: &Ratings, rules: &Rules, progress: &Progre
         design,
         findings,
         pairs,
+        outcomes,
         parts: Vec::new(),
         values: results.values(),
         results,
@@ -474,6 +499,7 @@ fn statistics(cells: &Cells<'_>, rules: &Rules, progress: &Progress) -> Results 
         ends,
         residuals,
         finding: BTreeMap::new(),
+        outcomes: BTreeMap::new(),
         posterior: None,
         before_exclusion: None,
     }

@@ -17,6 +17,7 @@
 
 mod error;
 mod factors;
+mod motion;
 mod pool;
 mod preregistered;
 mod source;
@@ -38,7 +39,7 @@ use crate::load::{self, Loaded};
 use std::io::BufRead;
 use std::path::Path;
 use study_base::text::{ParticipantId, QuestionId};
-use study_plan::protocol::{Factor, Protocol, Task};
+use study_plan::protocol::{Factor, Protocol, Task, Transform};
 use study_session::outcome::RatingRow;
 use study_session::outcome::ratings::Ratings;
 use study_session::store::{Derived, SessionData, StudyFolder, one_study};
@@ -277,18 +278,44 @@ impl Study {
                  approximate, and the ordinal model is a logistic one"
             ),
         });
-        analysis.warnings.splice(0..0, shares);
+        let outcome = protocol.outcomes.iter().find(|o| o.id == *question);
+        let measured = outcome.map(|outcome| Warning {
+            code: "outcome",
+            text: format!(
+                "this analysis is of a measured outcome, {}, in place of the rating{}: what it shows was not planned for",
+                outcome.in_words(),
+                match outcome.transform {
+                    Transform::Log => "; numbers are its natural logarithms",
+                    Transform::Identity => "",
+                }
+            ),
+        });
+        analysis
+            .warnings
+            .splice(0..0, shares.into_iter().chain(measured));
         Ok(analysis)
     }
 
     /// The answers to a question, with what the protocol and the model files say of the
     /// realizations.
     fn ratings(&self, question: &QuestionId) -> Ratings {
-        let share_of = self.loaded.protocol.analysis.share_of(question);
+        let protocol = &self.loaded.protocol;
+        // An outcome is measured in the trials whose rating counts.
+        let outcome = protocol.outcomes.iter().find(|o| o.id == *question);
+        let question = outcome.map_or(question, |_| &protocol.analysis.primary);
+        let share_of = protocol.analysis.share_of(question);
         let derived = &self.derived;
         let mut ratings = Ratings::from_rows(&derived.rows, question, share_of);
         ratings.set_states(&derived.participants);
         ratings.set_failed(&derived.rows, &derived.attempts);
+        let outcomes = match outcome {
+            None => protocol.outcomes.as_slice(),
+            Some(outcome) => std::slice::from_ref(outcome),
+        };
+        ratings.set_measured(&derived.rows, outcomes, &motion::measured(self, outcomes));
+        if let (Some(outcome), Some(own)) = (outcome, ratings.measured.first()) {
+            ratings = ratings.of_measured(own, |x| outcome.transform.apply(x));
+        }
         describe_realizations(&mut ratings, &self.loaded);
         ratings
     }
@@ -441,7 +468,7 @@ pub fn describe_realizations(ratings: &mut Ratings, loaded: &Loaded) {
     }
 }
 
-/// The given question or the primary one, which must have numeric answers.
+/// The given question, or measured outcome, or the primary question, which must have numeric answers.
 fn question(protocol: &Protocol, asked: Option<&str>) -> Result<QuestionId, StudyError> {
     let id = match asked {
         None => protocol.analysis.primary.clone(),
@@ -450,6 +477,7 @@ fn question(protocol: &Protocol, asked: Option<&str>) -> Result<QuestionId, Stud
     let numeric: Vec<&str> = (protocol.questions.iter())
         .filter(|q| q.kind.scale().is_number() || protocol.analysis.share_of(&q.id).is_some())
         .map(|q| q.id.as_str())
+        .chain(protocol.outcomes.iter().map(|o| o.id.as_str()))
         .collect();
     if numeric.contains(&id.as_str()) {
         return Ok(id);

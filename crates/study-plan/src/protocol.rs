@@ -23,6 +23,7 @@ pub mod groups;
 pub mod identification;
 pub mod keys;
 pub mod kinds;
+pub mod outcomes;
 pub mod pairs;
 pub mod parts;
 pub mod phrases;
@@ -45,6 +46,7 @@ pub use factors::{Crossing, Factor};
 pub use groups::{Assign, Assigned, GroupRules, Groups, SessionPlan};
 pub use identification::{Criterion, Feedback, Identification, Label};
 pub use kinds::QuestionKind;
+pub use outcomes::{Answers, BetterEnd, Clock, Measure, OutcomeRules, Telemetry, Transform};
 pub use pairs::{IntervalOrder, Pairs};
 pub use parts::{
     Compared, Exposure, FamilyRules, FitRules, Interval, Method, Mushra, Part, Presentations, Task,
@@ -107,6 +109,9 @@ pub struct Protocol {
     /// `[[questionnaires]]`
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub questionnaires: Vec<Questionnaire>,
+    /// `[[outcomes]]`
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub outcomes: Vec<OutcomeRules>,
     /// `[analysis]`
     pub analysis: AnalysisRules,
     /// `[[parts]]`; without any, the study is one rating part.

@@ -3,6 +3,7 @@
 
 mod conditional;
 mod factors;
+mod outcomes;
 mod pairs;
 mod posterior;
 mod sites;
@@ -67,6 +68,7 @@ pub(super) fn answers(a: &Analysis) -> Vec<Answer> {
     answers.extend(all.into_iter().flatten());
     answers.extend(target::repeats(a));
     answers.extend(sites::sites(a));
+    answers.extend(outcomes::outcomes(a));
     answers
 }
 

@@ -56,6 +56,12 @@ pub fn tables(source: &Source, analysis: &Analysis) -> Vec<TableFile> {
             ),
         ]);
     }
+    if !analysis.outcomes.is_empty() {
+        all.extend([
+            table("outcomes.csv", of(tables::outcomes::means(analysis))),
+            table("outcome_tests.csv", of(tables::outcomes::tests(analysis))),
+        ]);
+    }
     if !analysis.parts.is_empty() {
         all.extend(part_tables(&analysis.parts));
     }

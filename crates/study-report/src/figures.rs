@@ -9,6 +9,7 @@ mod counts;
 mod factors;
 mod identification;
 mod means;
+mod outcomes;
 mod pairs;
 mod parts;
 mod rendering;
@@ -33,7 +34,7 @@ use study_stats::describe::mean;
 pub const MAX_DRAWN: usize = 60;
 
 /// File names of all figures, without extension.
-pub const NAMES: [&str; 12] = [
+pub const NAMES: [&str; 13] = [
     "factors",
     "fig10-means",
     // Of earlier versions: now below fig10-means.
@@ -45,6 +46,7 @@ pub const NAMES: [&str; 12] = [
     "histograms",
     "subject-lines",
     "order",
+    "outcomes",
     "rendering",
     "telemetry",
 ];
@@ -124,6 +126,7 @@ pub fn all(a: &Analysis, traces: &[Trace]) -> Vec<Drawn> {
         counts::histograms(&scene).or_else(|| strips::strips(&scene)),
         subjects::lines(&scene),
         subjects::order(&scene),
+        outcomes::outcomes(&scene),
         rendering::rendering(&scene),
         traces::traces(&scene, traces),
     ]

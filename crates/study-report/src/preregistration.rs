@@ -298,6 +298,13 @@ fn design(c: &Content<'_>) -> Vec<String> {
             effects.join(", ")
         ));
     }
+    if !p.outcomes.is_empty() {
+        let outcomes: Vec<String> = p.outcomes.iter().map(|o| text(&o.in_words())).collect();
+        lines.push(format!(
+            "Measured besides, and tested as one family (Holm's correction); no answer rests on them: {}.",
+            outcomes.join(", ")
+        ));
+    }
     for m in p.models.iter().filter(|m| !tested(m)) {
         lines.push(match &m.duplicate_of {
             Some(of) => format!("`{}`: hidden duplicate of `{of}`.", m.id),

@@ -2,6 +2,7 @@
 
 mod exclusions;
 pub(crate) mod factors;
+pub(crate) mod outcomes;
 mod pairs;
 pub(crate) mod parts;
 mod posterior;

@@ -10,6 +10,7 @@ pub mod cell;
 pub mod event;
 pub mod fidelity;
 pub mod fold;
+pub mod motion;
 pub mod ratings;
 pub mod rows;
 

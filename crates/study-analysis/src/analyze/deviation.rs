@@ -3,7 +3,7 @@
 use super::warning::Warning;
 use std::fmt::Display;
 use study_base::text::PartId;
-use study_plan::protocol::{AnalysisRules, Exclusion, Protocol};
+use study_plan::protocol::{AnalysisRules, Exclusion, OutcomeRules, Protocol};
 
 /// A rule that a report calls preregistered unless it was changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -138,6 +138,11 @@ pub fn deviations(before: &Protocol, after: &Protocol) -> Vec<Deviation> {
         )
     };
     compare("factors", &[], factors(before), factors(after));
+    let outcomes = |protocol: &Protocol| {
+        let all = protocol.outcomes.iter();
+        joined(all.map(OutcomeRules::in_words).collect())
+    };
+    compare("outcomes", &[], outcomes(before), outcomes(after));
     for new in &after.models {
         let Some(old) = before.model(&new.id) else {
             continue;

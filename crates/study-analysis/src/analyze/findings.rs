@@ -19,7 +19,7 @@ use super::cells::Cells;
 use super::design::Design;
 use super::question::FindingNumbers;
 use super::record::{Interval, Stat, Why};
-use super::results::Evidence;
+use super::results::{AdjustedCells, Differences, Evidence, FactorialTests};
 use super::verdicts;
 use super::warning::Warning;
 use std::collections::BTreeMap;
@@ -342,6 +342,35 @@ struct Facts<'a> {
     ranked: Vec<(f64, &'a str)>,
 }
 
+/// What realizations and factors are compared by.
+pub(super) struct Compared<'a> {
+    pub(super) design: Design,
+    pub(super) rules: &'a Rules,
+    pub(super) differences: &'a Differences,
+    pub(super) cells: &'a AdjustedCells,
+    pub(super) factorial: Option<&'a FactorialTests>,
+}
+
+impl Facts<'_> {
+    fn compared(&self) -> Compared<'_> {
+        Compared {
+            design: self.design,
+            rules: self.rules,
+            differences: &self.evidence.differences,
+            cells: &self.evidence.cells,
+            factorial: self.evidence.factorial.as_ref(),
+        }
+    }
+}
+
+/// Whether the factors matter or, in a study without, whether the realizations differ.
+pub(super) fn compared(facts: &Compared<'_>) -> Vec<Finding> {
+    match facts.factorial {
+        Some(_) => factors::factors(facts),
+        None => differ::differ(facts).into_iter().collect(),
+    }
+}
+
 /// All findings, in the order of a report, and the comparisons of pairs.
 pub(super) fn findings(
     cells: &Cells<'_>,
@@ -364,7 +393,7 @@ pub(super) fn findings(
             rules.better,
         ),
     };
-    let mut found = factors::factors(&facts);
+    let mut found = factors::factors(&facts.compared());
     found.extend(others::against_references(&facts));
     let about_vaf = AboutVaf {
         adjusted: &evidence.corr_adjusted,
@@ -375,7 +404,7 @@ pub(super) fn findings(
     found.extend(vaf::delivered(&facts));
     found.extend(others::memory(&facts));
     found.extend(pairs::best(&facts));
-    found.extend(differ::differ(&facts));
+    found.extend(differ::differ(&facts.compared()));
     found.extend(pairs::which(&facts));
     found.extend(others::disagreement(&facts));
     found.extend(others::order(&facts));

@@ -71,6 +71,8 @@ names! {
     ItemName = "NAME",
     /// A label by which something is identified.
     LabelName = "LABEL",
+    /// The name of a measured outcome.
+    OutcomeName = "OUTCOME",
     /// The name of an effect: its factors, joined by `:`.
     EffectName = "EFFECT",
 }

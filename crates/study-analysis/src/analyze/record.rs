@@ -19,7 +19,7 @@
 //! 4. Findings and reports read `results.order.trial.slope.number()` instead of a string.
 
 pub use super::keys::{
-    ContrastName, CovariateName, DuplicateName, EffectName, Key, LevelsName, PairName,
+    ContrastName, CovariateName, DuplicateName, EffectName, Key, LevelsName, OutcomeName, PairName,
     ParticipantName, RealizationName, ReferenceName, SiteName,
 };
 use super::values::{Value, Values};

@@ -20,6 +20,7 @@ pub use super::headline::{
     VarianceShares,
 };
 pub use super::influence::Influence;
+pub use super::measured::{MeasuredOutcome, OutcomeMean, OutcomePair, OutcomeTest, OutcomeVaf};
 pub use super::memory::{Covariates, Line, LogMemory, Quadratic};
 pub use super::missing::{AllMoved, MissingOf, MissingRatings, Moved};
 pub use super::mixed::{
@@ -40,8 +41,8 @@ use super::question::Question;
 use super::record::statistics;
 pub use super::record::{
     ContrastName, CovariateName, Declared, DuplicateName, EffectName, Field, Interval, Key,
-    LevelsName, List, Number, PairName, ParticipantName, RealizationName, ReferenceName, SiteName,
-    Stat, Why,
+    LevelsName, List, Number, OutcomeName, PairName, ParticipantName, RealizationName,
+    ReferenceName, SiteName, Stat, Why,
 };
 pub use super::reference::{DuplicateTest, ReferenceEquivalence, ReferenceTest, References};
 pub use super::rendering::{DeliveredVaf, Gain, Judged, Playbacks, RenderedVaf, Rendering};
@@ -159,6 +160,8 @@ statistics! {
         ends: BTreeMap<RealizationName, Ends>,
         /// what participants and realizations leave unexplained
         residuals: Residuals,
+        /// measured outcomes
+        outcomes: BTreeMap<OutcomeName, MeasuredOutcome>,
         /// a second opinion, if it is asked for
         posterior: Option<PosteriorModel> as "ordinal_posterior",
         /// the answers to the questions of the report

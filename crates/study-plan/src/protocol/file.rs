@@ -21,6 +21,7 @@ mod groups;
 mod looked;
 mod models;
 mod orders;
+mod outcomes;
 mod parts;
 mod power;
 mod questionnaires;
@@ -98,6 +99,9 @@ pub const ROOT: &[Key] = keys! {
     /// Standard questionnaires, asked of the participant after `[[outro]]`, with their scores in
     /// the analysis.
     "questionnaires": Kind::Variants(&questionnaires::QUESTIONNAIRES), "";
+    /// What is measured in each trial beside the questions, such as times: described, and compared between the
+    /// realizations. Needs the format `study-protocol/3`.
+    "outcomes": Kind::Variants(&outcomes::OUTCOMES), "";
     /// Decisions that were made before the data.
     "analysis": Kind::Table(analysis::ANALYSIS), "", required;
     /// What is assumed before the data, for `study power`. It changes no session and no
@@ -122,10 +126,11 @@ const FORMATS: &[Word] = &[
 const OF_FORMAT_2: [&str; 5] = ["parts", "families", "tracks", "groups", "sessions"];
 
 /// Keys that need [`FORMAT_3`], without the places in lists.
-pub const OF_FORMAT_3: [&str; 10] = [
+pub const OF_FORMAT_3: [&str; 11] = [
     "confirms",
     "design.order_version",
     "factors",
+    "outcomes",
     "spaces",
     "models.levels",
     "parts.answers",
@@ -346,6 +351,7 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
     let mut outro = questions::read(&mut root, "outro");
     let questionnaires = questionnaires::read(&mut root);
     outro.extend(questionnaires.iter().flat_map(|q| q.questions()));
+    let outcomes = outcomes::read(&mut root);
     let analysis = root.section("analysis").and_then(analysis::read);
     let power = root.section("power").and_then(power::read);
 
@@ -369,6 +375,7 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
     if !broken {
         sections.agree(document);
         questionnaires::agree(&questionnaires, &raw.parts, document);
+        outcomes::agree(&outcomes, &sections, document);
     }
     let resolved = raw.resolve(&sections, document, broken);
     if let (Some(sessions), Some(parts), Some(families), false) =
@@ -410,6 +417,9 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
             .collect::<Option<_>>()?,
         design: design?,
         device: device?,
+        outcomes: (outcomes.into_iter())
+            .map(outcomes::PartialOutcome::finish)
+            .collect::<Option<_>>()?,
         analysis: analysis?,
         parts: resolved.parts?,
         families: resolved.families?,

@@ -18,7 +18,7 @@
 //! * wording: title, authors and the like; all texts, prompts and labels; consent;
 //!   questions asked once (setup, intake, outro); who types, and when a session
 //!   can be resumed.
-//! * analysis: `[analysis]`, planned participants, VAF and covariates, `[device.rendering]`.
+//! * analysis: `[analysis]`, `[[outcomes]]`, planned participants, VAF and covariates, `[device.rendering]`.
 
 use super::keys::word;
 use super::{
@@ -96,6 +96,7 @@ pub fn parts(
         intake,
         outro,
         questionnaires,
+        outcomes,
         analysis,
         parts,
         families,
@@ -251,6 +252,9 @@ pub fn parts(
     }
     if !questionnaires.is_empty() {
         analysis["questionnaires"] = json!(questionnaires);
+    }
+    if !outcomes.is_empty() {
+        analysis["outcomes"] = json!(outcomes);
     }
     Parts {
         stimulus,

@@ -290,6 +290,22 @@ fn factors(a: &Analysis) -> Option<String> {
     ))
 }
 
+/// What was measured besides the ratings, and how it was tested.
+fn outcomes(a: &Analysis) -> Option<String> {
+    let named: Vec<String> = a.outcomes.iter().map(|o| o.rules.in_words()).collect();
+    let by = match a.crossing {
+        Some(_) => "by the factors in the same way",
+        None => "between the realizations in the same way",
+    };
+    (!named.is_empty()).then(|| {
+        format!(
+            "Measured besides: {}. They were compared {by}, in the trials whose rating was analyzed, with Holm's \
+             correction over the tests of all of them.",
+            apa::listing(&named)
+        )
+    })
+}
+
 /// The errors of comparisons within participants.
 fn clustered(a: &Analysis) -> &'static str {
     match a.results.evidence.cells.clustered {
@@ -379,6 +395,7 @@ fn tests(a: &Analysis) -> Vec<String> {
         ));
     }
     text.extend(factors(a));
+    text.extend(outcomes(a));
     text.extend(differences(a));
     let wilcoxon = (a.results.posthoc.values()).any(|p| defined(&p.p_wilcoxon_exact));
     let test = finding(&Question::Pairs).and_then(|f| f.test.as_ref());

@@ -65,6 +65,8 @@ pub(super) fn section(a: &Analysis) -> Markup {
         tables::realizations(a, ""),
         tables::missing(a),
         tables::pairs(a),
+        tables::outcomes::means(a),
+        tables::outcomes::tests(a),
     ];
     all.extend(tables::against_references(a));
     all.extend([

@@ -9,11 +9,13 @@ mod build;
 mod columns;
 mod error;
 mod line;
+mod measured;
 mod pooled;
 mod read;
 
 pub use columns::{Ratings, Row};
 pub use error::RatingsError;
+pub use measured::{Measured, Motions};
 
 use super::event::{Failure, State};
 use super::fidelity::{Fidelity, Verdict};

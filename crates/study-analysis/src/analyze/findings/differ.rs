@@ -1,6 +1,6 @@
 //! Do the realizations differ?
 
-use super::{Estimate, Facts, Finding, Question, Test, TestKind};
+use super::{Compared, Estimate, Finding, Question, Test, TestKind};
 use crate::analyze::effects::MAX_COLUMNS;
 use crate::analyze::results::{Differences, Number as _};
 use study_base::apa;
@@ -8,7 +8,7 @@ use study_base::text::counted;
 use study_stats::level::rejects;
 
 /// The tests that can decide, chosen by the design.
-fn chosen(facts: &Facts<'_>) -> TestKind {
+fn chosen(facts: &Compared<'_>) -> TestKind {
     let d = facts.design;
     match (d.complete, d.realizations) {
         _ if !d.uses_complete() => TestKind::WithinParticipants,
@@ -20,7 +20,7 @@ fn chosen(facts: &Facts<'_>) -> TestKind {
     }
 }
 
-pub(super) fn differ(facts: &Facts<'_>) -> Option<Finding> {
+pub(super) fn differ(facts: &Compared<'_>) -> Option<Finding> {
     let d = facts.design;
     if d.realizations == 0 {
         return None;
@@ -40,8 +40,8 @@ pub(super) fn differ(facts: &Facts<'_>) -> Option<Finding> {
     });
     let Differences {
         friedman, rmanova, ..
-    } = &facts.evidence.differences;
-    let cells = &facts.evidence.cells;
+    } = facts.differences;
+    let cells = facts.cells;
     let Some(test) = found else {
         let p = match kind {
             TestKind::WithinParticipants => {
@@ -129,10 +129,10 @@ fn smallest_friedman(participants: usize, k: usize) -> Option<f64> {
     (participants == 2).then(|| 1.0 / (2..=k).map(|i| i as f64).product::<f64>())
 }
 
-fn test(facts: &Facts<'_>, kind: TestKind) -> Option<Test> {
+fn test(facts: &Compared<'_>, kind: TestKind) -> Option<Test> {
     let Differences {
         friedman, rmanova, ..
-    } = &facts.evidence.differences;
+    } = facts.differences;
     let alpha = facts.rules.alpha;
     let of_anova = |p: Option<f64>, epsilon: f64| {
         let f = rmanova.f.number()?;
@@ -153,7 +153,7 @@ fn test(facts: &Facts<'_>, kind: TestKind) -> Option<Test> {
             rmanova.eps_hf_unclipped.number()?.min(1.0),
         ),
         TestKind::WithinParticipants => {
-            let cells = &facts.evidence.cells;
+            let cells = facts.cells;
             let equal = &cells.within;
             let (f, df, p, epsilon) = match &cells.clustered {
                 Some(own) => {

@@ -1,6 +1,6 @@
 //! Do the factors of a factorial design matter, and does the effect of one depend on another?
 
-use super::{Direction, Estimate, Facts, Finding, Question, Test, TestKind};
+use super::{Compared, Direction, Estimate, Finding, Question, Test, TestKind};
 use crate::analyze::results::{ContrastName, FactorialEffect, LevelsName, Number as _};
 use study_base::apa;
 use study_base::text::counted;
@@ -8,8 +8,8 @@ use study_plan::protocol::factors::GROUP;
 use study_stats::level::rejects;
 
 /// A finding for each effect that is tested; nothing in a study without factors.
-pub(super) fn factors(facts: &Facts<'_>) -> Vec<Finding> {
-    let (Some(crossing), Some(tests)) = (&facts.rules.crossing, &facts.evidence.factorial) else {
+pub(super) fn factors(facts: &Compared<'_>) -> Vec<Finding> {
+    let (Some(crossing), Some(tests)) = (&facts.rules.crossing, facts.factorial) else {
         return Vec::new();
     };
     let shown = |effect: &[usize]| {
@@ -60,7 +60,7 @@ pub(super) fn factors(facts: &Facts<'_>) -> Vec<Finding> {
     found
 }
 
-fn decided(facts: &Facts<'_>, question: Question, numbers: &FactorialEffect) -> Finding {
+fn decided(facts: &Compared<'_>, question: Question, numbers: &FactorialEffect) -> Finding {
     let design = facts.design;
     let Some(p) = numbers.p_holm.number() else {
         let why = numbers.p_holm.reason().unwrap_or("there is no test");
@@ -121,8 +121,8 @@ fn decided(facts: &Facts<'_>, question: Question, numbers: &FactorialEffect) -> 
 }
 
 /// Of a factor with two levels the difference, second minus first, and its direction.
-fn estimate(facts: &Facts<'_>, factor: usize, finding: &mut Finding) {
-    let (Some(crossing), Some(tests)) = (&facts.rules.crossing, &facts.evidence.factorial) else {
+fn estimate(facts: &Compared<'_>, factor: usize, finding: &mut Finding) {
+    let (Some(crossing), Some(tests)) = (&facts.rules.crossing, facts.factorial) else {
         return;
     };
     let [first, second] = crossing.levels(factor) else {
@@ -150,8 +150,8 @@ fn estimate(facts: &Facts<'_>, factor: usize, finding: &mut Finding) {
 const UNEQUAL: f64 = 1.5;
 
 /// Says so if groups are of unlike size: then the test needs ratings that vary alike in all.
-fn unequal_groups(facts: &Facts<'_>, finding: &mut Finding) {
-    let (Some(crossing), Some(tests)) = (&facts.rules.crossing, &facts.evidence.factorial) else {
+fn unequal_groups(facts: &Compared<'_>, finding: &mut Finding) {
+    let (Some(crossing), Some(tests)) = (&facts.rules.crossing, facts.factorial) else {
         return;
     };
     // Of any mean of a group, whichever effects are tested.
@@ -176,7 +176,7 @@ fn unequal_groups(facts: &Facts<'_>, finding: &mut Finding) {
 
 /// Says so if the ranks do not show what the ratings do. That they show more says little: with single
 /// ratings they reject too often (docs/calibration.md).
-fn ranks(facts: &Facts<'_>, numbers: &FactorialEffect, finding: &mut Finding) {
+fn ranks(facts: &Compared<'_>, numbers: &FactorialEffect, finding: &mut Finding) {
     let alpha = facts.rules.alpha;
     let (Some(p), Some(of_ranks)) = (numbers.p_gg.number(), numbers.art_p.number()) else {
         return;

@@ -569,6 +569,7 @@ mod factors;
 mod fits;
 mod identification;
 mod keys;
+mod outcomes;
 mod parts;
 mod questionnaires;
 mod relative;

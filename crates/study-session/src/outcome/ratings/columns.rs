@@ -2,6 +2,7 @@
 
 use super::error::RatingsError;
 use super::line::{Field, Line};
+use super::measured::Measured;
 use super::{Comment, Felt, Origin, Practice, Realization, Subject};
 use crate::outcome::rows::{RatingRow, Status};
 use std::sync::Arc;
@@ -32,6 +33,8 @@ macro_rules! columns {
             pub comments: Vec<Comment>,
             /// Practice rows, which are not in the columns.
             pub practice: Arc<Practice>,
+            /// What was measured beside the ratings, in the order of the protocol.
+            pub measured: Vec<Measured>,
             /// Names of the sites that the subjects are from; empty if there is only one.
             /// Untrusted.
             pub sites: Vec<String>,
@@ -86,6 +89,7 @@ macro_rules! columns {
                 Self {
                     $($set: rows.iter().map(|&i| self.$set[i]).collect(),)+
                     $($column: rows.iter().map(|&i| self.$column[i]).collect(),)+
+                    measured: self.measured.iter().map(|m| m.pick(rows)).collect(),
                     felt: match self.felt.is_empty() {
                         true => Vec::new(),
                         false => rows.iter().map(|&i| self.felt(i).copied()).collect(),
@@ -96,6 +100,7 @@ macro_rules! columns {
 
             /// Adds the columns of others, and nothing else.
             pub(super) fn extend(&mut self, other: &Self) {
+                Measured::extend(self, other);
                 if !other.felt.is_empty() {
                     self.felt.resize(self.len(), None);
                     self.felt.extend_from_slice(&other.felt);

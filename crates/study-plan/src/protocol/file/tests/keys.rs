@@ -112,10 +112,11 @@ fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
     let mut whole = least();
     // Keys of parts exclude each other; `parts` tests them. Factors need levels of all
-    // realizations, spaces a part.
+    // realizations, spaces a part. The unit of an outcome follows from what is measured, and
+    // its questions have to be there; `outcomes` tests them.
     let elsewhere = |key: &&Key| {
         crate::protocol::file::OF_FORMAT_2.contains(&key.name)
-            || ["factors", "spaces"].contains(&key.name)
+            || ["factors", "spaces", "outcomes"].contains(&key.name)
     };
     let root = || ROOT.iter().filter(|key| !elsewhere(key));
     for key in root() {

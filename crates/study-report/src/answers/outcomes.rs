@@ -1,0 +1,166 @@
+//! What was measured in the trials besides the rating.
+
+use super::Answer;
+use crate::{apa, sentences};
+use study_analysis::analyze::findings::Estimate;
+use study_analysis::analyze::results::{
+    MeasuredOutcome, Number as _, OutcomeMean, OutcomeName, OutcomePair,
+};
+use study_analysis::analyze::{Analysis, Finding, OutcomeAnswer, Question, Verdict};
+use study_base::text::sentence;
+use study_plan::protocol::{BetterEnd, Transform};
+
+/// An answer for each outcome that was measured.
+pub(super) fn outcomes(a: &Analysis) -> Vec<Answer> {
+    let one = |outcome: &OutcomeAnswer| {
+        let record = (a.results.outcomes).get(outcome.rules.id.as_str())?;
+        Some(answer(a, outcome, record))
+    };
+    a.outcomes.iter().filter_map(one).collect()
+}
+
+fn answer(a: &Analysis, outcome: &OutcomeAnswer, record: &MeasuredOutcome) -> Answer {
+    let rules = &outcome.rules;
+    let noun = rules.measure.noun();
+    let by = match a.crossing {
+        Some(_) => "depend on the factors",
+        None => "differ between the realizations",
+    };
+    let question = format!("Measured: does {} ({noun}) {by}?", rules.id);
+    let mut told = outcome.findings.iter().map(|f| found(outcome, f));
+    let mut answer = Answer::new(&question, told.next().unwrap_or_default());
+    answer.main.extend(told);
+    answer.main.extend(ends(outcome, record));
+    answer.main.extend(with_vaf(record));
+    answer.main.extend(trade_offs(a, outcome, record));
+    (answer.main).extend(outcome.caveats.iter().map(sentences::caveat));
+    answer.more.push(
+        "Measured outcomes decide no question of the study; p is corrected over the tests of all of them (Holm)."
+            .to_owned(),
+    );
+    answer
+}
+
+/// The verdict of a test, with its result.
+fn found(outcome: &OutcomeAnswer, f: &Finding) -> String {
+    let noun = outcome.rules.measure.noun();
+    let effect = f.names.join(" × ");
+    let claim = match (&f.question, f.names.len()) {
+        (Question::Effect(_), 1) => format!("{effect} has an effect on the {noun}"),
+        (Question::Effect(_), _) => format!("{effect} is an interaction in the {noun}"),
+        _ => format!("the {noun} differs between the realizations"),
+    };
+    let result = sentences::result(f).map_or_else(String::new, |r| format!(": {r}"));
+    let test = f.test.as_ref().map_or_else(String::new, |t| {
+        let name = sentences::test_name(t.kind);
+        match t.comparisons {
+            0 | 1 => format!(" ({name})"),
+            n => format!(" ({name}, Holm's correction over {n} tests)"),
+        }
+    });
+    let difference = (f.estimate.as_ref())
+        .filter(|_| f.reason().is_none())
+        .map_or_else(String::new, |e| second_level(outcome, e));
+    match &f.verdict {
+        Verdict::Yes => sentence(&format!("shown: {claim}{result}{test}{difference}")),
+        Verdict::NotShown => sentence(&format!(
+            "not shown: that {claim}{result}{test}{difference}"
+        )),
+        Verdict::Undefined(why) => {
+            sentence(&format!("whether {claim} cannot be determined: {why}"))
+        }
+    }
+}
+
+/// The second level of a factor less the first one or, of logarithms, over it.
+fn second_level(outcome: &OutcomeAnswer, e: &Estimate) -> String {
+    let rules = &outcome.rules;
+    let back = |x: f64| rules.transform.back(x);
+    let (what, unit) = match rules.transform {
+        Transform::Log => ("over", "times".to_owned()),
+        Transform::Identity => ("less", rules.measure.unit().to_owned()),
+    };
+    let own = Estimate {
+        value: back(e.value),
+        ci95: e.ci95.map(|(lo, hi)| (back(lo), back(hi))),
+        ..*e
+    };
+    format!(
+        "; the second level {what} the first: {} {unit}",
+        sentences::estimate(&own, apa::two)
+    )
+}
+
+/// The realizations at both ends, with what is compared.
+fn ends(outcome: &OutcomeAnswer, record: &MeasuredOutcome) -> Option<String> {
+    let rules = &outcome.rules;
+    let [first, .., last] = outcome.order.as_slice() else {
+        return None;
+    };
+    let of = |name: &str| {
+        let mean: &OutcomeMean = record.means.get(name)?;
+        let ci = sentences::ci(mean.center_ci95.as_ref(), apa::plain);
+        let center = apa::plain(mean.center.number()?);
+        Some(format!(
+            "{} {center} {}{ci}",
+            apa::name(name),
+            rules.measure.unit()
+        ))
+    };
+    let words = match rules.better {
+        Some(BetterEnd::Higher) => ["best (highest)", "worst (lowest)"],
+        Some(BetterEnd::Lower) => ["best (lowest)", "worst (highest)"],
+        None => ["lowest", "highest"],
+    };
+    let means = match rules.transform {
+        Transform::Log => "Geometric means",
+        Transform::Identity => "Means",
+    };
+    Some(format!(
+        "{means} over participants: {} {}; {} {}.",
+        words[0],
+        of(first)?,
+        words[1],
+        of(last)?
+    ))
+}
+
+/// The relation with VAF over the realizations, described.
+fn with_vaf(record: &MeasuredOutcome) -> Option<String> {
+    let vaf = record.vaf.as_ref()?;
+    Some(format!(
+        "Over {} realizations its means correlate with VAF by r = {}, ρ = {} (described, not tested).",
+        apa::whole(vaf.n.number()?),
+        apa::r(vaf.r.number()?),
+        apa::r(vaf.rho.number()?)
+    ))
+}
+
+/// How a time goes with what else was measured.
+fn trade_offs(a: &Analysis, outcome: &OutcomeAnswer, record: &MeasuredOutcome) -> Vec<String> {
+    let one = |(name, pair): (&OutcomeName, &OutcomePair)| {
+        let other = a
+            .outcomes
+            .iter()
+            .find(|o| o.rules.id.as_str() == name.as_str())?;
+        let r = pair.r.number()?;
+        let is_lower = |o: &OutcomeAnswer| o.rules.better == Some(BetterEnd::Lower);
+        let same_end = is_lower(outcome) == is_lower(other);
+        let goes = match (r > 0.0) == same_end {
+            true => "what is better in one tends to be better in the other",
+            false => {
+                "what is better in one tends to be worse in the other, as where speed is traded for accuracy"
+            }
+        };
+        Some(format!(
+            "Speed and accuracy: within participants {} and {} correlate over the realizations by r({}) = {}{}: {goes} \
+             (described, not tested).",
+            outcome.rules.id,
+            other.rules.id,
+            apa::whole(pair.df.number()?),
+            apa::r(r),
+            sentences::ci(&pair.ci95, apa::r)
+        ))
+    };
+    record.pairs.iter().filter_map(one).collect()
+}
