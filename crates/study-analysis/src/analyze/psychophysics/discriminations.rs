@@ -298,11 +298,12 @@ fn levels(
 /// since an adaptive track stays near the threshold.
 pub(crate) fn settings(protocol: &Protocol, track: &TrackRules) -> TrialSettings {
     let (spacing, core) = protocol.fit(track);
-    let family = track.family().and_then(|id| protocol.family(id));
     let places = |levels: &[f64]| -> Option<Vec<f64>> {
         levels.iter().map(|level| spacing.place(*level)).collect()
     };
-    let support = family.and_then(|f| Support::of(places(f.ladder.levels())?));
+    // As the track counts its levels.
+    let ladder = track.family().map(|_| protocol.ladder(track));
+    let support = ladder.and_then(|ladder| Support::of(places(ladder.levels())?));
     // Where a stimulus equals the standard, if all levels are above it.
     let origin = (track.counted_standard()).and_then(|level| spacing.place(level));
     let origin = origin.filter(|origin| support.is_some_and(|s| *origin <= s.low));
@@ -484,6 +485,10 @@ procedure = {{ rule = "staircase", up = 1, down = 3, start = 1.0, scale = "lin",
         assert!((support.low - 0.1f64.ln()).abs() < 1e-12);
         assert!((support.high - 2f64.ln()).abs() < 1e-12);
         assert_eq!(of("lin", 0.1, 0.0).lapse, 30.0);
+        // Counted from the standard 0.8, the levels 0.82 to 1.6 are fractions from 0.025 to 1.
+        let protocol = on_standards("relative = \"fraction\"");
+        let support = settings(&protocol, &protocol.tracks[2]).priors.support.unwrap();
+        assert!((support.low - 0.025f64.ln()).abs() < 1e-9 && support.high.abs() < 1e-9);
     }
 
     /// Tracks are compared, not tracks in a session.
