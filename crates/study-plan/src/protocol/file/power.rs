@@ -12,8 +12,8 @@ use study_base::text::Untrusted;
 const SHARE: Kind = Kind::Number((Bound::Included(0.0), Bound::Excluded(1.0)), "");
 
 pub(super) const POWER: &[Key] = keys! {
-    /// How many studies are simulated for each design; of pairs 2000 without it, of tracks 200.
-    "studies": Kind::Whole(10, 10_000_000), "40000", default("10000");
+    /// How many studies are simulated for each design.
+    "studies": Kind::Whole(10, 10_000_000), "40000", derived("10000; of pairs and of effects 2000, of tracks 200, of tracks of one condition 40");
     /// The power that is wanted.
     "targets": Kind::NumberList, "[0.8, 0.9]";
     /// The tests whose power is simulated: `verdict`, `pearson`, `permutation`, `crossed`,
