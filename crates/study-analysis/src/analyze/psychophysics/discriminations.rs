@@ -489,7 +489,10 @@ procedure = {{ rule = "staircase", up = 1, down = 3, start = 1.0, scale = "lin",
         assert_eq!(of("lin", 0.1, 0.0).lapse, 30.0);
         // Counted from the standard 0.8, the levels 0.82 to 1.6 are fractions from 0.025 to 1.
         let protocol = on_standards("relative = \"fraction\"");
-        let support = settings(&protocol, &protocol.tracks[2]).priors.support.unwrap();
+        let support = settings(&protocol, &protocol.tracks[2])
+            .priors
+            .support
+            .unwrap();
         assert!((support.low - 0.025f64.ln()).abs() < 1e-9 && support.high.abs() < 1e-9);
     }
 
