@@ -35,6 +35,10 @@ fn a_space_of_which_some_points_pass_is_used_and_drawn() {
         "{said}"
     );
     assert!(said.contains("need more than 12 N at rest"), "{said}");
+    // Friction by the sign of the speed that no damping confines is refused, as it is of a realization.
+    let (code, strong) = checked(AXES, "detent = [0.4, 1.2], friction = [0.0, 5.0]");
+    assert_eq!(code, 0, "{strong}");
+    assert!(strong.contains("9 can put energy into a hand"), "{strong}");
     assert!(
         said.contains("rows from detent 0.4 to 2.4, friction 0 to 1.6 within a row"),
         "{said}"
@@ -123,6 +127,10 @@ fn a_search_is_rehearsed_verified_and_explored() {
     let path = at.join("s/protocol.toml");
     let text = fs::read_to_string(&path).unwrap();
     let text = text.replace("grid = 9", "grid = 5");
+    let text = text.replace(
+        "Which one felt more like a real switch?",
+        "Which one felt more \\\"alive\\\"?",
+    );
     fs::write(&path, text.replace("trials = 40", "trials = 20")).unwrap();
     run(&["rehearse", "s", "--participants", "2", "--out", "r"]);
     let said = run(&["verify", "r"]);
@@ -183,6 +191,7 @@ fn confirmed(at: &Path, pairs: &str) {
     let hash = format!("pairs_sha256 = \"{}\"", study_base::hex::sha256(pairs));
     assert!(text.contains(&hash), "{hash}: {text}");
     for expected in [
+        "alive",
         "id = \"s-confirmation\"",
         "seed = 7",
         "study = \"s\"",

@@ -17,6 +17,22 @@ use study_report::explore;
 /// The study, after its comment and before the device and the search.
 const PROTOCOL: &str = include_str!("confirm.toml");
 
+/// What the template asks of pairs.
+const PROMPT: &str = "\"Which one felt more like a real switch?\"";
+
+/// What the search asked, as a text of TOML.
+fn prompt(study: &Study, search: &Exploration) -> String {
+    let protocol = &study.loaded.protocol;
+    let asked = protocol
+        .part(&search.part)
+        .and_then(|part| part.asks.first());
+    let question = asked.and_then(|id| protocol.questions.iter().find(|q| q.id == *id));
+    question.map_or_else(
+        || PROMPT.to_owned(),
+        |q| toml::Value::String(q.prompt.clone()).to_string(),
+    )
+}
+
 /// The files of a confirmation of the search in a results folder: its protocol, the table with which the search began and that
 /// which it found to be best.
 ///
@@ -70,6 +86,7 @@ pub(super) fn confirmation(
         seed
     };
     let text = with_values(PROTOCOL, &confirmed, seed)?;
+    let text = text.replacen(PROMPT, &prompt(&study, search), 1);
     let sections = format!(
         "{}\n{}",
         device(&study)?,

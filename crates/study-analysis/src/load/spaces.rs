@@ -7,6 +7,7 @@ use study_base::diagnostic::{Fault, Findings};
 use study_base::text::ModelId;
 use study_haptics::family::{self, Family, FamilyError};
 use study_haptics::model::Realization;
+use study_haptics::safe_play;
 use study_plan::protocol::check::Spans;
 use study_plan::protocol::fingerprint::family_file;
 use study_plan::protocol::{Axis, Protocol, SpaceRules, Vary};
@@ -18,7 +19,7 @@ const LEAST_SHARE: f64 = 0.25;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Point {
     Good,
-    /// It can put energy into a hand.
+    /// It can put energy into a hand: it fails its certificate, or would be refused as a realization of its own.
     Active,
     /// It needs more force than the device has.
     Strong,
@@ -95,7 +96,8 @@ fn built(from: &Realization, axes: &[Axis]) -> Result<Vec<Realization>, FamilyEr
 fn judged(table: &Realization, limit_n: f64) -> Point {
     let strongest = forces(table, table, 0.0).into_iter();
     let peak_n = strongest.fold(0.0, |most: f64, f| most.max(f.abs()));
-    if !table.certificate().passes() {
+    let is_unsafe = || safe_play::refusal(table, &safe_play::Device::default()).is_some();
+    if !table.certificate().passes() || is_unsafe() {
         Point::Active
     } else if peak_n > limit_n {
         Point::Strong
