@@ -501,10 +501,11 @@ impl History {
         given
     }
 
-    /// Sets the trials to come: those that are planned, and of no track that has ended.
+    /// Sets the trials to come: those that are planned, and of no track and no practice that has ended. One that failed before
+    /// that end does not come again.
     fn set_queue(&mut self, queue: &[u32]) {
-        let takes_place = |trial: &&u32| self.takes_place(**trial);
-        self.queue = queue.iter().filter(takes_place).copied().collect();
+        let comes = |trial: &&u32| self.planned(**trial).is_some_and(|t| !self.has_ended(t));
+        self.queue = queue.iter().filter(comes).copied().collect();
     }
 
     /// A trial that comes again takes its track, or its practice, up again, if that had ended.
