@@ -39,15 +39,29 @@ def crates(target: str) -> tuple[dict, dict, str]:
     )
     uses: dict[tuple[str, str], set] = {}
     path: list[tuple[str, str]] = []
+    unused = None
     for line in tree.splitlines():
         depth, name, version, *_ = line.split()
+        if unused is not None and int(depth) > unused:
+            continue
         one = (name, version.lstrip("v"))
         del path[int(depth):]
+        unused = int(depth) if path and only_for_no_build(packages[path[-1]], name) else None
+        if unused is not None:
+            continue
         if path:
             uses[path[-1]].add(one)
         path.append(one)
         uses.setdefault(one, set())
     return packages, uses, next(one for one in uses if one[0] == PROGRAM)
+
+
+def only_for_no_build(package: dict, name: str) -> bool:
+    """Whether a package is needed to build another one that has nothing to build: `cargo tree` lists it, and Cargo does not
+    compile it (derive_more-impl 2.1.1 names rustc_version, and comes without a build script)."""
+    kinds = {one["kind"] for one in package["dependencies"] if one["name"] == name}
+    scripts = any("custom-build" in one["kind"] for one in package["targets"])
+    return kinds == {"build"} and not scripts
 
 
 def checksums() -> dict[tuple[str, str], str]:
