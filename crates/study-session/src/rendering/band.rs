@@ -3,10 +3,11 @@
 //! Where the motion determines the force, that is one force with its doubt. Where a table's
 //! direction is not known, because the handle rests or turned among lost samples, it is any
 //! force between its two branches. A state of a mechanism or of elements that is not known
-//! leaves the force open: such samples, and those that were lost, are not judged.
+//! leaves the force open: such samples, and those that were lost, are not judged. Where samples are
+//! so far apart that the motion among them is anybody's guess, only a handle at rest is judged.
 
-use super::comparable::{by_sign, unknown_s};
-use super::predicted::{GAP_S, Predicted, accelerations, predicted};
+use super::comparable::{SLOW_S, by_sign, unknown_s};
+use super::predicted::{GAP_S, Predicted, SETTLING_S, accelerations, predicted};
 use super::{Played, REST_MM_S};
 use crate::outcome::Sample;
 use study_wire::predict::{BranchView, TableView};
@@ -45,6 +46,7 @@ pub(super) fn bands(
 ) -> Vec<Band> {
     let sides = sides(played, samples);
     let quiet = quiet_s(samples);
+    let still = still_s(samples);
     let unknown_s = unknown_s(played, forces, interval_s);
     let by_sign = by_sign(played);
     // Among lost samples the force was somewhere; from there the slew limit takes its time.
@@ -83,7 +85,9 @@ pub(super) fn bands(
         Band {
             ends_n: [low - force.doubt_n, high + force.doubt_n],
             // The filters of a program go over a pause in one turn, each in its own way.
-            judged: (sides.is_some() || certain) && (played.numbered || !force.after_gap),
+            judged: (sides.is_some() || certain)
+                && (played.numbered || !force.after_gap)
+                && (interval_s <= SLOW_S || still[i] >= SETTLING_S),
             narrow: certain && !force.after_gap,
         }
     };
@@ -109,6 +113,19 @@ fn sides(played: &Played<'_>, samples: &[Sample]) -> Option<[Vec<Predicted>; 2]>
         predicted(&what, played.stepped(), samples, |i| a_m_s2[i])
     };
     Some([side(table.positive), side(table.negative)])
+}
+
+/// For how long the position has been the same at each sample, s.
+fn still_s(samples: &[Sample]) -> Vec<f64> {
+    let mut since: Option<&Sample> = None;
+    let still = samples.iter().map(|here| {
+        let begun = since
+            .filter(|begun| begun.x_mm == here.x_mm)
+            .unwrap_or(here);
+        since = Some(begun);
+        here.t_s - begun.t_s
+    });
+    still.collect()
 }
 
 /// For how long the encoder has not moved at each sample, s: the position is the same and the

@@ -9,7 +9,7 @@ use study_wire::servo::{Law, Rendering, Servo, ServoSettings};
 /// After a longer pause between two samples the filters have to settle again, s.
 pub(super) const GAP_S: f64 = 0.004;
 /// Time in which filter and slew limit forget a gap, s.
-const SETTLING_S: f64 = 0.06;
+pub(super) const SETTLING_S: f64 = 0.06;
 /// Only this much of a longer gap is calculated, in addition to the ramp, s.
 const LONGEST_GAP_S: f64 = 0.25;
 

@@ -456,6 +456,28 @@ fn too_little_is_never_ok() {
     assert_eq!(found.verdict, Verdict::TooLittle, "{found:?}");
 }
 
+/// At 100 samples a second nobody knows how the hand moved between two of them; a force at rest is known.
+#[test]
+fn a_slow_report_of_the_right_force_accuses_nobody() {
+    let steep = Table {
+        k_n_per_mm: [1.0; 2],
+        f0_n: [[-13.0; 2], [-17.0; 2]],
+        ..table()
+    };
+    let trembling = |tick: u32, v_mm_s: f64| v_mm_s + 40.0 * f64::from(tick % 5) - 80.0;
+    let fast = played_at(&steep.what(), AMPLITUDE_MM, 5.0, trembling);
+    for every in [3, 5, 10, 25] {
+        let slow: Vec<Sample> = fast.iter().copied().step_by(every).collect();
+        let found = verdict_about(&steep, &slow, |_| (), |_| ());
+        assert_eq!(found.verdict, Verdict::TooLittle, "{every}: {found:?}");
+    }
+    let rests = played(&table().what(), 0.0, 5.0);
+    let slow: Vec<Sample> = rests.into_iter().step_by(10).collect();
+    assert_eq!(verdict_of(&slow).verdict, Verdict::TooLittle);
+    let wrong = forced(&slow, |s| s.force_command_n + 2.0);
+    assert_eq!(verdict_of(&wrong).defects, [Defect::Error]);
+}
+
 /// An accelerometer knows what the positions do not tell.
 #[test]
 fn steps_of_the_position_accuse_nobody_and_excuse_nothing() {
