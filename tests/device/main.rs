@@ -13,6 +13,8 @@ mod process;
 mod process_check;
 mod rendering;
 mod safety;
+#[cfg(unix)]
+mod shell;
 mod shipped;
 mod supervision;
 #[path = "../support/mod.rs"]

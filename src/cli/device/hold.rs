@@ -90,13 +90,29 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
 pub(super) fn input_lines() -> Receiver<String> {
     let (sender, lines) = channel();
     std::thread::spawn(move || {
-        for line in std::io::stdin().lock().lines().map_while(Result::ok) {
+        let mut read = std::io::stdin().lock().lines();
+        loop {
+            wait_for_the_foreground();
+            let Some(Ok(line)) = read.next() else {
+                return;
+            };
             if !line.trim().is_empty() && sender.send(line).is_err() {
                 return;
             }
         }
     });
     lines
+}
+
+/// Returns once the process may read its terminal. A shell has a command with `&` in the background, where the
+/// system would stop the whole process, with the device that it simulates.
+fn wait_for_the_foreground() {
+    #[cfg(unix)]
+    while rustix::termios::tcgetpgrp(std::io::stdin())
+        .is_ok_and(|group| group != rustix::process::getpgrp())
+    {
+        std::thread::sleep(Duration::from_millis(200));
+    }
 }
 
 /// The device, of either kind.

@@ -242,12 +242,27 @@ fn socket(args: &Args) -> Result<Socket, Failure> {
     match args.listen {
         Some(at) => at_address(at),
         #[cfg(unix)]
-        None => Ok(Socket::Pty {
-            name: args.link.clone(),
-        }),
+        None => {
+            if let Some(name) = args.link.as_deref().filter(|name| is_in_use(name)) {
+                return Err(
+                    Failure::device(format!("{}: the port of another device", name.display()))
+                        .hint("stop that device, or choose another name; if it no longer runs, remove the link"),
+                );
+            }
+            Ok(Socket::Pty {
+                name: args.link.clone(),
+            })
+        }
         #[cfg(not(unix))]
         None => at_address(SocketAddr::from(([127, 0, 0, 1], 0))),
     }
+}
+
+/// Whether a symbolic link leads to a port that exists. The link of a device that was killed leads nowhere.
+#[cfg(unix)]
+fn is_in_use(link: &std::path::Path) -> bool {
+    let is_link = std::fs::symlink_metadata(link).is_ok_and(|found| found.is_symlink());
+    is_link && link.exists()
 }
 
 /// At an address, with a new token.
