@@ -13,6 +13,9 @@ use study_haptics::recording::force_curve::{self as curve, Source, Stated, USUAL
 /// A longer press is likelier a time in ms, s.
 const LONG_S: f64 = 1800.0;
 
+/// A weaker switch is likelier a force in another unit than was assumed, N.
+const WEAK_N: f64 = 0.05;
+
 /// Arguments of `study import`.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
@@ -113,6 +116,20 @@ fn force_curve(args: &ForceCurve, console: &mut Console) -> Result<(), Failure> 
             ),
         };
         console.say(format!("{}: {layout}, {rows} rows, {rate}", path.display()));
+        if !curve.assumed.is_empty() {
+            console.say(format!(
+                "note: {}: {} assumed; the names of the columns can say it, such as `force_n`",
+                path.display(),
+                curve.assumed.join(" and ")
+            ));
+        }
+        let most_n = curve.f_n.iter().fold(0.0, |most: f64, n| most.max(n.abs()));
+        if !curve.assumed.is_empty() && most_n < WEAK_N {
+            console.say(format!(
+                "warning: {}: the force is {most_n:.4} N at most, less than of any switch: if the column is in N, call it `force_n`",
+                path.display()
+            ));
+        }
         if let Some(hz) = curve.rate_hz.filter(|hz| rows as f64 / hz > LONG_S) {
             console.say(format!(
                 "warning: {}: by its column of the time the curve took {:.1} h; if that is in ms, call it time_ms",

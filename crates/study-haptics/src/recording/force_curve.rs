@@ -57,6 +57,8 @@ pub struct ForceCurve {
     pub f_n: Vec<f64>,
     /// Rows a second, if the file has a time.
     pub rate_hz: Option<f64>,
+    /// The units that the file does not state, such as `force in gf`.
+    pub assumed: Vec<String>,
 }
 
 /// Why a file is no force curve, and at which line.
@@ -150,6 +152,8 @@ struct Column {
     factor: Option<f64>,
     /// Where each row has the unit.
     unit_at: Option<usize>,
+    /// The unit that was taken because the file states none.
+    assumed: Option<&'static str>,
 }
 
 impl Column {
@@ -274,12 +278,17 @@ pub fn read(text: &str) -> Result<ForceCurve, ForceCurveError> {
         Some(settings) => Some(1.0 / settings.interval_s),
         None => rate(&times).map_err(|(line, fault)| ForceCurveError { line, fault })?,
     };
+    let assumed = [&header.force, &header.displacement]
+        .into_iter()
+        .filter_map(|column| Some(format!("{} in {}", column.what, column.assumed?)))
+        .collect();
     Ok(ForceCurve {
         layout,
         target,
         x_mm,
         f_n,
         rate_hz,
+        assumed,
     })
 }
 
@@ -309,9 +318,10 @@ fn columns(line: &str) -> Result<Option<Header>, Fault> {
             at,
             factor: None,
             unit_at,
+            assumed: (unit_at.is_none() && stated.is_empty()).then_some(usual),
         };
         if unit_at.is_none() {
-            column.unit(if stated.is_empty() { usual } else { stated })?;
+            column.unit(column.assumed.unwrap_or(stated))?;
         }
         Ok(Some(column))
     };
@@ -402,6 +412,7 @@ fn column_at(at: usize, (what, kind, _): (&'static str, usize, &'static str)) ->
         at,
         factor: None,
         unit_at: None,
+        assumed: None,
     }
 }
 
@@ -484,7 +495,7 @@ pub fn unlike(curves: &[Source<'_>]) -> Vec<String> {
 
 /// One recording of all curves, one after the other, as the bytes of its CSV file. Each line of the
 /// header begins with what it says: `measured force curve` with the next ones in short, `target`, `instrument`, `source` (one for each curve),
-/// `quasi-static` where a time was made up, `resolution`, `credit`, `license`.
+/// `quasi-static` where a time was made up, `units not stated`, `resolution`, `credit`, `license`.
 ///
 /// Velocity and acceleration are differences within a curve.
 pub fn join(curves: &[Source<'_>], stated: Stated<'_>) -> Vec<u8> {
@@ -539,6 +550,20 @@ pub fn join(curves: &[Source<'_>], stated: Stated<'_>) -> Vec<u8> {
             "the file has no time; {usual_hz} rows a second are assumed, and bounds of mass and damping rest on that"
         );
         line("quasi-static", Some(&text));
+    }
+    let assumed: Vec<&str> = (curves.iter())
+        .flat_map(|source| source.curve.assumed.iter().map(String::as_str))
+        .fold(Vec::new(), |mut all, unit| {
+            if !all.contains(&unit) {
+                all.push(unit);
+            }
+            all
+        });
+    if !assumed.is_empty() {
+        line(
+            "units not stated",
+            Some(&format!("{} assumed", assumed.join(", "))),
+        );
     }
     let steps = [("x", x_mm, "mm"), ("F", f_n, "N")].map(|(name, values, unit)| {
         let step =

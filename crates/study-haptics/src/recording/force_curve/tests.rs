@@ -48,6 +48,28 @@ fn tidy_columns_stand_in_any_order_with_units_in_their_names() {
     let other = read("Displacement (um);Force [mN]\n0;0\n1000,5;900\n0;1\n").unwrap();
     assert_eq!(other.x_mm, [0.0, 1.0005, 0.0]);
     assert!((other.f_n[1] - 0.9).abs() < 1e-12);
+    assert_eq!(other.assumed, [""; 0]);
+}
+
+/// A column of newtons that is called `force` is read as gf: a hundredth of the force, and nobody would see it.
+#[test]
+fn a_unit_that_nobody_stated_is_told() {
+    assert_eq!(read(FINE).unwrap().assumed, [""; 0]);
+    let bare = read("force,displacement\n0,0\n0.6,1\n0.1,0\n").unwrap();
+    assert_eq!(bare.assumed, ["force in gf", "displacement in mm"]);
+    let half = read("force_n,displacement\n0,0\n0.6,1\n0.1,0\n").unwrap();
+    assert_eq!(half.assumed, ["displacement in mm"]);
+    let header = |curve| {
+        let source = Source {
+            curve,
+            file: "a.csv",
+            sha256: "aa",
+        };
+        String::from_utf8(join(&[source], Stated::default())).unwrap()
+    };
+    let said = "units not stated: force in gf, displacement in mm assumed";
+    assert!(header(&bare).contains(said));
+    assert!(!header(&read(FINE).unwrap()).contains("not stated"));
 }
 
 #[test]
