@@ -97,14 +97,14 @@ fn an_undefined_test_of_equivalence_gives_its_reason() {
     );
     assert!(a.values.reason("reference/R/a/p_tost").is_some());
     for text in [words(&html(&a)), terminal(&a)] {
-        assert!(!text.contains("margin was preregistered"), "{text}");
+        assert!(!text.contains("margin was set"), "{text}");
         assert!(
             text.contains("Equivalence within ± 0.5 was not tested: "),
             "{text}"
         );
     }
     let without = analyze(&ratings, &Rules::default());
-    assert!(terminal(&without).contains("No equivalence margin was preregistered"));
+    assert!(terminal(&without).contains("No equivalence margin was set in advance"));
 }
 
 #[test]

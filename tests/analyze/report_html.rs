@@ -150,7 +150,7 @@ fn absent_results_are_left_out() {
 }
 
 #[test]
-fn preregistered_rules_and_their_changes_are_reported() {
+fn rules_and_their_changes_are_reported() {
     let csv = "subject,model,repetition,rating,vaf\n\
                S1,a,1,4,0.5\nS1,b,1,4,0.6\nS1,c,1,4,0.7\nS2,a,1,5,0.5\nS2,b,1,3,0.6\nS2,c,1,6,0.7\n\
                S3,a,1,2,0.5\nS3,b,1,3,0.6\nS3,c,1,5,0.7\n";
@@ -173,7 +173,7 @@ fn preregistered_rules_and_their_changes_are_reported() {
     assert!(page.contains("Deviations from the preregistered analysis"));
     assert!(page.contains("because &quot;typo&quot;: vaf: a → b"));
     let neither = report(&analyze(&ratings, &Rules::default()), &[]);
-    assert!(neither.contains("No exclusion rule was preregistered."));
+    assert!(neither.contains("No exclusion rule was set in advance."));
     assert!(neither.contains("No analysis rule was changed"));
 }
 
@@ -289,7 +289,7 @@ fn the_command_writes_the_same_bytes_whatever_the_locale_and_the_threads() {
 }
 
 #[test]
-fn rules_changed_after_the_study_began_are_not_called_preregistered() {
+fn rules_changed_after_the_study_began_are_not_said_to_be_set_in_advance() {
     let csv = "subject,model,repetition,rating,vaf\n\
                S1,a,1,4,0.5\nS1,b,1,4,0.6\nS1,c,1,4,0.7\nS2,a,1,5,0.5\nS2,b,1,3,0.6\nS2,c,1,6,0.7\n\
                S3,a,1,2,0.5\nS3,b,1,3,0.6\nS3,c,1,5,0.7\n";
@@ -331,7 +331,7 @@ fn rules_changed_after_the_study_began_are_not_called_preregistered() {
             .replace("eviation from the preregistered analysis", "")
     };
     let changed = told(&rules);
-    for bad in ["beforehand", "preregistered"] {
+    for bad in ["beforehand", "in advance", "preregistered"] {
         assert!(!changed.contains(bad), "{bad}: {changed}");
     }
     for said in [
@@ -345,11 +345,12 @@ fn rules_changed_after_the_study_began_are_not_called_preregistered() {
     rules.deviations.clear();
     let stated = told(&rules);
     for said in [
-        "The preregistered rules exclude",
-        "was preregistered to count as realistic",
-        "Preregistered exclusion rules",
-        "the preregistered exclusion rule",
+        "The rules that were set in advance exclude",
+        "counts as realistic, a threshold that was set in advance",
+        "Exclusion rules, set in advance",
     ] {
         assert!(stated.contains(said), "{said}: {stated}");
     }
+    // Nobody knows whether it was registered anywhere.
+    assert!(!stated.contains("preregistered"), "{stated}");
 }

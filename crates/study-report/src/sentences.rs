@@ -281,7 +281,7 @@ pub(super) fn no_equivalence(a: &Analysis, contrast: &ReferenceTest) -> Option<S
         None if a.changed(PreregisteredRule::Margin) => {
             "The equivalence margin was removed after the study began: see Deviations.".to_owned()
         }
-        None => "No equivalence margin was preregistered.".to_owned(),
+        None => "No equivalence margin was set in advance.".to_owned(),
         Some(margin) => format!("Equivalence within ± {margin} was not tested: {why}."),
     })
 }

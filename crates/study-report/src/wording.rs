@@ -5,7 +5,7 @@ mod parts;
 mod ratings;
 
 pub(crate) use parts::{declared_of_part, of_part, upwards};
-pub(crate) use ratings::{declared, of_ratings, role};
+pub(crate) use ratings::{declared, of_ratings, role, two_levels};
 
 use crate::{apa, sentences};
 use study_analysis::analyze::findings::Direction;

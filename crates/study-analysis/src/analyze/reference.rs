@@ -128,7 +128,7 @@ fn contrast(differences: &[f64], p_holm: Option<f64>, rules: &Rules) -> Referenc
     let within = |p: f64| f64::from(u8::from(rejects(p, rules.alpha)));
     let no_p = match margin {
         Some(_) => why,
-        None => "no equivalence margin was preregistered",
+        None => "no equivalence margin was set in advance",
     };
     ReferenceTest {
         n: Stat::count(differences.len()),

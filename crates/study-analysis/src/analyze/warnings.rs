@@ -117,21 +117,21 @@ fn excluded(
     changed: bool,
     results: &Results,
 ) {
-    let (first, later) = if changed {
-        ("the", " (changed after the study began)")
+    let later = if changed {
+        " (changed after the study began)"
     } else {
-        ("the preregistered", "")
+        ""
     };
     for e in exclusions {
         if let Some(problem) = e.problem {
-            let text = format!("{first} exclusion rule `{}`{later}: {problem}", e.rule);
+            let text = format!("the exclusion rule `{}`{later}: {problem}", e.rule);
             warn("rule-not-judged", text);
         }
         if e.rows > 0 {
             warn(
                 "excluded",
                 format!(
-                    "{first} exclusion rule `{}`{later} excluded {} of {}",
+                    "the exclusion rule `{}`{later} excluded {} of {}",
                     e.rule,
                     counted(e.rows, "row", "rows"),
                     people(e.participants)

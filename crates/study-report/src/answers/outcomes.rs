@@ -1,6 +1,7 @@
 //! What was measured in the trials besides the rating.
 
 use super::Answer;
+use crate::wording::two_levels;
 use crate::{apa, sentences};
 use study_analysis::analyze::findings::Estimate;
 use study_analysis::analyze::results::{
@@ -27,7 +28,7 @@ fn answer(a: &Analysis, outcome: &OutcomeAnswer, record: &MeasuredOutcome) -> An
         None => "differ between the realizations",
     };
     let question = format!("Measured: does {} ({noun}) {by}?", rules.id);
-    let mut told = outcome.findings.iter().map(|f| found(outcome, f));
+    let mut told = outcome.findings.iter().map(|f| found(a, outcome, f));
     let mut answer = Answer::new(&question, told.next().unwrap_or_default());
     answer.main.extend(told);
     answer.main.extend(ends(outcome, record));
@@ -42,7 +43,7 @@ fn answer(a: &Analysis, outcome: &OutcomeAnswer, record: &MeasuredOutcome) -> An
 }
 
 /// The verdict of a test, with its result.
-fn found(outcome: &OutcomeAnswer, f: &Finding) -> String {
+fn found(a: &Analysis, outcome: &OutcomeAnswer, f: &Finding) -> String {
     let noun = outcome.rules.measure.noun();
     let effect = f.names.join(" × ");
     let claim = match (&f.question, f.names.len()) {
@@ -60,7 +61,8 @@ fn found(outcome: &OutcomeAnswer, f: &Finding) -> String {
     });
     let difference = (f.estimate.as_ref())
         .filter(|_| f.reason().is_none())
-        .map_or_else(String::new, |e| second_level(outcome, e));
+        .and_then(|e| second_level(outcome, two_levels(a, f)?, e))
+        .unwrap_or_default();
     match &f.verdict {
         Verdict::Yes => sentence(&format!("shown: {claim}{result}{test}{difference}")),
         Verdict::NotShown => sentence(&format!(
@@ -73,22 +75,26 @@ fn found(outcome: &OutcomeAnswer, f: &Finding) -> String {
 }
 
 /// The second level of a factor less the first one or, of logarithms, over it.
-fn second_level(outcome: &OutcomeAnswer, e: &Estimate) -> String {
+fn second_level(outcome: &OutcomeAnswer, levels: [&str; 2], e: &Estimate) -> Option<String> {
     let rules = &outcome.rules;
     let back = |x: f64| rules.transform.back(x);
-    let (what, unit) = match rules.transform {
-        Transform::Log => ("over", "times".to_owned()),
-        Transform::Identity => ("less", rules.measure.unit().to_owned()),
+    let [first, second] = levels.map(apa::name);
+    let (difference, unit) = match rules.transform {
+        Transform::Log => (format!("{second} over {first}"), "times".to_owned()),
+        Transform::Identity => (
+            format!("{second} − {first}"),
+            rules.measure.unit().to_owned(),
+        ),
     };
     let own = Estimate {
         value: back(e.value),
         ci95: e.ci95.map(|(lo, hi)| (back(lo), back(hi))),
         ..*e
     };
-    format!(
-        "; the second level {what} the first: {} {unit}",
+    Some(format!(
+        "; {difference}: {} {unit}",
         sentences::estimate(&own, apa::two)
-    )
+    ))
 }
 
 /// The realizations at both ends, with what is compared.
@@ -136,7 +142,7 @@ fn with_vaf(record: &MeasuredOutcome) -> Option<String> {
     ))
 }
 
-/// How a time goes with what else was measured.
+/// How a time goes with what else was measured; in which direction only where the interval tells it.
 fn trade_offs(a: &Analysis, outcome: &OutcomeAnswer, record: &MeasuredOutcome) -> Vec<String> {
     let one = |(name, pair): (&OutcomeName, &OutcomePair)| {
         let other = a
@@ -146,14 +152,14 @@ fn trade_offs(a: &Analysis, outcome: &OutcomeAnswer, record: &MeasuredOutcome) -
         let r = pair.r.number()?;
         let is_lower = |o: &OutcomeAnswer| o.rules.better == Some(BetterEnd::Lower);
         let same_end = is_lower(outcome) == is_lower(other);
-        let goes = match (r > 0.0) == same_end {
-            true => "what is better in one tends to be better in the other",
-            false => {
-                "what is better in one tends to be worse in the other, as where speed is traded for accuracy"
-            }
+        let known = pair.ci95.ends().is_some_and(|(lo, hi)| lo * hi > 0.0);
+        let goes = match (known, (r > 0.0) == same_end) {
+            (false, _) => "",
+            (true, true) => ": what is better in one tends to be better in the other",
+            (true, false) => ": what is better in one tends to be worse in the other",
         };
         Some(format!(
-            "Speed and accuracy: within participants {} and {} correlate over the realizations by r({}) = {}{}: {goes} \
+            "Within participants {} and {} correlate over the realizations by r({}) = {}{}{goes} \
              (described, not tested).",
             outcome.rules.id,
             other.rules.id,

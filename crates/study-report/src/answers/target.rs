@@ -104,7 +104,7 @@ fn realistic(a: &Analysis, best: &str) -> Option<String> {
                 .to_owned(),
         ),
         None if sentences::is_about_realism(a) => {
-            Some("no threshold for “realistic” was preregistered".to_owned())
+            Some("no threshold for “realistic” was set in advance".to_owned())
         }
         None => None,
     }

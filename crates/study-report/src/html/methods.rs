@@ -115,7 +115,7 @@ fn design(d: &Details, a: &Analysis) -> Vec<String> {
                  the study began (see Deviations)."
             )
         } else {
-            format!("A rating of {from} or higher was preregistered to count as realistic.")
+            format!("A rating of {from} or higher counts as realistic, a threshold that was set in advance.")
         });
     }
     if d.states.iter().any(|(state, _)| state != "done") {
@@ -218,7 +218,7 @@ fn exclusions(a: &Analysis) -> Vec<String> {
                  exclude {rules}."
             )
         } else {
-            format!("The preregistered rules exclude {rules}.")
+            format!("The rules that were set in advance exclude {rules}.")
         });
     }
     let by_rules: usize = a.exclusions.iter().map(|e| e.rows).sum();
@@ -461,7 +461,7 @@ fn tests(a: &Analysis) -> Vec<String> {
         let margin = if a.changed(PreregisteredRule::Margin) {
             "a margin that was changed after the study began (see Deviations)"
         } else {
-            "the preregistered margin"
+            "a margin that was set in advance"
         };
         text.push(format!(
             "Equivalence with the reference was tested by two one-sided t tests with {margin}."

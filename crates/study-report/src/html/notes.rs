@@ -54,7 +54,7 @@ fn rules(a: &Analysis) -> Markup {
         @if a.exclusions.is_empty() && changed {
             p { "The exclusion rules were removed after the study began: see Deviations." }
         } @else if a.exclusions.is_empty() {
-            p { "No exclusion rule was preregistered." }
+            p { "No exclusion rule was set in advance." }
         } @else {
             (table(&tables::rules(a)))
             @match (&with, &without) {

@@ -9,7 +9,7 @@ use study_analysis::analyze::{Analysis, PreregisteredRule, Value};
 pub(crate) fn rules(a: &Analysis) -> Table {
     let caption = match a.changed(PreregisteredRule::Exclusions) {
         true => "Exclusion rules, changed after the study began: see Deviations",
-        false => "Preregistered exclusion rules",
+        false => "Exclusion rules, set in advance",
     };
     Builder::new(caption, &a.exclusions)
         .column(report("rule").file("rule"), &|e| {

@@ -345,6 +345,13 @@ fn value(a: &Analysis, f: &Finding, key: &str) -> Option<String> {
 /// name and the difference.
 fn levels(a: &Analysis, f: &Finding) -> Option<String> {
     let estimate = f.estimate.as_ref()?;
+    let [first, second] = two_levels(a, f)?;
+    let size = sentences::estimate(estimate, apa::two);
+    Some(format!(" ({second} − {first}: {size})"))
+}
+
+/// The names of both levels, if a finding is about one factor that has two.
+pub(crate) fn two_levels<'a>(a: &'a Analysis, f: &Finding) -> Option<[&'a str; 2]> {
     let crossing = a.crossing.as_ref()?;
     let [name] = &f.names[..] else {
         return None;
@@ -353,8 +360,7 @@ fn levels(a: &Analysis, f: &Finding) -> Option<String> {
     let [first, second] = &factor.levels[..] else {
         return None;
     };
-    let size = sentences::estimate(estimate, apa::two);
-    Some(format!(" ({second} − {first}: {size})"))
+    Some([first.as_str(), second.as_str()])
 }
 
 /// The effect size of Friedman's test.
