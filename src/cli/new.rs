@@ -2,6 +2,7 @@
 
 mod confirm;
 
+use super::console::shell_command;
 use super::include::{Who, include};
 use super::{Console, Failure, schema};
 use std::fs;
@@ -160,9 +161,10 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     add_schema(&mut files);
     write(dir, &files)?;
     let shown = dir.display().to_string();
-    let shown = Untrusted(&shown);
+    let word = shell_command(std::slice::from_ref(&shown));
+    let (shown, word) = (Untrusted(&shown), Untrusted(&word));
     console.out(format!(
-        "wrote {shown}: {} and {} beside it\nnext: study check {shown}; study run {shown} --pilot\n",
+        "wrote {shown}: {} and {} beside it\nnext: study check {word}; study run {word} --pilot\n",
         load::FILE_NAME,
         counted(files.len() - 1, "file", "files")
     ))

@@ -426,9 +426,13 @@ fn finish(
     };
     let folder = study.saved_in();
     let shown = folder.display();
+    let include = match &written {
+        Ok(Some(derived)) => ending::included(derived),
+        _ => "",
+    };
     match how {
         Ending::Finished => console.out(format!(
-            "The session is finished and saved in {shown}.\nNext: study status {shown} · study analyze {shown}\n"
+            "The session is finished and saved in {shown}.\nNext: study status {shown} · study analyze {shown}{include}\n"
         )),
         Ending::Interrupted => console.out(format!(
             "The session is not finished; all answers are saved in {shown}.\nResume it with: {resume}\n"

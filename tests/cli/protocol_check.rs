@@ -165,6 +165,31 @@ fn of_version_1(table: &str) -> String {
     format!("{head}[positive]{nodes}")
 }
 
+/// The search can come back to the switch that was identified, and all of its points can be presented.
+#[test]
+fn the_shipped_search_has_the_identified_switch_among_its_points() {
+    let (code, out, err) = run(Path::new("."), &["check", "protocols/realism-search"]);
+    assert_eq!(code, 0, "{err}");
+    assert!(
+        out.contains("realism-search: ok") && out.contains("0 warnings"),
+        "{out}{err}"
+    );
+    let loaded = study_analysis::load::load(Path::new("protocols/realism-search")).unwrap();
+    let space = &loaded.protocol.spaces[0];
+    let is_start = |point: &usize| {
+        let levels = space.levels(*point);
+        let apart = |(level, start): (&f64, f64)| (level - start).abs();
+        levels.iter().zip([1.0, 0.0, 1.0]).map(apart).sum::<f64>() < 1e-12
+    };
+    assert_eq!((0..space.lattice.len()).filter(is_start).count(), 1);
+    let model =
+        |protocol: &str| fs::read(format!("protocols/{protocol}/models/passive.toml")).unwrap();
+    assert!(
+        model("realism-search") == model("turn-signal-passive"),
+        "identify.sh makes both"
+    );
+}
+
 /// A mechanism of an older version has 33 N at an edge that no data reached: it passes its
 /// certificate and is refused, or named where the protocol permits it.
 #[test]
@@ -496,7 +521,7 @@ fn a_new_study_has_no_errors_and_overwrites_nothing() {
     let dir = TempDir::new().unwrap();
     let (code, out, err) = run(dir.path(), &["new", "Our Switch"]);
     assert_eq!((code, err.as_str()), (0, ""));
-    assert!(out.contains("study check Our Switch"), "{out}");
+    assert!(out.contains("study check 'Our Switch'"), "{out}");
     let (code, out, _) = run(dir.path(), &["check", "Our Switch"]);
     assert_eq!(code, 0);
     assert!(

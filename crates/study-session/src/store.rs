@@ -144,13 +144,16 @@ pub fn studies(path: &Path) -> Result<Vec<StudyFolder>, StoreError> {
 /// As [`studies`], and [`StoreError::Several`].
 pub fn one_study(path: &Path) -> Result<StudyFolder, StoreError> {
     let mut studies = studies(path)?;
-    match (studies.pop(), studies.len()) {
-        (Some(only), 0) => Ok(only),
-        (_, others) => Err(StoreError::Several {
-            path: path.to_owned(),
-            count: others + 1,
-        }),
+    if studies.len() == 1 {
+        return Ok(studies.remove(0));
     }
+    let name = |study: &StudyFolder| study.path().file_name().unwrap_or_default().to_owned();
+    Err(StoreError::Several {
+        path: path.to_owned(),
+        names: (studies.iter().map(name))
+            .map(|name| name.to_string_lossy().into_owned())
+            .collect(),
+    })
 }
 
 impl StudyFolder {

@@ -161,9 +161,12 @@ fn failure(error: ImportError) -> Failure {
         ImportError::Asked { field, .. } => format!(
             "name it: --column {field}=NAME{}",
             match field.as_str() {
-                "subject" | "participant" => "; if each file is one participant: @file",
-                "model" => "; if each realization has a column of its own: --wide NAME,NAME",
-                _ => "",
+                "subject" | "participant" => {
+                    format!("; --column {field}=@file takes it from the name of the file")
+                }
+                "model" =>
+                    "; if each realization has a column of its own: --wide NAME,NAME".to_owned(),
+                _ => String::new(),
             }
         ),
         ImportError::Cell { .. } => {

@@ -2,7 +2,8 @@
 
 use crate::cli::Failure;
 use std::path::Path;
-use study_session::store::StoreError;
+use study_session::outcome::ParticipantRow;
+use study_session::store::{Derived, StoreError};
 
 /// The failure to report if the tables could not be written after a session.
 pub(super) fn unwritten(why: &StoreError, folder: &Path) -> Failure {
@@ -28,4 +29,14 @@ pub(super) fn wrong_forces([wrong, all]: [usize; 2]) -> Option<String> {
              next session, `study device check` shows what it does wrong"
         )
     })
+}
+
+/// What `study analyze` has to be told to find data in a study without a participant.
+pub(super) fn included(derived: &Derived) -> &'static str {
+    let any = |what: fn(&ParticipantRow) -> bool| derived.participants.iter().any(what);
+    match (any(|p| !p.pilot && !p.simulated), any(|p| p.pilot)) {
+        (true, _) => "",
+        (false, true) => " --include pilot",
+        (false, false) => " --include simulated",
+    }
 }

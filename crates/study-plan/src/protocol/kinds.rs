@@ -163,10 +163,14 @@ fn ascending<T: PartialOrd + Display>(section: &Section<'_, '_>, from: T, to: T)
     if from < to {
         return Some(());
     }
+    let wrong = match from > to {
+        true => "reversed",
+        false => "a single point",
+    };
     section.fault_at(
         "from",
         Fault::error(format!(
-            "the scale of `{}` is reversed: from {from} to {to}",
+            "the scale of `{}` is {wrong}: from {from} to {to}",
             section.path()
         ))
         .label("has to be below `to`"),

@@ -48,12 +48,12 @@ pub enum StoreError {
         path: PathBuf,
     },
     /// A results folder with several studies where one is meant.
-    #[error("{}: contains {count} studies", .path.display())]
+    #[error("{}: contains {} studies: {}", .path.display(), .names.len(), listed(.names))]
     Several {
         /// The results folder.
         path: PathBuf,
-        /// Number of studies.
-        count: usize,
+        /// Names of their folders, sorted. Untrusted.
+        names: Vec<String>,
     },
     /// Written by a later version of the program.
     #[error("{}: written by a newer version of study ({})", .path.display(), Untrusted(.found))]
@@ -316,6 +316,16 @@ pub enum StoreError {
 /// A time for people.
 pub fn when(at: chrono::DateTime<chrono::FixedOffset>) -> String {
     at.format("%Y-%m-%d %H:%M").to_string()
+}
+
+/// The first names, which may have any characters.
+fn listed(names: &[String]) -> String {
+    const SHOWN: usize = 8;
+    let shown: Vec<String> = (names.iter().take(SHOWN))
+        .map(|name| Untrusted(name).to_string())
+        .collect();
+    let more = if names.len() > SHOWN { ", …" } else { "" };
+    shown.join(", ") + more
 }
 
 fn not_results(error: &io::Error) -> String {

@@ -307,7 +307,11 @@ fn questions_cannot_have_the_names_of_fixed_columns() {
 fn scales_options_and_ranges_are_checked() {
     assert_eq!(
         changed("from = 1", "from = 7"),
-        ["the scale of `questions[0]` is reversed: from 7 to 7"]
+        ["the scale of `questions[0]` is a single point: from 7 to 7"]
+    );
+    assert_eq!(
+        changed("from = 1", "from = 8"),
+        ["the scale of `questions[0]` is reversed: from 8 to 7"]
     );
     assert_eq!(
         changed("to = 7", "to = 7\nlabels = { 0 = \"none\", x = \"?\" }"),
