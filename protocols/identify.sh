@@ -58,6 +58,7 @@ identify --lambda 0.9991,0.9993,0.9995,0.9997,0.9999 --dx 1 --id 'lambda-{lambda
 identify --method static --dx 1 --id static --out "$passive"
 identify --method spring --out "$passive"
 identify --method passive --dx 0.5 --id passive --out "$passive"
+identify --method passive --dx 0.5 --id passive --out "$protocols/realism-search/models"
 identify --method mechanism --dx 0.5 --id mechanism --out "$passive"
 
 # The knob, in degrees and N·m at its axis

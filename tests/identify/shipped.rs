@@ -53,7 +53,7 @@ fn the_script_reproduces_every_file_byte_for_byte() {
         .env("PROTOCOLS", dir.path())
         .assert()
         .success();
-    for protocol in FOLDERS.into_iter().chain(["knob"]) {
+    for protocol in FOLDERS.into_iter().chain(["knob", "realism-search"]) {
         let made = files(dir.path(), protocol);
         let shipped = files(Path::new("protocols"), protocol);
         assert_eq!(
