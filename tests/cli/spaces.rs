@@ -34,7 +34,10 @@ fn a_space_of_which_some_points_pass_is_used_and_drawn() {
         said.contains("of the 81 points of the space `switch` are never presented"),
         "{said}"
     );
-    assert!(said.contains("need more than 12 N at rest"), "{said}");
+    assert!(
+        said.contains("need more than 12 N, at rest or up to their trained speed"),
+        "{said}"
+    );
     // Friction by the sign of the speed that no damping confines is refused, as it is of a realization.
     let (code, strong) = checked(AXES, "detent = [0.4, 1.2], friction = [0.0, 5.0]");
     assert_eq!(code, 0, "{strong}");

@@ -10,6 +10,7 @@
 pub mod coverage;
 mod elements;
 pub mod file;
+mod strongest;
 mod units;
 
 pub use elements::Elements;

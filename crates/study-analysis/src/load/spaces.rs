@@ -1,7 +1,7 @@
 //! The tables of spaces: every point is built and certified before the session, and only those that pass can be presented.
 
 use super::OtherFiles;
-use super::families::forces;
+use super::families::strongest_at_rest_n;
 use std::collections::BTreeMap;
 use study_base::diagnostic::{Fault, Findings};
 use study_base::text::ModelId;
@@ -15,6 +15,22 @@ use study_plan::protocol::{Axis, Protocol, SpaceRules, Vary};
 /// A space of which less than this share of the points can be presented is refused.
 const LEAST_SHARE: f64 = 0.25;
 
+/// By which rule points pass. A study keeps the one with which it began, so that its journals read as they did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Judged {
+    /// The certificate, safe play, and the force over the trained range and speeds.
+    Now,
+    /// The certificate, safe play, and the force at rest at the nodes.
+    AtNodes,
+    /// The certificate, and the force at rest at the nodes.
+    WithoutSafePlay,
+}
+
+impl Judged {
+    /// The rules of earlier releases, the last one first.
+    pub(super) const EARLIER: [Self; 2] = [Self::AtNodes, Self::WithoutSafePlay];
+}
+
 /// What becomes of a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Point {
@@ -26,12 +42,12 @@ enum Point {
 }
 
 /// The realizations of all points that can be presented, which the lattices of the protocol then have. Spaces of which
-/// too few can, or which these do not connect, are reported if they are to be `played`.
+/// too few can, or which these do not connect, are reported if they are to be played, which is by the rule of now.
 pub(super) fn realizations(
     protocol: &mut Protocol,
     others: &OtherFiles<'_>,
     spans: &Spans,
-    played: bool,
+    data: Option<Judged>,
     findings: &mut Findings,
 ) -> BTreeMap<ModelId, Realization> {
     let limit_n = protocol.device.limits.force_n.get();
@@ -54,11 +70,13 @@ pub(super) fn realizations(
                 continue;
             }
         };
-        let points: Vec<Point> = tables.iter().map(|table| judged(table, limit_n)).collect();
+        let rule = data.unwrap_or(Judged::Now);
+        let points = tables.iter().map(|table| judged(table, limit_n, rule));
+        let points: Vec<Point> = points.collect();
         let full = space.lattice.clone();
         // Of a space with fewer than two good points the lattice stays; it is refused below.
         let _ = space.certify(|at| points[full.point(at)] == Point::Good);
-        if played {
+        if data.is_none() {
             let fault =
                 refused(space, &points, limit_n).or_else(|| partial(space, &points, limit_n));
             findings.faults.extend(fault.map(|fault| fault.at(place())));
@@ -93,13 +111,18 @@ fn built(from: &Realization, axes: &[Axis]) -> Result<Vec<Realization>, FamilyEr
     })
 }
 
-fn judged(table: &Realization, limit_n: f64) -> Point {
-    let strongest = forces(table, table, 0.0).into_iter();
-    let peak_n = strongest.fold(0.0, |most: f64, f| most.max(f.abs()));
-    let is_unsafe = || safe_play::refusal(table, &safe_play::Device::default()).is_some();
+fn judged(table: &Realization, limit_n: f64, rule: Judged) -> Point {
+    let is_unsafe = || {
+        let judged = rule != Judged::WithoutSafePlay;
+        judged && safe_play::refusal(table, &safe_play::Device::default()).is_some()
+    };
+    let strongest_n = || match rule {
+        Judged::Now => table.strongest_n(),
+        Judged::AtNodes | Judged::WithoutSafePlay => strongest_at_rest_n(table),
+    };
     if !table.certificate().passes() || is_unsafe() {
         Point::Active
-    } else if peak_n > limit_n {
+    } else if strongest_n() > limit_n {
         Point::Strong
     } else {
         Point::Good
@@ -157,7 +180,9 @@ fn why(points: &[Point], limit_n: f64) -> String {
         reasons.push(format!("{active} can put energy into a hand"));
     }
     if strong > 0 {
-        reasons.push(format!("{strong} need more than {limit_n} N at rest"));
+        reasons.push(format!(
+            "{strong} need more than {limit_n} N, at rest or up to their trained speed"
+        ));
     }
     reasons.join(", ")
 }
