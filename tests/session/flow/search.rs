@@ -139,6 +139,50 @@ fn a_search_after_a_fault_a_bad_trial_and_a_resume_is_the_one_without() {
     }
 }
 
+/// A device that fails whenever it plays one point costs two attempts, and no trial.
+#[test]
+fn a_search_goes_on_without_a_point_at_which_the_device_fails() {
+    for rule in [
+        MODEL,
+        r#"{ name = "sobol", trials = 14 }"#,
+        r#"{ name = "random", trials = 14 }"#,
+    ] {
+        let protocol = searching(rule);
+        let mut calm = Rig::new(protocol.clone());
+        end(&mut calm, &protocol);
+        let space = &protocol.spaces[0];
+        // The second point of a pair of the first trials, and one of a pair that the answers chose.
+        for at in [2, 9] {
+            let refused = space.realization(compared(&calm, &protocol)[at].pair[1]);
+            let plays = |rig: &Rig, screen: &Screen| {
+                let playing = matches!(screen, Screen::Playing { .. });
+                playing && rig.session.playing_model() == Some(&refused)
+            };
+            let mut rig = Rig::new(protocol.clone());
+            go_on(&mut rig, &protocol, plays);
+            rig.send(Input::DeviceFault("too fast".to_owned()));
+            go_on(&mut rig, &protocol, plays);
+            rig.send(Input::DeviceFault("too fast".to_owned()));
+            let left_out = |rig: &Rig| rig.count(|e| matches!(e, Event::PointLeftOut { .. }));
+            assert_eq!(left_out(&rig), 1, "{rule}");
+            // A trial that is marked as bad is felt again without the point.
+            go_on(&mut rig, &protocol, |rig, screen| {
+                done(rig) >= 1 && reference(screen)
+            });
+            rig.send(Input::MarkBad {
+                reason: "noise".to_owned(),
+            });
+            rig.send(Input::Quit);
+            let mut rig = Rig::back(protocol.clone(), rig.journal.clone(), 60.0);
+            go_on(&mut rig, &protocol, plays);
+            assert_eq!(rig.ending, Some(Ending::Finished), "{rule}");
+            assert_eq!(left_out(&rig), 1, "{rule}");
+            assert_eq!(rig.closed().values().flatten().count(), 14, "{rule}");
+            assert_eq!(verified(&protocol, &rig.journal), [""; 0], "{rule}");
+        }
+    }
+}
+
 #[test]
 fn a_model_learns_and_the_order_of_the_two_is_the_planned_one() {
     let protocol = searching(MODEL);
