@@ -6,7 +6,7 @@ use crate::world;
 use study_base::text::{ModelId, QuestionId};
 use study_plan::procedure::search::RecordedPair;
 use study_plan::protocol::{Answer, Protocol, SpaceRules, Stimuli};
-use study_session::outcome::{Entry, Event};
+use study_session::outcome::{Choice, Entry, Event};
 use study_session::session::{Ending, Input, Screen};
 use study_session::store::{Frozen, StudyFolder};
 
@@ -137,6 +137,42 @@ fn a_search_after_a_fault_a_bad_trial_and_a_resume_is_the_one_without() {
         end(&mut rig, &protocol);
         assert_eq!(compared(&rig, &protocol), expected, "{rule}");
     }
+}
+
+/// A search is one block: restarting it would lose all of its answers.
+#[test]
+fn a_search_is_not_restarted_after_a_long_gap() {
+    let protocol = searching(MODEL);
+    let mut rig = Rig::new(protocol.clone());
+    go_on(&mut rig, &protocol, |rig, screen| {
+        done(rig) >= 6 && reference(screen)
+    });
+    rig.send(Input::Quit);
+    let mut rig = Rig::back(protocol.clone(), rig.journal.clone(), 9.0 * 3600.0);
+    rig.identify();
+    let restart = |rig: &Rig| match rig.view().screen {
+        Screen::ResumeChoice { restart, .. } => Some(restart),
+        _ => None,
+    };
+    assert_eq!(restart(&rig), Some(false));
+    rig.send(Input::Resume(Choice::RestartBlock));
+    assert_eq!(restart(&rig), Some(false));
+    assert!(
+        rig.view()
+            .notice
+            .unwrap()
+            .contains("a search is not restarted")
+    );
+    rig.send(Input::Resume(Choice::Continue));
+    assert_eq!(compared(&rig, &protocol).len(), 6);
+    end(&mut rig, &protocol);
+    assert_eq!(
+        rig.journal
+            .iter()
+            .filter(|e| matches!(e.event, Event::TrialDone { .. }))
+            .count(),
+        14
+    );
 }
 
 /// A device that fails whenever it plays one point costs two attempts, and no trial.
