@@ -7,6 +7,7 @@
 //! ([`study_wire::predict`]) and the passivity certificate ([`certificate`]) are shared
 //! with the firmware.
 
+mod alike;
 pub mod coverage;
 mod elements;
 pub mod file;
