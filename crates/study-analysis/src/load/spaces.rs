@@ -1,12 +1,12 @@
 //! The tables of spaces: every point is built and certified before the session, and only those that pass can be presented.
 
-use super::OtherFiles;
 use super::families::strongest_at_rest_n;
+use super::{Loaded, OtherFiles};
 use std::collections::BTreeMap;
 use study_base::diagnostic::{Fault, Findings};
 use study_base::text::ModelId;
 use study_haptics::family::{self, Family, FamilyError};
-use study_haptics::model::Realization;
+use study_haptics::model::{Realization, Units};
 use study_haptics::safe_play;
 use study_plan::protocol::check::Spans;
 use study_plan::protocol::fingerprint::family_file;
@@ -14,6 +14,19 @@ use study_plan::protocol::{Axis, Protocol, SpaceRules, Vary};
 
 /// A space of which less than this share of the points can be presented is refused.
 const LEAST_SHARE: f64 = 0.25;
+
+impl Loaded {
+    /// The table that a space varies, as it is; `None` if its file cannot be read.
+    pub fn start_of(&self, space: &SpaceRules) -> Option<Realization> {
+        let (_, bytes) = self.files.iter().find(|(name, _)| *name == space.from)?;
+        let text = std::str::from_utf8(bytes).ok()?;
+        let table = study_haptics::model::file::parse(&space.from, text).0?;
+        match table.units {
+            Units::Linear => Some(table),
+            _ => Some(table.at_lever(self.protocol.device.lever_mm?)),
+        }
+    }
+}
 
 /// By which rule points pass. A study keeps the one with which it began, so that its journals read as they did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -80,6 +93,11 @@ pub(super) fn realizations(
             let fault =
                 refused(space, &points, limit_n).or_else(|| partial(space, &points, limit_n));
             findings.faults.extend(fault.map(|fault| fault.at(place())));
+            for axis in idle(space, &tables) {
+                let own = spans.get(&format!("{path}.axes.{}", axis.vary.as_str()));
+                let fault = changes_nothing(space, axis).at(own.cloned().or_else(place));
+                findings.faults.push(fault);
+            }
         }
         let tables = tables.into_iter().enumerate();
         levels.extend(
@@ -169,6 +187,37 @@ fn partial(space: &SpaceRules, points: &[Point], limit_n: f64) -> Option<Fault> 
     })
 }
 
+/// The axes of which all levels have the same table, whatever the others are.
+fn idle<'a>(space: &'a SpaceRules, tables: &[Realization]) -> Vec<&'a Axis> {
+    let lattice = &space.lattice;
+    let same = |axis: usize| {
+        tables.iter().enumerate().all(|(point, table)| {
+            let mut at = lattice.at(point);
+            at[axis] = 0;
+            table.is_alike(&tables[lattice.point(&at)])
+        })
+    };
+    let axes = space.axes.iter().enumerate();
+    axes.filter(|(axis, _)| same(*axis))
+        .map(|(_, axis)| axis)
+        .collect()
+}
+
+/// The warning of an axis that nobody can feel.
+fn changes_nothing(space: &SpaceRules, axis: &Axis) -> Fault {
+    let what = format!(
+        "the axis `{}` of the space `{}` changes nothing: all of its levels have the same table",
+        axis.vary.as_str(),
+        space.id
+    );
+    let has_none = match axis.vary {
+        Vary::Damping => "its table has no damping",
+        Vary::Mass => "its table has no mass",
+        _ => "its table has nothing that it would change",
+    };
+    Fault::warning(what).hint(format!("take it out: {has_none}"))
+}
+
 fn count(points: &[Point], which: Point) -> usize {
     points.iter().filter(|point| **point == which).count()
 }
@@ -217,4 +266,41 @@ fn map(space: &SpaceRules, points: &[Point]) -> String {
         name(0).map_or_else(String::new, |name| format!("rows from {name}")),
         lines.join(" ")
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Judged;
+    use crate::load::{Purpose, load_begun, load_frozen, open};
+    use std::fs;
+
+    /// With damping, the strongest points of the template need more than 12 N in motion, and none does at rest.
+    #[test]
+    fn a_study_that_has_begun_keeps_its_points() {
+        let folder = tempfile::tempdir().unwrap();
+        let repository = concat!(env!("CARGO_MANIFEST_DIR"), "/../../");
+        let read = |path: &str| fs::read_to_string(format!("{repository}{path}")).unwrap();
+        let table = read("protocols/turn-signal-extended/models/static.toml");
+        let mut damped = String::new();
+        for (i, piece) in table.split("b_n_s_per_mm = [").enumerate() {
+            let (values, rest) = piece.split_at(if i == 0 { 0 } else { piece.find(']').unwrap() });
+            let key = if i == 0 { "" } else { "b_n_s_per_mm = [" };
+            damped += &format!("{key}{}{rest}", values.replace("0.0", "0.03"));
+        }
+        fs::create_dir(folder.path().join("models")).unwrap();
+        fs::write(folder.path().join("models/static.toml"), damped).unwrap();
+        let path = folder.path().join("protocol.toml");
+        fs::write(&path, read("src/cli/new/search.toml")).unwrap();
+        let of = |loaded: &crate::load::Loaded| loaded.protocol.spaces[0].lattice.certified().len();
+        let now = load_frozen(&path).unwrap();
+        let before = open(&path, Purpose::Data(Judged::AtNodes)).0.unwrap();
+        assert_eq!(of(&before), 81);
+        assert!(of(&now) < 81, "{}", of(&now));
+        assert_ne!(now.fingerprints, before.fingerprints);
+        for begun in [now, before] {
+            let again = load_begun(&path, &begun.fingerprints).unwrap();
+            assert_eq!(of(&again), of(&begun));
+            assert_eq!(again.fingerprints, begun.fingerprints);
+        }
+    }
 }
