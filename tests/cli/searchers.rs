@@ -124,7 +124,7 @@ fn damage_is_said_and_exclusion_rules_apply() {
     // A changed line.
     let journal = at.join("r/s/sessions/P01/1/journal.jsonl");
     let text = fs::read_to_string(&journal).unwrap();
-    let changed = text.replacen("\"playback_started\"", "\"playback_storted\"", 1);
+    let changed = text.replacen("\"playback_started\"", "\"playback_stopped\"", 1);
     assert_ne!(changed, text);
     fs::write(&journal, changed).unwrap();
     let (_, _, err) = study(&["explore", "r"], at);

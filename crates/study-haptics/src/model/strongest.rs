@@ -33,13 +33,13 @@ impl Realization {
             // Without the ends, at which parameters may jump.
             let (low, high) = (from + beside, to - beside);
             let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
-            let [left, centre, right] = [low, middle, high].map(force);
+            let [left, center, right] = [low, middle, high].map(force);
             // The parabola through the three, which is exact.
-            let bend = (left - 2.0 * centre + right) / (2.0 * half * half);
+            let bend = (left - 2.0 * center + right) / (2.0 * half * half);
             let vertex = middle - (right - left) / (4.0 * half * bend);
             let within = vertex > low && vertex < high;
-            let vertex = if within { force(vertex) } else { centre };
-            let all = [force(from), left, centre, vertex, right, force(to)];
+            let vertex = if within { force(vertex) } else { center };
+            let all = [force(from), left, center, vertex, right, force(to)];
             all.into_iter().fold(0.0, |most: f64, n| most.max(n.abs()))
         };
         breaks.windows(2).map(of_piece).fold(0.0, f64::max)
