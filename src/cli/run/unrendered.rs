@@ -142,7 +142,7 @@ fn clipped(device: &Identity, table: &Realization, most_n: f64) -> Option<Why> {
     let asked_n = table.strongest_n();
     (asked_n > most_n).then(|| Why {
         what: format!(
-            "needs up to {asked_n:.1} N, and the device `{}` gives at most {most_n:.1} N",
+            "needs up to {asked_n:.2} N, and the device `{}` gives at most {most_n:.2} N",
             device.id
         ),
         hint: "",

@@ -59,7 +59,7 @@ fn a_challenger_is_the_point_that_may_be_better_by_most() {
     assert_eq!(prior.challenge(2.0, |_| true), Some((0, 1)));
     // A point that cannot be presented is neither.
     assert_eq!(posterior.best_point(|point| point != 3), Some(2));
-    assert_eq!(posterior.challenge(2.0, |point| point != 3), Some((0, 2)));
+    assert_eq!(posterior.challenge(2.0, |point| point != 3), Some((2, 4)));
     assert_eq!(posterior.challenge(2.0, |point| point > 2), Some((3, 4)));
     assert_eq!(posterior.challenge(2.0, |point| point == 3), None);
     assert_eq!(posterior.best_pair(|point| point > 2), Some((3, 4)));
