@@ -6,12 +6,11 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use study_analysis::analyze::Include;
 use study_analysis::analyze::psychophysics::search::Exploration;
-use study_analysis::load;
+use study_analysis::load::{self, Loaded};
 use study_analysis::study::Study;
 use study_base::hex::sha256;
 use study_base::text::{PartId, Untrusted, counted};
 use study_haptics::model::{Realization, file};
-use study_haptics::safe_play;
 use study_plan::protocol::{Part, Protocol, Seat, SpaceRules};
 use study_report::explore;
 use study_session::store::SessionData;
@@ -107,7 +106,7 @@ pub(super) fn confirmation(
         );
         return Err(Failure::input(what));
     }
-    refuse_unplayable(protocol, space, &start)?;
+    refuse_unplayable(&study.loaded, space, &start)?;
     let pairs = explore::pairs_csv(search).map_err(Failure::input)?;
     let (confirmed, seed) = following((own.id.as_str(), own.seed), "confirmation", asked.seed);
     let text = with_values(PROTOCOL, &confirmed, seed)?;
@@ -186,22 +185,15 @@ fn refuse_unasked(search: &Exploration, include: Include) -> Result<(), Failure>
 
 /// Refuses a start that `study check` would refuse as a realization of the confirmation.
 fn refuse_unplayable(
-    protocol: &Protocol,
+    loaded: &Loaded,
     space: &SpaceRules,
     start: &Realization,
 ) -> Result<(), Failure> {
-    if protocol.device.uncertified.as_ref().is_some_and(|u| u.play) {
+    let Some(why) = loaded.refusal(start) else {
         return Ok(());
-    }
-    let certificate = start.certificate();
-    let danger = safe_play::refusal(start, &safe_play::Device::default());
-    let why = match danger {
-        _ if !certificate.passes() => format!("it can put energy into a hand: {certificate}"),
-        Some(danger) => format!("it is not safe to play: {danger}"),
-        None => return Ok(()),
     };
     Err(Failure::input(format!(
-        "the table with which the search began, {}, cannot be compared with its best point: {why}",
+        "the table with which the search began, {}, cannot be compared with its best point: it {why}",
         Untrusted(&space.from)
     ))
     .hint("compare the best point with a table that passes: `study new DIR --kind abx`, with both as its realizations, and name the search in its `[confirms]`"))
@@ -298,7 +290,7 @@ mod tests {
         let mut loaded = load::load(folder.path()).unwrap();
         let space = &loaded.protocol.spaces[0];
         let start = loaded.start_of(space).unwrap();
-        assert!(refuse_unplayable(&loaded.protocol, space, &start).is_ok());
+        assert!(refuse_unplayable(&loaded, space, &start).is_ok());
         // With detent 1 and without friction a point is the start, and no other one.
         let alike = loaded
             .levels
@@ -307,12 +299,12 @@ mod tests {
         assert_eq!(alike.count(), 1);
         let mut active = start.clone();
         active.positive.f0_n.iter_mut().for_each(|n| *n -= 100.0);
-        let refused = refuse_unplayable(&loaded.protocol, space, &active).unwrap_err();
+        let refused = refuse_unplayable(&loaded, space, &active).unwrap_err();
         let words = "models/static.toml, cannot be compared with its best point: it can put energy into a hand";
         assert!(refused.message.contains(words), "{}", refused.message);
         let mut rough = start;
         rough.positive.f0_n.iter_mut().for_each(|n| *n += 10.0);
-        let refused = refuse_unplayable(&loaded.protocol, space, &rough).unwrap_err();
+        let refused = refuse_unplayable(&loaded, space, &rough).unwrap_err();
         assert!(
             refused.message.contains("it is not safe to play"),
             "{}",
@@ -327,6 +319,6 @@ mod tests {
         );
         fs::write(folder.path().join("protocol.toml"), permitted).unwrap();
         loaded = load::load(folder.path()).unwrap();
-        assert!(refuse_unplayable(&loaded.protocol, &space, &active).is_ok());
+        assert!(refuse_unplayable(&loaded, &space, &active).is_ok());
     }
 }

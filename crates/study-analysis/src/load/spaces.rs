@@ -26,6 +26,26 @@ impl Loaded {
             _ => Some(table.at_lever(self.protocol.device.lever_mm?)),
         }
     }
+
+    /// Why `study check` would refuse a table as a realization, in words after "it"; `None` if it would not, as where
+    /// uncertified tables may be played.
+    pub fn refusal(&self, table: &Realization) -> Option<String> {
+        if self
+            .protocol
+            .device
+            .uncertified
+            .as_ref()
+            .is_some_and(|u| u.play)
+        {
+            return None;
+        }
+        let certificate = table.certificate();
+        if !certificate.passes() {
+            return Some(format!("can put energy into a hand: {certificate}"));
+        }
+        let danger = safe_play::refusal(table, &safe_play::Device::default())?;
+        Some(format!("is not safe to play: {danger}"))
+    }
 }
 
 /// By which rule points pass. A study keeps the one with which it began, so that its journals read as they did.
