@@ -8,7 +8,8 @@ document rather than being fast. `study` itself does not use it.
 
 prints `trial,first,second` for somebody who prefers the lower point every time;
 with `--answers FILE` (a number for each trial: the preferred point) it prints
-the pairs up to the one that follows the last answer.
+the pairs up to the one that follows the last answer. `--left-out 7@3,4@5` leaves
+out point 7 after three trials and point 4 after five.
 """
 
 import argparse
@@ -145,7 +146,7 @@ class Model:
         quadratic = sum(x * y for x, y in zip(s, g))
         self.evidence = log - 0.5 * quadratic - sum(math.log(l[i][i]) for i in range(m))
 
-    def next_pair(self, acquire):
+    def next_pair(self, acquire, may):
         rows = [[self.k(a, j) - self.k(b, j) for j in range(self.n)] for a, b in self.answers]
         mean = [sum(s * row[j] for s, row in zip(self.s, rows)) for j in range(self.n)]
         whitened = [forward(self.l, [r * row[j] for r, row in zip(self.root, rows)]) for j in range(self.n)]
@@ -154,9 +155,10 @@ class Model:
             return self.k(i, j) - sum(x * y for x, y in zip(whitened[i], whitened[j]))
 
         if acquire == "challenger":
-            most = max(mean)
-            best = next(i for i, m in enumerate(mean) if m >= most - 1e-9 * max(abs(most), 1.0))
-            others = [j for j in range(self.n) if j != best]
+            most = max(m for i, m in enumerate(mean) if may[i])
+            tied = most - 1e-9 * max(abs(most), 1.0)
+            best = next(i for i, m in enumerate(mean) if may[i] and m >= tied)
+            others = [j for j in range(self.n) if j != best and may[j]]
             promises = []
             for j in others:
                 variance = covariance(best, best) + covariance(j, j) - 2 * covariance(best, j)
@@ -166,7 +168,7 @@ class Model:
             other = others[next(i for i, promise in enumerate(promises) if promise >= tied)]
             return min(best, other), max(best, other)
 
-        pairs = [(a, b) for b in range(self.n) for a in range(b)]
+        pairs = [(a, b) for b in range(self.n) for a in range(b) if may[a] and may[b]]
         values = []
         for a, b in pairs:
             spread = math.sqrt(max(0.0, covariance(a, a) + covariance(b, b) - 2 * covariance(a, b)))
@@ -187,7 +189,7 @@ def kernels(dimensions):
             yield length * root, sd, -0.5 * ((length != 0.4) + (sd != 2.0))
 
 
-def next_pair(lattice, answers, acquire):
+def next_pair(lattice, answers, acquire, out):
     index = {point: i for i, point in enumerate(lattice.certified)}
     coordinates = [lattice.coordinates(point) for point in lattice.certified]
     inner = [(index[a], index[b]) for a, b in answers]
@@ -196,7 +198,7 @@ def next_pair(lattice, answers, acquire):
         model = Model(coordinates, length, sd, inner)
         if model.evidence + weight > best_value + 1e-9:
             best, best_value = model, model.evidence + weight
-    a, b = best.next_pair(acquire)
+    a, b = best.next_pair(acquire, [point not in out for point in lattice.certified])
     return lattice.certified[a], lattice.certified[b]
 
 
@@ -209,6 +211,7 @@ def main():
     parser.add_argument("--start", type=int, required=True)
     parser.add_argument("--acquire", choices=["challenger", "eubo"], default="challenger")
     parser.add_argument("--trials", type=int, required=True)
+    parser.add_argument("--left-out", default="", help="points that are left out, with the trials before that")
     parser.add_argument("--answers", help="a file with the preferred point of each trial, one a line")
     arguments = parser.parse_args()
     numbers = lambda text: [int(word) for word in text.split(",") if word]
@@ -219,9 +222,19 @@ def main():
     if arguments.answers:
         with open(arguments.answers, encoding="utf-8") as file:
             preferred = [int(line) for line in file if line.strip()]
-    answers = []
+    left_out = [tuple(map(int, word.split("@"))) for word in arguments.left_out.split(",") if word]
+    answers, turn = [], 0
     for trial in range(arguments.trials):
-        pair = planned[trial] if trial < arguments.start else next_pair(lattice, answers, arguments.acquire)
+        out = {point for point, after in left_out if after <= trial}
+        turns = [(turn + k) % len(planned) for k in range(len(planned))]
+        free = [k for k in turns if not out & set(planned[k])]
+        if free:
+            turn, pair = free[0], planned[free[0]]
+        else:
+            pair = tuple([point for point in lattice.certified if point not in out][:2])
+        turn += 1
+        if trial >= arguments.start:
+            pair = next_pair(lattice, answers, arguments.acquire, out)
         print(f"{trial + 1},{pair[0]},{pair[1]}")
         if preferred is None:
             answers.append(pair)

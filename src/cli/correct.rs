@@ -4,7 +4,7 @@ use super::{Console, Failure, study_folder};
 use std::path::PathBuf;
 use study_analysis::load;
 use study_base::text::{ParticipantId, QuestionId, Untrusted};
-use study_plan::protocol::Answer;
+use study_plan::protocol::{Answer, Seat};
 use study_session::store::{self, AnswerCorrection, StudyFolder};
 
 /// Arguments of `study correct`.
@@ -73,12 +73,37 @@ fn of_id(
     console: &mut Console,
 ) -> Result<String, Failure> {
     let to = ParticipantId::new(to).map_err(Failure::input)?;
+    refuse_searcher(study, from, &to)?;
     for notice in study.correct_id(from, &to, reason, study_folder::now())? {
         console.say(notice);
     }
     Ok(format!(
         "{from} is {to} from now on; the journal has both. `study analyze` and copies elsewhere still have {from} until they are made again.\n"
     ))
+}
+
+/// Refuses the id of somebody who took part in the search that the study confirms: they cannot take part in it.
+fn refuse_searcher(
+    study: &StudyFolder,
+    from: &ParticipantId,
+    to: &ParticipantId,
+) -> Result<(), Failure> {
+    let confirms = load::frozen(study)?.protocol.confirms;
+    let Some(search) = confirms.filter(|search| search.was_searcher(to)) else {
+        return Ok(());
+    };
+    let sessions = study.sessions()?;
+    let mut own = sessions.iter().filter(|s| s.participant == *from);
+    if own.all(|s| s.seat.is_some_and(Seat::is_simulated)) {
+        return Ok(());
+    }
+    Err(Failure::input(format!(
+        "{to} took part in the search `{}`, which this study confirms, and cannot be {from}",
+        Untrusted(&search.study)
+    ))
+    .hint(format!(
+        "if it was them, leave their answers out: study participant RESULTS {from} --state excluded --reason TEXT"
+    )))
 }
 
 fn of_answer(

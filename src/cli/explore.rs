@@ -1,7 +1,7 @@
 //! `study explore`: what a search found.
 
 use super::include::{Who, include};
-use super::{Console, Failure};
+use super::{Console, Failure, study_folder};
 use std::fs;
 use std::path::PathBuf;
 use study_analysis::study::Study;
@@ -31,9 +31,11 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             "`study new --kind search` writes such a study; `study analyze` analyzes all others",
         ));
     }
+    study_folder::warn(&study.folder, &study.damage()?, console);
+    let whole = study_folder::whole(&study.folder, &study.sessions);
     console.out(explore::text(&found))?;
     let Some(dir) = &args.out else {
-        return Ok(());
+        return whole;
     };
     fs::create_dir_all(dir).map_err(|e| Failure::file(dir, &e))?;
     for own in &found {
@@ -48,5 +50,5 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             console.say(format!("wrote {}", Untrusted(&shown)));
         }
     }
-    Ok(())
+    whole
 }

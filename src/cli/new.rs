@@ -5,11 +5,12 @@ mod confirm;
 use super::console::shell_command;
 use super::include::{Who, include};
 use super::{Console, Failure, schema};
+use confirm::Asked;
 use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use study_analysis::load;
-use study_base::text::{Untrusted, counted};
+use study_base::text::{PartId, Untrusted, counted};
 use study_plan::protocol::file;
 
 /// The files of a new study: a commented protocol and three of the paper's realizations.
@@ -133,6 +134,9 @@ pub(super) struct Args {
     /// Also include these sessions of the search
     #[arg(long, value_name = "WHO", value_delimiter = ',', requires = "confirm")]
     include: Vec<Who>,
+    /// The part whose search is confirmed, in a study with several
+    #[arg(long, value_name = "NAME", requires = "confirm")]
+    part: Option<PartId>,
     /// What a trial is
     #[arg(long, value_enum, default_value_t = TrialKind::Rating, conflicts_with = "from")]
     kind: TrialKind,
@@ -140,6 +144,9 @@ pub(super) struct Args {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=MAX_SEED))]
     seed: Option<u64>,
 }
+
+/// The longest id of a study.
+const MAX_ID: usize = 64;
 
 /// The largest integer of TOML.
 const MAX_SEED: u64 = i64::MAX as u64;
@@ -153,7 +160,13 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let seed = args.seed.unwrap_or_else(of_today);
     let mut files = match &args.from {
         Some(results) if args.confirm => {
-            confirm::confirmation(results, include(&args.include), (&today.to_string(), seed))?
+            let asked = Asked {
+                include: include(&args.include),
+                part: args.part.as_ref(),
+                today: &today.to_string(),
+                seed,
+            };
+            confirm::confirmation(results, &asked, console)?
         }
         Some(results) => replication(results, &today.to_string(), seed)?,
         None => starter(dir, seed, args.kind)?,
@@ -202,9 +215,7 @@ fn replication(results: &Path, today: &str, seed: u64) -> Result<Files, Failure>
     let (folder, version) = frozen(results)?;
     let loaded = load::load_frozen(&folder.join(load::FILE_NAME))?;
     let study = &loaded.protocol.study;
-    let mut id = format!("{}-replication", study.id);
-    id.truncate(64);
-    let seed = if seed == study.seed { seed + 1 } else { seed };
+    let (id, seed) = following((study.id.as_str(), study.seed), "replication", seed);
     let mut files = loaded.files;
     let Some((_, bytes)) = files.first_mut() else {
         return Err(Failure::input("the frozen protocol is empty"));
@@ -219,6 +230,26 @@ fn replication(results: &Path, today: &str, seed: u64) -> Result<Files, Failure>
     );
     *bytes = (origin + &text).into_bytes();
     Ok(files)
+}
+
+/// Id and seed of a study that follows another one, of which neither is that of the other.
+fn following((id, own_seed): (&str, u64), what: &str, seed: u64) -> (String, u64) {
+    let named = |most: usize, end: &str| {
+        // Ids are ASCII.
+        let begin = id.get(..most - end.len()).unwrap_or(id);
+        format!("{}{end}", begin.trim_end_matches('-'))
+    };
+    let next = named(MAX_ID, &format!("-{what}"));
+    let next = match next == id {
+        true => named(MAX_ID, &format!("-{what}-2")),
+        false => next,
+    };
+    let seed = match seed == own_seed {
+        true if seed == MAX_SEED => seed - 1,
+        true => seed + 1,
+        false => seed,
+    };
+    (next, seed)
 }
 
 /// The folder of a study's newest frozen protocol, and its version.
@@ -300,7 +331,7 @@ fn study_id(name: &str) -> String {
             id.push('-');
         }
     }
-    id.truncate(64);
+    id.truncate(MAX_ID);
     let id = id.trim_end_matches('-');
     if id.is_empty() {
         "my-study".to_owned()
@@ -345,6 +376,21 @@ mod tests {
         assert_eq!(study_id("Turn signal (v2)"), "turn-signal-v2");
         assert_eq!(study_id("…"), "my-study");
         assert!(study_id(&"x".repeat(100)).len() == 64);
+    }
+
+    #[test]
+    fn a_study_that_follows_another_has_an_id_and_a_seed_of_its_own() {
+        let next = |id: &str, own, seed| following((id, own), "replication", seed);
+        assert_eq!(next("s", 1, 7), ("s-replication".to_owned(), 7));
+        assert_eq!(next("s", 7, 7).1, 8);
+        assert_eq!(next("s", MAX_SEED, MAX_SEED).1, MAX_SEED - 1);
+        let long = "x".repeat(64);
+        let (once, _) = next(&long, 1, 2);
+        assert_eq!(once, format!("{}-replication", "x".repeat(52)));
+        let (twice, _) = next(&once, 1, 2);
+        assert_eq!(twice, format!("{}-replication-2", "x".repeat(50)));
+        assert!(once.len() == 64 && twice.len() == 64);
+        assert_eq!(next(&format!("{}-y", "x".repeat(51)), 1, 2).0.len(), 63);
     }
 
     #[test]

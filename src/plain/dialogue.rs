@@ -346,15 +346,16 @@ impl Dialogue {
                 claiming: false,
                 ..
             } => self.identify(line.trim(), participant, operator),
-            Screen::ResumeChoice { .. } => match key.as_str() {
-                "b" => Ok(vec![Input::Resume(Choice::RestartBlock)]),
+            Screen::ResumeChoice { restart, .. } => match key.as_str() {
+                "b" if *restart => Ok(vec![Input::Resume(Choice::RestartBlock)]),
                 "c" => Ok(vec![Input::Resume(Choice::Continue)]),
                 "d" => self.sure(
                     "Does the participant drop out?",
                     vec![Input::Resume(Choice::DropOut)],
                     view,
                 ),
-                _ => say("Type b, c or d."),
+                _ if *restart => say("Type b, c or d."),
+                _ => say("Type c or d."),
             },
             Screen::Consent { .. } => match yes_or_no(&key, &view.words) {
                 Some(true) => Ok(vec![Input::Consent(true)]),

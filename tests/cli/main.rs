@@ -10,6 +10,7 @@ mod protocol_check;
 mod protocol_docs;
 mod protocol_schema;
 mod schema_install;
+mod searchers;
 mod spaces;
 #[path = "../support/mod.rs"]
 mod support;

@@ -34,7 +34,10 @@ fn a_space_of_which_some_points_pass_is_used_and_drawn() {
         said.contains("of the 81 points of the space `switch` are never presented"),
         "{said}"
     );
-    assert!(said.contains("need more than 12 N at rest"), "{said}");
+    assert!(
+        said.contains("need more than 12 N, at rest or up to their trained speed"),
+        "{said}"
+    );
     // Friction by the sign of the speed that no damping confines is refused, as it is of a realization.
     let (code, strong) = checked(AXES, "detent = [0.4, 1.2], friction = [0.0, 5.0]");
     assert_eq!(code, 0, "{strong}");
@@ -45,6 +48,19 @@ fn a_space_of_which_some_points_pass_is_used_and_drawn() {
     );
     assert!(said.contains("######### #########"), "{said}");
     assert!(said.contains("........."), "{said}");
+}
+
+/// The table of the template has no damping.
+#[test]
+fn an_axis_that_changes_nothing_is_warned_about() {
+    let (code, said) = checked(AXES, "detent = [0.4, 1.2], b = [0.5, 2.0]");
+    assert_eq!(code, 0, "{said}");
+    let words =
+        "the axis `b` of the space `switch` changes nothing: all of its levels have the same table";
+    assert!(said.contains(words), "{said}");
+    assert!(!said.contains("the axis `detent`"), "{said}");
+    let (_, said) = checked("", "");
+    assert!(!said.contains("changes nothing"), "{said}");
 }
 
 #[test]
@@ -127,6 +143,8 @@ fn a_search_is_rehearsed_verified_and_explored() {
     let path = at.join("s/protocol.toml");
     let text = fs::read_to_string(&path).unwrap();
     let text = text.replace("grid = 9", "grid = 5");
+    let text = text.replace("gap_s = 1.0", "gap_s = 0.8");
+    let text = text.replace("max_s = 6 }", "max_s = 5.5, replays = 1 }");
     let text = text.replace(
         "Which one felt more like a real switch?",
         "Which one felt more \\\"alive\\\"?",
@@ -142,6 +160,7 @@ fn a_search_is_rehearsed_verified_and_explored() {
         "SD between people",
         "posterior SD",
         "20 pairs: best at detent ",
+        "SIMULATED participants are included.",
     ] {
         assert!(said.contains(expected), "{expected}: {said}");
     }
@@ -196,10 +215,28 @@ fn confirmed(at: &Path, pairs: &str) {
         "seed = 7",
         "study = \"s\"",
         "searchers = []",
+        "better-pairs.csv, which study explore --include simulated --out writes",
+        "simulated = true",
         "force_n = 12.0",
     ] {
         assert!(text.contains(expected), "{expected}: {text}");
     }
+    // Both parts are felt as the search was.
+    for expected in [
+        "gap_s = 0.8 ",
+        "exposure = { min_s = 1, max_s = 5.5, replays = 1 }",
+    ] {
+        assert_eq!(text.matches(expected).count(), 2, "{expected}: {text}");
+    }
+    // Not without being asked for.
+    let (code, _, said) = study(&["new", "d", "--from", "r", "--confirm"], at);
+    assert_eq!(code, 1);
+    assert!(
+        said.contains("only simulated participants have searched in `better`")
+            && said.contains("--include simulated"),
+        "{said}"
+    );
+    assert!(!at.join("d").exists());
     let file = |path: &str| fs::read(at.join(path)).unwrap();
     assert_eq!(
         file("c/models/reference.toml"),
@@ -210,14 +247,65 @@ fn confirmed(at: &Path, pairs: &str) {
     let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
     let sentence = "confirms, on participants who did not search, what the part better of the study s found to be best: switch.";
     assert!(said.contains(sentence), "{said}");
+    let simulated = "SIMULATED participants searched";
+    assert!(said.contains(simulated), "{said}");
     let page = fs::read_to_string(at.join("k/s-confirmation/analysis/report.html")).unwrap();
     assert!(page.contains("No answer of the search is in this analysis"));
+    assert!(page.contains(simulated));
     run(&["preregister", "c", "--date", "2026-11-27"]);
     let declared = fs::read_to_string(at.join("c/preregistration.md")).unwrap();
     assert!(
-        declared.contains("on participants who did not search"),
+        declared.contains("on participants who did not search") && declared.contains(simulated),
         "{declared}"
     );
+}
+
+/// Each of several searches is confirmed by itself.
+#[test]
+fn one_of_several_searches_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let (code, _, said) = study(&["new", "s", "--kind", "search", "--seed", "7"], at);
+    assert_eq!(code, 0, "{said}");
+    let path = at.join("s/protocol.toml");
+    let text = fs::read_to_string(&path).unwrap();
+    let text = text.replace("grid = 9", "grid = 3");
+    let text = text.replace("trials = 40, start = 8", "trials = 6, start = 4");
+    let (from, to) = (
+        text.find("[[parts]]").unwrap(),
+        text.find("[analysis]").unwrap(),
+    );
+    let second = text[from..to].replace("\"better\"", "\"softer\"");
+    let both = format!("{}{second}{}", &text[..to], &text[to..]);
+    fs::write(&path, both).unwrap();
+    let rehearsed = ["rehearse", "s", "--participants", "1", "--out", "r"];
+    assert_eq!(study(&rehearsed, at).0, 0);
+    let confirm = |more: &[&str]| {
+        let head = [
+            "new",
+            "c",
+            "--from",
+            "r",
+            "--confirm",
+            "--include",
+            "simulated",
+        ];
+        study(&[&head[..], more].concat(), at)
+    };
+    let (code, _, said) = confirm(&[]);
+    assert_eq!(code, 1, "{said}");
+    assert!(said.contains("has 2 searches"), "{said}");
+    assert!(said.contains("--part: better, softer"), "{said}");
+    let (code, _, said) = confirm(&["--part", "other"]);
+    assert_eq!(code, 1, "{said}");
+    assert!(
+        said.contains("the part `other` of the study `s` is no search"),
+        "{said}"
+    );
+    let (code, _, said) = confirm(&["--part", "softer"]);
+    assert_eq!(code, 0, "{said}");
+    let text = fs::read_to_string(at.join("c/protocol.toml")).unwrap();
+    assert!(text.contains("part = \"softer\""), "{text}");
 }
 
 fn no_search(at: &Path) {

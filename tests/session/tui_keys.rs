@@ -415,6 +415,7 @@ fn consent_and_drop_out_are_confirmed() {
         gap_h: 5.0,
         done: 1,
         total: Some(15),
+        restart: true,
     };
     let mut desk = Desk::with(old);
     assert_eq!(desk.types("b"), [Input::Resume(Choice::RestartBlock)]);

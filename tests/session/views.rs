@@ -246,6 +246,7 @@ pub(crate) fn screens() -> Vec<(&'static str, View)> {
                 gap_h: 19.25,
                 done: 6,
                 total: Some(15),
+                restart: true,
             }),
         ),
         (

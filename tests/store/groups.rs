@@ -115,6 +115,8 @@ fn searchers_do_not_confirm_their_search() {
             pairs_sha256: "0".repeat(64),
             best: ModelId::new("switch.7").unwrap(),
             searchers: vec![ParticipantId::new("P01").unwrap()],
+            pilot: false,
+            simulated: false,
         }),
         ..Plan::default()
     };

@@ -33,6 +33,8 @@ mod join;
 mod recordings;
 mod spaces;
 
+use spaces::Judged;
+
 pub use frozen::{FrozenError, changes, damage, frozen, frozen_version, frozen_versions};
 pub use recordings::{Deliveries, RecordingError, deliveries};
 
@@ -191,8 +193,22 @@ pub fn load_for(path: &Path, results: &Path) -> Result<Loaded, LoadError> {
 /// # Errors
 /// As [`load`].
 pub fn load_frozen(path: &Path) -> Result<Loaded, LoadError> {
-    let (loaded, findings) = open(path, Purpose::Data);
+    let (loaded, findings) = open(path, Purpose::Data(Judged::Now));
     loaded.ok_or(LoadError(findings))
+}
+
+/// The same of a study whose manifest has these fingerprints: with the points of its spaces that passed when it began.
+fn load_begun(path: &Path, prints: &Fingerprints) -> Result<Loaded, LoadError> {
+    let now = load_frozen(path)?;
+    if now.protocol.spaces.is_empty() || now.fingerprints == *prints {
+        return Ok(now);
+    }
+    let mut earlier = Judged::EARLIER.into_iter();
+    let found = earlier.find_map(|judged| {
+        let loaded = open(path, Purpose::Data(judged)).0;
+        loaded.filter(|loaded| loaded.fingerprints == *prints)
+    });
+    Ok(found.unwrap_or(now))
 }
 
 /// Loads the protocol at `path`; returns all errors and warnings, and the protocol if
@@ -208,24 +224,33 @@ enum Purpose<'a> {
     Design,
     /// Sessions of a study that may have started in this folder.
     Sessions(&'a Path),
-    /// Reading the data of a study that has started.
-    Data,
+    /// Reading the data of a study that has started, with the points of its spaces that passed by this rule.
+    Data(Judged),
 }
 
 impl Purpose<'_> {
+    /// The rule by which points passed, if data are read and nothing is to be played.
+    fn of_data(self) -> Option<Judged> {
+        match self {
+            Self::Data(judged) => Some(judged),
+            Self::Design | Self::Sessions(_) => None,
+        }
+    }
+
     fn has_started(self, study: &str) -> bool {
         match self {
             Self::Design => false,
             Self::Sessions(results) => [results.join(study), results.to_owned()]
                 .iter()
                 .any(|folder| folder.join(layout::MANIFEST).symlink_metadata().is_ok()),
-            Self::Data => true,
+            Self::Data(_) => true,
         }
     }
 }
 
 fn open(path: &Path, purpose: Purpose<'_>) -> (Option<Loaded>, Vec<Findings>) {
-    let path = if path.is_dir() && purpose != Purpose::Data {
+    let data = purpose.of_data();
+    let path = if path.is_dir() && data.is_none() {
         path.join(FILE_NAME)
     } else {
         path.to_owned()
@@ -268,12 +293,12 @@ fn open(path: &Path, purpose: Purpose<'_>) -> (Option<Loaded>, Vec<Findings>) {
     others.turn(protocol.device.lever_mm);
     join::vaf(&mut protocol, &others, &spans, &mut findings);
     join::too_close(&protocol, &others, &mut findings);
-    if purpose != Purpose::Data {
+    if data.is_none() {
         join::certificates(&protocol, &others, &spans, &mut findings);
     }
-    let played = purpose != Purpose::Data;
+    let played = data.is_none();
     let mut levels = families::realizations(&protocol, &others, &spans, played, &mut findings);
-    let points = spaces::realizations(&mut protocol, &others, &spans, played, &mut findings);
+    let points = spaces::realizations(&mut protocol, &others, &spans, data, &mut findings);
     levels.extend(points);
     let orders = others.orders.take();
     // An order whose file is missing cannot be checked.

@@ -30,7 +30,7 @@ pub use source::{Site, SiteDevice, Source};
 pub use traces::Trace;
 
 use crate::analyze::psychophysics::search::{Exploration, explorations};
-use crate::analyze::psychophysics::{PartAnalysis, StudyData, parts};
+use crate::analyze::psychophysics::{PartAnalysis, StudyData, parts, searchers_of};
 use crate::analyze::{
     self, Analysis, Deviation, Include, OrdinalEffort, Progress, Rules, Warning,
     analyze_with_progress,
@@ -194,6 +194,7 @@ impl Study {
         });
         // Before all other warnings.
         let warnings = warnings.chain(self.clock_jumps());
+        let warnings = warnings.chain(self.with_data(|data| searchers_of(data, options.include)));
         analysis.warnings.splice(0..0, warnings);
         Ok(Analyzed {
             source,

@@ -554,6 +554,7 @@ fn identity(device: &message::Identity) -> Option<Identity> {
         mechanisms: device.constants.is_some_and(|told| told.features.mechanism),
         elements: device.constants.is_some_and(|told| told.features.elements),
         stiffness_n_per_mm: Some(device.stiffness_n_per_mm),
+        damping_n_s_per_mm: Some(device.damping_n_s_per_mm),
         stroke_mm: Some(device.stroke_mm),
         firmware: Some(display_name(&device.firmware)),
     })

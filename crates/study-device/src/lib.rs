@@ -54,6 +54,8 @@ pub struct Identity {
     pub elements: bool,
     /// Largest stiffness of a certified realization, N/mm, if it tells.
     pub stiffness_n_per_mm: Option<f64>,
+    /// Largest damping of a certified realization, N·s/mm, if it tells.
+    pub damping_n_s_per_mm: Option<f64>,
     /// Positions that its handle can reach, mm, if it tells.
     pub stroke_mm: Option<[f64; 2]>,
     /// The version of its firmware, or of a program, if it tells it.

@@ -89,6 +89,7 @@ impl Device for Manual {
             mechanisms: false,
             elements: false,
             stiffness_n_per_mm: None,
+            damping_n_s_per_mm: None,
             stroke_mm: None,
             firmware: None,
         }

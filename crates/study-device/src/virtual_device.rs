@@ -249,6 +249,7 @@ impl Device for VirtualDevice {
             mechanisms: true,
             elements: true,
             stiffness_n_per_mm: None,
+            damping_n_s_per_mm: None,
             stroke_mm: None,
             firmware: None,
         })

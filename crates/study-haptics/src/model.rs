@@ -7,9 +7,11 @@
 //! ([`study_wire::predict`]) and the passivity certificate ([`certificate`]) are shared
 //! with the firmware.
 
+mod alike;
 pub mod coverage;
 mod elements;
 pub mod file;
+mod strongest;
 mod units;
 
 pub use elements::Elements;

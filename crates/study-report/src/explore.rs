@@ -1,5 +1,6 @@
 //! What a search found, as text and as tables. There are no p values: a search decides nothing.
 
+use crate::part_answers::included;
 use std::fmt::Write as _;
 use study_analysis::analyze::psychophysics::search::{Exploration, Explored};
 use study_base::text::{Untrusted, counted};
@@ -23,21 +24,33 @@ pub fn text(explorations: &[Exploration]) -> String {
             space.lattice.certified().len(),
             space.lattice.len()
         );
-        if found.participants.is_empty() {
+        if let Some(banner) = included(found.simulated, found.pilot) {
+            let _ = writeln!(out, "{banner}");
+        }
+        for rule in found.exclusions.iter().filter(|rule| rule.rows > 0) {
+            let (rows, who) = (
+                counted(rule.rows, "answer", "answers"),
+                counted(rule.participants, "participant", "participants"),
+            );
+            let _ = writeln!(out, "The rule {} excludes {rows} of {who}.", rule.rule);
+        }
+        if found.searches.is_empty() {
             out.push_str("\nNo participant who counts has an answer.\n");
         }
         if let Some(all) = &found.population {
-            let who = counted(found.participants.len(), "participant", "participants");
+            let people = found.people();
+            let mut who = counted(people, "participant", "participants");
+            if people < found.searches.len() {
+                let _ = write!(who, " in {} sessions", found.searches.len());
+            }
             let _ = writeln!(out, "\n{who}: {}", best(space, all.best, &all.mean));
-            maps(
-                &mut out,
-                space,
-                (&all.mean, &all.sd),
-                all.best,
-                "SD between people",
-            );
+            let between = match people {
+                1 => "SD between sessions",
+                _ => "SD between people",
+            };
+            maps(&mut out, space, (&all.mean, &all.sd), all.best, between);
         }
-        for own in &found.participants {
+        for own in &found.searches {
             let _ = writeln!(
                 out,
                 "\n{}, session {}, {}: {}",
@@ -54,6 +67,16 @@ pub fn text(explorations: &[Exploration]) -> String {
                 "posterior SD",
             );
             order(&mut out, own);
+            if !own.left_out.is_empty() {
+                let points = own.left_out.iter().map(|point| (point + 1).to_string());
+                let points: Vec<String> = points.collect();
+                let _ = writeln!(
+                    out,
+                    "{:>9}  {}: the device failed there",
+                    "left out",
+                    points.join(", ")
+                );
+            }
         }
     }
     out
@@ -196,7 +219,7 @@ pub fn points_csv(found: &Exploration) -> Result<Vec<u8>, csv::Error> {
     if let Some(all) = &found.population {
         rows("", "", (&all.mean, &all.sd), all.best)?;
     }
-    for own in &found.participants {
+    for own in &found.searches {
         let session = own.session.to_string();
         rows(
             own.participant.as_str(),
@@ -215,7 +238,7 @@ pub fn points_csv(found: &Exploration) -> Result<Vec<u8>, csv::Error> {
 pub fn pairs_csv(found: &Exploration) -> Result<Vec<u8>, csv::Error> {
     let mut table = csv::Writer::from_writer(Vec::new());
     table.write_record(["participant", "session", "trial", "a", "b", "preferred"])?;
-    for own in &found.participants {
+    for own in &found.searches {
         for pair in &own.pairs {
             let [a, b] = pair.points.map(|point| (point + 1).to_string());
             table.write_record([

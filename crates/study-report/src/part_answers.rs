@@ -15,7 +15,12 @@ const MAX_LISTED: usize = 12;
 
 /// The banner of a part whose answers are not those of real participants.
 pub(super) fn banner(part: &PartAnalysis) -> Option<&'static str> {
-    match (part.simulated, part.pilot) {
+    included(part.simulated, part.pilot)
+}
+
+/// Who is included besides real participants.
+pub(super) fn included(simulated: bool, pilot: bool) -> Option<&'static str> {
+    match (simulated, pilot) {
         (true, true) => Some("SIMULATED participants and PILOTS are included."),
         (true, false) => Some("SIMULATED participants are included."),
         (false, true) => Some("PILOTS are included."),

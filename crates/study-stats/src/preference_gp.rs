@@ -111,7 +111,7 @@ impl Posterior {
     /// // The middle is preferred to both ends.
     /// let choices = [Choice { preferred: 2, other: 0 }, Choice { preferred: 2, other: 4 }];
     /// let posterior = Posterior::new(&points, &kernel, &choices)?;
-    /// assert_eq!(posterior.best_point(), 2);
+    /// assert_eq!(posterior.best_point(|_| true), Some(2));
     /// # Ok::<(), NoPosterior>(())
     /// ```
     pub fn new(

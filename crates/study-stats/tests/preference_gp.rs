@@ -103,7 +103,7 @@ fn the_posterior_is_that_of_a_generic_optimizer() {
         }
         for row in case.rows("best") {
             assert_eq!(
-                found.best_pair(),
+                found.best_pair(|_| true),
                 Some((row[0] as usize, row[1] as usize)),
                 "{name}"
             );

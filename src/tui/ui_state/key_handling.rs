@@ -143,11 +143,12 @@ impl UiState {
             Screen::Who {
                 claiming, roster, ..
             } => self.press_who(key, *claiming, roster.as_deref(), &view.words),
-            Screen::ResumeChoice { .. } => match key {
-                Key::Char('b' | 'B') => vec![Input::Resume(Choice::RestartBlock)],
+            Screen::ResumeChoice { restart, .. } => match key {
+                Key::Char('b' | 'B') if *restart => vec![Input::Resume(Choice::RestartBlock)],
                 Key::Char('c' | 'C') => vec![Input::Resume(Choice::Continue)],
                 Key::Char('d' | 'D') => self.confirm(Confirm::DropOut),
-                Key::Enter => self.notify("Choose b, c or d."),
+                Key::Enter if *restart => self.notify("Choose b, c or d."),
+                Key::Enter => self.notify("Choose c or d."),
                 _ => Vec::new(),
             },
             Screen::Consent { .. } => match key {

@@ -335,9 +335,16 @@ fn after_a_long_gap_the_operator_chooses() {
     let mut rig = left_at(&plain(), 5.0 * 3600.0, |rig| {
         rig.until_reference(4);
     });
-    let Screen::ResumeChoice { gap_h, done, total } = rig.view().screen else {
+    let Screen::ResumeChoice {
+        gap_h,
+        done,
+        total,
+        restart,
+    } = rig.view().screen
+    else {
         panic!("{:?}", rig.view().screen);
     };
+    assert!(restart);
     assert!((gap_h - 5.0).abs() < 1e-6);
     assert_eq!((done, total), (4, Some(6)));
     let before = rig.journal.len();

@@ -6,7 +6,7 @@ use crate::world;
 use study_base::text::{ModelId, QuestionId};
 use study_plan::procedure::search::RecordedPair;
 use study_plan::protocol::{Answer, Protocol, SpaceRules, Stimuli};
-use study_session::outcome::{Entry, Event};
+use study_session::outcome::{Choice, Entry, Event};
 use study_session::session::{Ending, Input, Screen};
 use study_session::store::{Frozen, StudyFolder};
 
@@ -136,6 +136,86 @@ fn a_search_after_a_fault_a_bad_trial_and_a_resume_is_the_one_without() {
         let mut rig = Rig::back(protocol.clone(), rig.journal.clone(), 60.0);
         end(&mut rig, &protocol);
         assert_eq!(compared(&rig, &protocol), expected, "{rule}");
+    }
+}
+
+/// A search is one block: restarting it would lose all of its answers.
+#[test]
+fn a_search_is_not_restarted_after_a_long_gap() {
+    let protocol = searching(MODEL);
+    let mut rig = Rig::new(protocol.clone());
+    go_on(&mut rig, &protocol, |rig, screen| {
+        done(rig) >= 6 && reference(screen)
+    });
+    rig.send(Input::Quit);
+    let mut rig = Rig::back(protocol.clone(), rig.journal.clone(), 9.0 * 3600.0);
+    rig.identify();
+    let restart = |rig: &Rig| match rig.view().screen {
+        Screen::ResumeChoice { restart, .. } => Some(restart),
+        _ => None,
+    };
+    assert_eq!(restart(&rig), Some(false));
+    rig.send(Input::Resume(Choice::RestartBlock));
+    assert_eq!(restart(&rig), Some(false));
+    assert!(
+        rig.view()
+            .notice
+            .unwrap()
+            .contains("a search is not restarted")
+    );
+    rig.send(Input::Resume(Choice::Continue));
+    assert_eq!(compared(&rig, &protocol).len(), 6);
+    end(&mut rig, &protocol);
+    assert_eq!(
+        rig.journal
+            .iter()
+            .filter(|e| matches!(e.event, Event::TrialDone { .. }))
+            .count(),
+        14
+    );
+}
+
+/// A device that fails whenever it plays one point costs two attempts, and no trial.
+#[test]
+fn a_search_goes_on_without_a_point_at_which_the_device_fails() {
+    for rule in [
+        MODEL,
+        r#"{ name = "sobol", trials = 14 }"#,
+        r#"{ name = "random", trials = 14 }"#,
+    ] {
+        let protocol = searching(rule);
+        let mut calm = Rig::new(protocol.clone());
+        end(&mut calm, &protocol);
+        let space = &protocol.spaces[0];
+        // The second point of a pair of the first trials, and one of a pair that the answers chose.
+        for at in [2, 9] {
+            let refused = space.realization(compared(&calm, &protocol)[at].pair[1]);
+            let plays = |rig: &Rig, screen: &Screen| {
+                let playing = matches!(screen, Screen::Playing { .. });
+                playing && rig.session.playing_model() == Some(&refused)
+            };
+            let mut rig = Rig::new(protocol.clone());
+            go_on(&mut rig, &protocol, plays);
+            rig.send(Input::DeviceFault("too fast".to_owned()));
+            go_on(&mut rig, &protocol, plays);
+            rig.send(Input::DeviceFault("too fast".to_owned()));
+            let left_out = |rig: &Rig| rig.count(|e| matches!(e, Event::PointLeftOut { .. }));
+            assert_eq!(left_out(&rig), 1, "{rule}");
+            // A trial that is marked as bad is felt again without the point.
+            go_on(&mut rig, &protocol, |rig, screen| {
+                done(rig) >= 1 && reference(screen)
+            });
+            rig.send(Input::MarkBad {
+                reason: "noise".to_owned(),
+            });
+            rig.send(Input::Quit);
+            let mut rig = Rig::back(protocol.clone(), rig.journal.clone(), 60.0);
+            go_on(&mut rig, &protocol, plays);
+            assert_eq!(rig.ending, Some(Ending::Finished), "{rule}");
+            assert_eq!(left_out(&rig), 1, "{rule}");
+            assert_eq!(rig.closed().values().flatten().count(), 14, "{rule}");
+            assert_eq!(verified(&protocol, &rig.journal), [""; 0], "{rule}");
+        }
     }
 }
 

@@ -4,6 +4,7 @@
 //! defines them.
 
 mod again;
+mod counting;
 pub(crate) mod decided;
 mod detection;
 mod discriminations;
@@ -40,6 +41,7 @@ pub(crate) use part_data::{asked, sessions_of};
 pub use preferences::{Choice, Preference, preferences};
 pub use scales::{MagnitudeRow, MushraRoles, MushraRow, magnitude, mushra};
 pub use study::parts;
+pub(crate) use study::searchers_of;
 pub(crate) use table::{PARTICIPANT, correct_column};
 pub use table::{TableError, TableKind, analyze_table, read_table};
 pub use tracks::{TrackData, TrackTrial, quest_plus, staircase, track_order};

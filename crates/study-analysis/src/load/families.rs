@@ -1,19 +1,20 @@
-//! The tables of families: every level is built before the session, and certified.
+//! The tables of families: every level is built before the session, and has to be as safe as a realization.
 
-use super::{OtherFiles, PERMIT};
+use super::{ANEW, OtherFiles, PERMIT};
 use std::collections::BTreeMap;
 use study_base::diagnostic::{Fault, Findings};
 use study_base::perception::force_jnd_n;
 use study_base::text::ModelId;
 use study_haptics::family::{self, Family, Passing};
 use study_haptics::model::Realization;
+use study_haptics::safe_play;
 use study_plan::protocol::check::Spans;
 use study_plan::protocol::fingerprint::family_file;
 use study_plan::protocol::{FamilyRules, Protocol, TrackRules, Vary};
 use study_wire::predict::{Motion, force_n};
 
 /// The realizations of all levels and standards. Reports families that do not fit
-/// together and, if they are to be `played`, levels that fail their certificate.
+/// together and, if they are to be `played`, levels that fail their certificate or are not safe to play.
 pub(super) fn realizations(
     protocol: &Protocol,
     others: &OtherFiles<'_>,
@@ -48,7 +49,7 @@ pub(super) fn realizations(
             let at = place("range").or_else(|| place("levels"));
             findings.faults.extend(
                 refused(protocol, rules, &family, &standards)
-                    .or_else(|| doubtful(protocol, rules, &family))
+                    .or_else(|| doubtful(protocol, rules, &family, &standards))
                     .map(|fault| fault.at(at)),
             );
         }
@@ -75,7 +76,17 @@ fn built(
     Some(Family::new(file("from")?, vary))
 }
 
-/// The fault of a family whose certificate fails in part, with the range that passes.
+/// The lowest and the highest level of a family and of the standards in it.
+fn ends(rules: &FamilyRules, standards: &[(ModelId, f64)]) -> (f64, f64) {
+    let ladder = (rules.ladder.first(), rules.ladder.last());
+    let levels = standards.iter().map(|(_, level)| *level);
+    levels.fold(ladder, |(low, high), level| {
+        (low.min(level), high.max(level))
+    })
+}
+
+/// The fault of a family whose certificate fails in part, with the range that passes, or of which some levels are not safe to
+/// play.
 fn refused(
     protocol: &Protocol,
     rules: &FamilyRules,
@@ -85,16 +96,18 @@ fn refused(
     if protocol.device.uncertified.as_ref().is_some_and(|u| u.play) {
         return None;
     }
-    let of_standards = standards.iter().map(|(_, level)| *level);
-    let (mut low, mut high) = (rules.ladder.first(), rules.ladder.last());
-    for level in of_standards {
-        (low, high) = (low.min(level), high.max(level));
-    }
+    let (low, high) = ends(rules, standards);
     let id = &rules.id;
     // The ends decide; a table at margin 0 is certified for itself, too.
-    let built = rules.realizations().map(|(_, level)| level);
+    let built = || rules.realizations().map(|(_, level)| level);
     let fails = |level: &f64| !family.at(*level).certificate().passes();
-    let failing = [low, high].into_iter().chain(built).find(fails)?;
+    let Some(failing) = [low, high].into_iter().chain(built()).find(fails) else {
+        let of_standards = standards.iter().map(|(_, level)| *level);
+        let mut levels: Vec<f64> = built().chain(of_standards).collect();
+        levels.sort_by(f64::total_cmp);
+        levels.dedup();
+        return unsafe_levels(rules, family, &levels);
+    };
     let label = family.at(failing).certificate().to_string();
     Some(match family.passing(low, high) {
         Passing::Between(from, to) => Fault::error(format!(
@@ -113,25 +126,48 @@ fn refused(
     })
 }
 
+/// The fault of a family of which some of these levels are refused as realizations are.
+fn unsafe_levels(rules: &FamilyRules, family: &Family, levels: &[f64]) -> Option<Fault> {
+    let danger = |level: &f64| {
+        let danger = safe_play::refusal(&family.at(*level), &safe_play::Device::default());
+        Some((*level, danger?))
+    };
+    let dangers: Vec<_> = levels.iter().filter_map(danger).collect();
+    let (level, danger) = dangers.first()?;
+    let (some, all) = (dangers.len(), levels.len());
+    let what = format!(
+        "{some} of the {all} levels of the family `{}` are not safe to play",
+        rules.id
+    );
+    let hint = match some < all {
+        true => format!("take a range without level {level}"),
+        false => ANEW.to_owned(),
+    };
+    let label = format!("level {level}: {danger}");
+    Some(Fault::error(what).label(label).hint(hint))
+}
+
 /// The warning of a family that the device clips, or whose levels cannot be told apart.
-fn doubtful(protocol: &Protocol, rules: &FamilyRules, family: &Family) -> Option<Fault> {
+fn doubtful(
+    protocol: &Protocol,
+    rules: &FamilyRules,
+    family: &Family,
+    standards: &[(ModelId, f64)],
+) -> Option<Fault> {
     let id = &rules.id;
     let (low, high) = (
         family.at(rules.ladder.first()),
         family.at(rules.ladder.last()),
     );
-    let most = |forces: Vec<f64>| {
-        forces
-            .into_iter()
-            .fold(0.0, |most: f64, f| most.max(f.abs()))
-    };
     let limit = protocol.device.limits.force_n.get();
     // The force is convex in the level: the largest is at an end.
-    let peak = most(forces(&low, &low, 0.0)).max(most(forces(&high, &high, 0.0)));
-    if peak > limit {
+    let (lowest, highest) = ends(rules, standards);
+    let strongest_n = [lowest, highest].map(|level| family.at(level).strongest_n());
+    let strongest_n = strongest_n[0].max(strongest_n[1]);
+    if strongest_n > limit {
         return Some(
             Fault::warning(format!(
-                "the family `{id}` needs up to {peak:.1} N at rest, and the device clips at {limit} N"
+                "the family `{id}` needs up to {strongest_n:.1} N up to its trained speed, and the device clips at {limit} N"
             ))
             .hint("take a smaller range, or a higher limit"),
         );
@@ -141,17 +177,23 @@ fn doubtful(protocol: &Protocol, rules: &FamilyRules, family: &Family) -> Option
         let pairs = forces(&high, &low, v)
             .into_iter()
             .zip(forces(&low, &low, v));
-        most(pairs.map(|(a, b)| a - b).collect())
+        pairs.fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()))
     };
     let span = difference(0.0).max(difference(fast)).max(difference(-fast));
     // A mass is felt in accelerations, of which nothing is known here.
-    let noticeable = force_jnd_n(peak);
+    let noticeable = force_jnd_n(strongest_at_rest_n(&low).max(strongest_at_rest_n(&high)));
     (span < noticeable && rules.vary != Vary::Mass).then(|| {
         Fault::warning(format!(
             "the levels of the family `{id}` differ by at most {span:.2} N, and {noticeable:.2} N is just noticeable"
         ))
         .hint("take a larger range")
     })
+}
+
+/// The largest force of a table at rest at its nodes, N.
+pub(super) fn strongest_at_rest_n(table: &Realization) -> f64 {
+    let forces = forces(table, table, 0.0).into_iter();
+    forces.fold(0.0, |most: f64, f| most.max(f.abs()))
 }
 
 /// Forces of a table at the nodes of another, in both directions, at a speed.

@@ -1,6 +1,6 @@
 //! The protocols that a study froze.
 
-use super::{LoadError, Loaded, load_frozen};
+use super::{LoadError, Loaded, load_begun, load_frozen};
 use study_plan::protocol::difference::{self, Change};
 use study_session::store::{Finding, SessionData, StoreError, StudyFolder, layout};
 
@@ -23,7 +23,11 @@ pub fn frozen(study: &StudyFolder) -> Result<Loaded, FrozenError> {
 /// [`FrozenError`].
 pub fn frozen_version(study: &StudyFolder, version: u32) -> Result<Loaded, FrozenError> {
     let file = layout::protocol(study.path(), version).join(layout::PROTOCOL);
-    Ok(load_frozen(&file)?)
+    let mut versions = study.manifest().versions.iter();
+    Ok(match versions.find(|known| known.version == version) {
+        Some(known) => load_begun(&file, &known.fingerprints)?,
+        None => load_frozen(&file)?,
+    })
 }
 
 /// What differs between the newest frozen protocol of a study and another.
@@ -64,7 +68,7 @@ pub fn frozen_versions(study: &StudyFolder, newest: Option<&Loaded>) -> Vec<Find
         let path = folder.join(layout::PROTOCOL);
         let prints = match newest {
             Some(loaded) if number == study.version() => Ok(loaded.fingerprints.clone()),
-            _ => load_frozen(&path).map(|loaded| loaded.fingerprints),
+            _ => load_begun(&path, &version.fingerprints).map(|loaded| loaded.fingerprints),
         };
         let what = match prints {
             Ok(_) if is_link => "a symbolic link in the place of a folder".to_owned(),

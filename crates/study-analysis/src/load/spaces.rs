@@ -1,12 +1,12 @@
 //! The tables of spaces: every point is built and certified before the session, and only those that pass can be presented.
 
-use super::OtherFiles;
-use super::families::forces;
+use super::families::strongest_at_rest_n;
+use super::{Loaded, OtherFiles};
 use std::collections::BTreeMap;
 use study_base::diagnostic::{Fault, Findings};
 use study_base::text::ModelId;
 use study_haptics::family::{self, Family, FamilyError};
-use study_haptics::model::Realization;
+use study_haptics::model::{Realization, Units};
 use study_haptics::safe_play;
 use study_plan::protocol::check::Spans;
 use study_plan::protocol::fingerprint::family_file;
@@ -14,6 +14,55 @@ use study_plan::protocol::{Axis, Protocol, SpaceRules, Vary};
 
 /// A space of which less than this share of the points can be presented is refused.
 const LEAST_SHARE: f64 = 0.25;
+
+impl Loaded {
+    /// The table that a space varies, as it is; `None` if its file cannot be read.
+    pub fn start_of(&self, space: &SpaceRules) -> Option<Realization> {
+        let (_, bytes) = self.files.iter().find(|(name, _)| *name == space.from)?;
+        let text = std::str::from_utf8(bytes).ok()?;
+        let table = study_haptics::model::file::parse(&space.from, text).0?;
+        match table.units {
+            Units::Linear => Some(table),
+            _ => Some(table.at_lever(self.protocol.device.lever_mm?)),
+        }
+    }
+
+    /// Why `study check` would refuse a table as a realization, in words after "it"; `None` if it would not, as where
+    /// uncertified tables may be played.
+    pub fn refusal(&self, table: &Realization) -> Option<String> {
+        if self
+            .protocol
+            .device
+            .uncertified
+            .as_ref()
+            .is_some_and(|u| u.play)
+        {
+            return None;
+        }
+        let certificate = table.certificate();
+        if !certificate.passes() {
+            return Some(format!("can put energy into a hand: {certificate}"));
+        }
+        let danger = safe_play::refusal(table, &safe_play::Device::default())?;
+        Some(format!("is not safe to play: {danger}"))
+    }
+}
+
+/// By which rule points pass. A study keeps the one with which it began, so that its journals read as they did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Judged {
+    /// The certificate, safe play, and the force over the trained range and speeds.
+    Now,
+    /// The certificate, safe play, and the force at rest at the nodes.
+    AtNodes,
+    /// The certificate, and the force at rest at the nodes.
+    WithoutSafePlay,
+}
+
+impl Judged {
+    /// The rules of earlier releases, the last one first.
+    pub(super) const EARLIER: [Self; 2] = [Self::AtNodes, Self::WithoutSafePlay];
+}
 
 /// What becomes of a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,12 +75,12 @@ enum Point {
 }
 
 /// The realizations of all points that can be presented, which the lattices of the protocol then have. Spaces of which
-/// too few can, or which these do not connect, are reported if they are to be `played`.
+/// too few can, or which these do not connect, are reported if they are to be played, which is by the rule of now.
 pub(super) fn realizations(
     protocol: &mut Protocol,
     others: &OtherFiles<'_>,
     spans: &Spans,
-    played: bool,
+    data: Option<Judged>,
     findings: &mut Findings,
 ) -> BTreeMap<ModelId, Realization> {
     let limit_n = protocol.device.limits.force_n.get();
@@ -54,14 +103,21 @@ pub(super) fn realizations(
                 continue;
             }
         };
-        let points: Vec<Point> = tables.iter().map(|table| judged(table, limit_n)).collect();
+        let rule = data.unwrap_or(Judged::Now);
+        let points = tables.iter().map(|table| judged(table, limit_n, rule));
+        let points: Vec<Point> = points.collect();
         let full = space.lattice.clone();
         // Of a space with fewer than two good points the lattice stays; it is refused below.
         let _ = space.certify(|at| points[full.point(at)] == Point::Good);
-        if played {
+        if data.is_none() {
             let fault =
                 refused(space, &points, limit_n).or_else(|| partial(space, &points, limit_n));
             findings.faults.extend(fault.map(|fault| fault.at(place())));
+            for axis in idle(space, &tables) {
+                let own = spans.get(&format!("{path}.axes.{}", axis.vary.as_str()));
+                let fault = changes_nothing(space, axis).at(own.cloned().or_else(place));
+                findings.faults.push(fault);
+            }
         }
         let tables = tables.into_iter().enumerate();
         levels.extend(
@@ -93,13 +149,18 @@ fn built(from: &Realization, axes: &[Axis]) -> Result<Vec<Realization>, FamilyEr
     })
 }
 
-fn judged(table: &Realization, limit_n: f64) -> Point {
-    let strongest = forces(table, table, 0.0).into_iter();
-    let peak_n = strongest.fold(0.0, |most: f64, f| most.max(f.abs()));
-    let is_unsafe = || safe_play::refusal(table, &safe_play::Device::default()).is_some();
+fn judged(table: &Realization, limit_n: f64, rule: Judged) -> Point {
+    let is_unsafe = || {
+        let judged = rule != Judged::WithoutSafePlay;
+        judged && safe_play::refusal(table, &safe_play::Device::default()).is_some()
+    };
+    let strongest_n = || match rule {
+        Judged::Now => table.strongest_n(),
+        Judged::AtNodes | Judged::WithoutSafePlay => strongest_at_rest_n(table),
+    };
     if !table.certificate().passes() || is_unsafe() {
         Point::Active
-    } else if peak_n > limit_n {
+    } else if strongest_n() > limit_n {
         Point::Strong
     } else {
         Point::Good
@@ -146,6 +207,37 @@ fn partial(space: &SpaceRules, points: &[Point], limit_n: f64) -> Option<Fault> 
     })
 }
 
+/// The axes of which all levels have the same table, whatever the others are.
+fn idle<'a>(space: &'a SpaceRules, tables: &[Realization]) -> Vec<&'a Axis> {
+    let lattice = &space.lattice;
+    let same = |axis: usize| {
+        tables.iter().enumerate().all(|(point, table)| {
+            let mut at = lattice.at(point);
+            at[axis] = 0;
+            table.is_alike(&tables[lattice.point(&at)])
+        })
+    };
+    let axes = space.axes.iter().enumerate();
+    axes.filter(|(axis, _)| same(*axis))
+        .map(|(_, axis)| axis)
+        .collect()
+}
+
+/// The warning of an axis that nobody can feel.
+fn changes_nothing(space: &SpaceRules, axis: &Axis) -> Fault {
+    let what = format!(
+        "the axis `{}` of the space `{}` changes nothing: all of its levels have the same table",
+        axis.vary.as_str(),
+        space.id
+    );
+    let has_none = match axis.vary {
+        Vary::Damping => "its table has no damping",
+        Vary::Mass => "its table has no mass",
+        _ => "its table has nothing that it would change",
+    };
+    Fault::warning(what).hint(format!("take it out: {has_none}"))
+}
+
 fn count(points: &[Point], which: Point) -> usize {
     points.iter().filter(|point| **point == which).count()
 }
@@ -157,7 +249,9 @@ fn why(points: &[Point], limit_n: f64) -> String {
         reasons.push(format!("{active} can put energy into a hand"));
     }
     if strong > 0 {
-        reasons.push(format!("{strong} need more than {limit_n} N at rest"));
+        reasons.push(format!(
+            "{strong} need more than {limit_n} N, at rest or up to their trained speed"
+        ));
     }
     reasons.join(", ")
 }
@@ -192,4 +286,41 @@ fn map(space: &SpaceRules, points: &[Point]) -> String {
         name(0).map_or_else(String::new, |name| format!("rows from {name}")),
         lines.join(" ")
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Judged;
+    use crate::load::{Purpose, load_begun, load_frozen, open};
+    use std::fs;
+
+    /// With damping, the strongest points of the template need more than 12 N in motion, and none does at rest.
+    #[test]
+    fn a_study_that_has_begun_keeps_its_points() {
+        let folder = tempfile::tempdir().unwrap();
+        let repository = concat!(env!("CARGO_MANIFEST_DIR"), "/../../");
+        let read = |path: &str| fs::read_to_string(format!("{repository}{path}")).unwrap();
+        let table = read("protocols/turn-signal-extended/models/static.toml");
+        let mut damped = String::new();
+        for (i, piece) in table.split("b_n_s_per_mm = [").enumerate() {
+            let (values, rest) = piece.split_at(if i == 0 { 0 } else { piece.find(']').unwrap() });
+            let key = if i == 0 { "" } else { "b_n_s_per_mm = [" };
+            damped += &format!("{key}{}{rest}", values.replace("0.0", "0.03"));
+        }
+        fs::create_dir(folder.path().join("models")).unwrap();
+        fs::write(folder.path().join("models/static.toml"), damped).unwrap();
+        let path = folder.path().join("protocol.toml");
+        fs::write(&path, read("src/cli/new/search.toml")).unwrap();
+        let of = |loaded: &crate::load::Loaded| loaded.protocol.spaces[0].lattice.certified().len();
+        let now = load_frozen(&path).unwrap();
+        let before = open(&path, Purpose::Data(Judged::AtNodes)).0.unwrap();
+        assert_eq!(of(&before), 81);
+        assert!(of(&now) < 81, "{}", of(&now));
+        assert_ne!(now.fingerprints, before.fingerprints);
+        for begun in [now, before] {
+            let again = load_begun(&path, &begun.fingerprints).unwrap();
+            assert_eq!(of(&again), of(&begun));
+            assert_eq!(again.fingerprints, begun.fingerprints);
+        }
+    }
 }

@@ -147,6 +147,7 @@ impl Hello {
                 mechanisms: self.mechanisms,
                 elements: false,
                 stiffness_n_per_mm,
+                damping_n_s_per_mm: None,
                 stroke_mm,
                 firmware: own.and(self.version),
             },

@@ -11,6 +11,7 @@ pub use lattice::{Lattice, MAX_POINTS};
 use super::ProcedureError;
 use serde::{Deserialize, Serialize};
 use sobol::Sobol;
+use std::collections::BTreeSet;
 use study_base::rng::Stream;
 use study_stats::preference_gp::{Candidate, Choice, Posterior, candidates};
 use thiserror::Error;
@@ -89,8 +90,12 @@ pub struct Search {
     coordinates: Vec<Vec<f64>>,
     candidates: Vec<Candidate>,
     planned: Vec<[usize; 2]>,
+    /// Index of the next planned pair.
+    at: usize,
     /// In indices of the certified points.
     choices: Vec<Choice>,
+    /// Certified points that are not presented any more.
+    left_out: BTreeSet<usize>,
 }
 
 impl Search {
@@ -131,27 +136,84 @@ impl Search {
                 .collect(),
             candidates: candidates(lattice.steps().len()),
             planned,
+            at: 0,
             choices: Vec::new(),
+            left_out: BTreeSet::new(),
         })
     }
 
     /// The two points that are compared next, the lower one first; `None` when the search has ended. The rule
     /// `preference-gp` computes for some 0.05 s here: ask once for each trial.
     pub fn next(&self) -> Option<[usize; 2]> {
-        let planned = *self.planned.get(self.choices.len())?;
+        if self.choices.len() >= self.planned.len() {
+            return None;
+        }
+        let (_, planned) = self.planned_pair();
         if self.choices.len() < self.rule.planned() as usize {
             return Some(planned);
         }
+        let may = |index: usize| self.may(self.lattice.certified()[index]);
         let found = self.posterior().and_then(|p| match self.rule.choose {
             Choose::PreferenceGp {
                 acquire: Acquire::Challenger,
                 ..
-            } => p.challenge(CHALLENGE_SDS),
-            _ => p.best_pair(),
+            } => p.challenge(CHALLENGE_SDS, may),
+            _ => p.best_pair(may),
         });
         Some(found.map_or(planned, |(a, b)| {
             [a, b].map(|index| self.lattice.certified()[index])
         }))
+    }
+
+    /// The next planned pair of points that are presented, and its index. After the last pair come the first ones again;
+    /// should none be left, it is the first two points that are.
+    fn planned_pair(&self) -> (usize, [usize; 2]) {
+        let all = self.planned.len();
+        let from_here = (self.at..self.at + all).map(|index| index % all);
+        let mut pairs = from_here.map(|index| (index, self.planned[index]));
+        let found = pairs.find(|(_, [a, b])| self.may(*a) && self.may(*b));
+        found.unwrap_or_else(|| {
+            let certified = self.lattice.certified().iter().copied();
+            let mut left = certified.filter(|point| self.may(*point));
+            // There are two: `leave_out` sees to it.
+            let pair = [left.next(), left.next()].map(Option::unwrap_or_default);
+            (self.at % all, pair)
+        })
+    }
+
+    fn may(&self, point: usize) -> bool {
+        !self.left_out.contains(&point)
+    }
+
+    /// Whether a point can be left out: it is certified and still presented, and two others are.
+    pub fn can_leave_out(&self, point: usize) -> bool {
+        let left = self.lattice.certified().len() - self.left_out.len();
+        left > 2 && self.lattice.is_certified(point) && self.may(point)
+    }
+
+    /// Presents a point no more, such as one that the device does not play. What was answered about it stays. The last two
+    /// points cannot be left out.
+    pub fn leave_out(&mut self, point: usize) {
+        if self.can_leave_out(point) {
+            self.left_out.insert(point);
+        }
+    }
+
+    /// Takes all that a journal has: each point is left out where it was, and answers are taken in their order.
+    pub fn replay(&mut self, trials: &[RecordedPair], left_out: &[LeftOut]) {
+        for (before, recorded) in trials.iter().enumerate() {
+            self.leave_out_at(before, left_out);
+            if let Some(answer) = recorded.answer() {
+                self.answer(&answer);
+            }
+        }
+        self.leave_out_at(trials.len(), left_out);
+    }
+
+    /// Leaves out what was left out after so many trials.
+    fn leave_out_at(&mut self, after: usize, left_out: &[LeftOut]) {
+        let here = left_out.iter().filter(|out| out.after == after);
+        here.for_each(|out| self.leave_out(out.point));
     }
 
     /// Takes the answer to a trial. A search that has ended takes none, and no search one about other points than
@@ -162,6 +224,7 @@ impl Search {
             && preferred != other
             && self.choices.len() < self.planned.len()
         {
+            self.at = self.planned_pair().0 + 1;
             self.choices.push(Choice { preferred, other });
         }
     }
@@ -177,9 +240,10 @@ impl Search {
         Some(found.ok()?.1)
     }
 
-    /// The certified point with the largest mean utility.
+    /// The certified point with the largest mean utility, of those that are not left out.
     pub fn best_point(&self) -> Option<usize> {
-        Some(self.lattice.certified()[self.posterior()?.best_point()])
+        let may = |index: usize| self.may(self.lattice.certified()[index]);
+        Some(self.lattice.certified()[self.posterior()?.best_point(may)?])
     }
 }
 
@@ -237,6 +301,15 @@ impl RecordedPair {
     }
 }
 
+/// A point that a search presents no more, as a journal has it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LeftOut {
+    /// The point.
+    pub point: usize,
+    /// The number of trials that the search had been told.
+    pub after: usize,
+}
+
 /// A journal that its rule would not have produced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum SearchMismatch {
@@ -270,8 +343,13 @@ pub enum SearchMismatch {
 ///
 /// # Errors
 /// [`SearchMismatch`].
-pub fn verify_search(mut search: Search, trials: &[RecordedPair]) -> Result<(), SearchMismatch> {
+pub fn verify_search(
+    mut search: Search,
+    trials: &[RecordedPair],
+    left_out: &[LeftOut],
+) -> Result<(), SearchMismatch> {
     for (trial, recorded) in (1..).zip(trials) {
+        search.leave_out_at(trial - 1, left_out);
         let computed = search.next().ok_or(SearchMismatch::Ended { trial })?;
         if computed != recorded.pair {
             return Err(SearchMismatch::Presented {

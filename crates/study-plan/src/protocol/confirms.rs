@@ -11,12 +11,18 @@ pub struct Confirms {
     pub study: String,
     /// Its part of kind `search`.
     pub part: PartId,
-    /// SHA-256 of the pairs and answers of the search, as `study explore --out` writes them.
+    /// SHA-256 of the pairs and answers of the search, as `study explore --out` writes them of those who are included.
     pub pairs_sha256: String,
     /// The point that it found to be best, a realization of that study.
     pub best: ModelId,
     /// Who took part in it.
     pub searchers: Vec<ParticipantId>,
+    /// Whether answers of pilots led to the point. Absent from fingerprints if not, as the next.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub pilot: bool,
+    /// Whether answers of simulated participants did.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub simulated: bool,
 }
 
 impl Confirms {

@@ -411,6 +411,13 @@ pub enum Event {
     },
     /// The criterion of a part's practice was reached: its other practice trials do not take place.
     PracticeEnded { part: PartId },
+    /// The device failed at a point of a space in several attempts: the searches of the session present it no more.
+    PointLeftOut {
+        /// Part whose search it was.
+        part: PartId,
+        /// The point, as a realization.
+        point: ModelId,
+    },
     /// A remark was entered.
     Remark {
         by: Author,

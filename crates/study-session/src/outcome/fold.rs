@@ -29,6 +29,7 @@ pub use interval_log::interval_rows;
 pub use trial::{Attempt, AttemptStart, Completion, Ended, Presentation, Sitting};
 
 use super::event::{Channel, Choice, Entry, Event, Failure, FormId, Moment, Start, State};
+use search::Failing;
 use std::collections::{BTreeMap, BTreeSet};
 use study_base::text::{PartId, ParticipantId, QuestionId};
 use study_plan::protocol::{Answer, Trial};
@@ -67,6 +68,8 @@ pub struct History {
     ended_practice: BTreeSet<PartId>,
     /// Completed trials of tracks, searches and practice, in the order in which these were told.
     told: Vec<(u32, u32)>,
+    /// What the device failed at in the searches, and what they present no more.
+    failing: Failing,
     /// Numbers of closed trials after which a break began.
     pub breaks: BTreeSet<u32>,
     /// When the break under way began.
@@ -268,6 +271,7 @@ impl History {
                 let queue = std::mem::take(&mut self.queue);
                 self.set_queue(&queue);
             }
+            Event::PointLeftOut { part, point } => self.leave_out(part, point),
             Event::PracticeEnded { part } => {
                 self.ended_practice.insert(part.clone());
                 let queue = std::mem::take(&mut self.queue);
@@ -281,6 +285,7 @@ impl History {
                 paused_s,
                 ..
             } => {
+                self.failed_at_point(*trial, *attempt, *failure);
                 self.failed(*trial, *attempt, *failure, queue);
                 let trial = self.trials.entry(*trial).or_default();
                 trial.again_after_s = paused_s.or(trial.again_after_s);
@@ -370,7 +375,7 @@ impl History {
                 trial.send_back();
             }
         }
-        self.told.retain(|(trial, _)| !queue.contains(trial));
+        self.untold(|(trial, _)| queue.contains(&trial));
         self.open = self.open.filter(|t| !queue.contains(t));
         self.last_done = self.last_done.filter(|t| !queue.contains(t));
         let closed = self.closed(false);
@@ -414,7 +419,7 @@ impl History {
         if let Some(attempt) = self.attempt_mut(trial, attempt) {
             attempt.void = true;
         }
-        self.told.retain(|t| *t != (trial, attempt));
+        self.untold(|t| t == (trial, attempt));
         self.reopen_tracks(queue);
         self.set_queue(queue);
         if self.open == Some(trial) && self.attempts(trial) == attempt {
@@ -449,6 +454,7 @@ impl History {
         }
         if practice || self.planned(trial).is_some_and(Trial::follows_from_answers) {
             self.told.push((trial, attempt));
+            self.played(trial, attempt);
         }
         self.queue.retain(|t| *t != trial);
         self.open = None;

@@ -22,7 +22,12 @@ pub fn page(view: &View) -> Page {
     let mut page = Page::new(view);
     match &view.screen {
         Screen::Who { .. } => page.title = words.get(Phrase::OneMoment).to_owned(),
-        Screen::ResumeChoice { gap_h, done, total } => page.resume(*gap_h, *done, *total),
+        Screen::ResumeChoice {
+            gap_h,
+            done,
+            total,
+            restart,
+        } => page.resume(*gap_h, (*done, *total), *restart),
         Screen::Consent { document, version } => {
             page.instruction = read_by_experimenter(view, "Ask the participant");
             page.title = words.get(Phrase::AgreeQuestion).to_owned();
@@ -198,14 +203,14 @@ impl Page {
         self.wait_clock = (wait_s > 0.0).then(|| clock(wait_s.ceil()));
     }
 
-    fn resume(&mut self, gap_h: f64, done: u32, total: Option<u32>) {
+    fn resume(&mut self, gap_h: f64, (done, total): (u32, Option<u32>), restart: bool) {
         let done = match total {
             Some(total) => format!("{done} of {total} trials are done."),
             None => format!("{} done.", counted(done as usize, "trial is", "trials are")),
         };
         self.title = "This session was not finished.".to_owned();
         self.text = format!("{done} The last one was {} ago.", ago(gap_h));
-        self.buttons = [
+        let choices = [
             (
                 Does::RestartBlock,
                 "restart the block",
@@ -217,14 +222,16 @@ impl Page {
                 "later trials are flagged",
             ),
             (Does::DropOut, "drop out", "the participant does not return"),
-        ]
-        .map(|(does, label, note)| Button {
+        ];
+        let offered = choices.into_iter();
+        let offered = offered.filter(|(does, ..)| restart || *does != Does::RestartBlock);
+        let button = |(does, label, note): (_, &str, _)| Button {
             does,
             label: label.to_owned(),
             note,
             enabled: true,
-        })
-        .into();
+        };
+        self.buttons = offered.map(button).collect();
     }
 
     fn form(&mut self, view: &View) {

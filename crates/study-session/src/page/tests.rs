@@ -109,6 +109,7 @@ fn a_participants_page_has_nothing_of_the_experimenters() {
             gap_h: 1.0,
             done: 3,
             total: Some(9),
+            restart: true,
         }),
         asks(true, rating(7)),
     ];

@@ -163,6 +163,7 @@ impl Session {
         let Some(trial) = self.history.planned(number).cloned() else {
             return;
         };
+        let failed = trial.clone();
         let planned = |n: &u32| self.history.planned(*n).cloned();
         let mut rest: Vec<Trial> = self.history.queue.iter().filter_map(planned).collect();
         rest.retain(|t| t.trial != number);
@@ -186,7 +187,7 @@ impl Session {
             constraint_broken = again.constraint_broken;
             again.queue
         };
-        let failed = Event::AttemptFailed {
+        let event = Event::AttemptFailed {
             trial: number,
             attempt,
             failure,
@@ -196,11 +197,12 @@ impl Session {
             paused_s: (self.paused_s())
                 .filter(|_| failure == Failure::Interrupted && self.is_forgotten(0.0)),
         };
-        self.record(failed, at);
+        self.record(event, at);
         if given_up {
             let trial = number;
             self.record(Event::TrialClosed { trial, attempt }, at);
         }
+        self.leave_points_out(&failed, at);
     }
 
     /// The trials that the ends of the tracks, and of the practice, of these trials have dropped.

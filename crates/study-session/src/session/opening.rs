@@ -6,7 +6,7 @@ use crate::outcome::fold::History;
 use crate::outcome::{Choice, Entry, Event, Failure, Moment, Start, State};
 use std::sync::Arc;
 use study_base::text::{ParticipantId, counted};
-use study_plan::protocol::Assigned;
+use study_plan::protocol::{Assigned, Stimuli};
 use study_plan::schedule;
 
 /// Longest operator code, in characters.
@@ -134,8 +134,19 @@ impl Session {
 
     pub(super) fn resume(&mut self, choice: Choice, at: Moment) {
         if let Phase::ResumeChoice { gap_s } = self.phase {
+            if choice == Choice::RestartBlock && !self.can_restart() {
+                return self.notify(
+                    "a search is not restarted: its answers so far lead to the next pairs",
+                );
+            }
             self.reopen(gap_s, Some(choice), at);
         }
+    }
+
+    /// Whether the block under way can be restarted. A search is one block, all of whose answers would be lost.
+    pub(super) fn can_restart(&self) -> bool {
+        let next = self.history.next_trial();
+        !next.is_some_and(|trial| matches!(trial.stimuli, Stimuli::Search { .. }))
     }
 
     /// Records the resumption. An attempt whose playback had not ended fails and its

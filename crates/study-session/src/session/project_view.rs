@@ -79,6 +79,7 @@ impl Session {
                 gap_h: gap_s / 3600.0,
                 done: self.history.closed(false),
                 total: self.total(false),
+                restart: self.can_restart(),
             },
             Phase::Consent => match &self.protocol.consent {
                 Some(consent) => Screen::Consent {

@@ -187,6 +187,8 @@ pub enum Screen {
         done: u32,
         /// Number of trials, without practice; `None` if it depends on the answers.
         total: Option<u32>,
+        /// Whether the block under way can be restarted; a search cannot.
+        restart: bool,
     },
     /// The consent document.
     Consent {

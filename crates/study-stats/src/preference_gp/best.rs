@@ -19,10 +19,11 @@ impl Posterior {
     }
 
     /// The pair with the largest [`expected_best`](Self::expected_best), the lower index first; of pairs within
-    /// [`TIE`] of it, the first one in the order (0, 1), (0, 2), (1, 2), (0, 3) and so on. `None` with fewer than two
-    /// points.
-    pub fn best_pair(&self) -> Option<(usize, usize)> {
-        let most = self.pairs().fold(f64::NEG_INFINITY, |most, (a, b)| {
+    /// [`TIE`] of it, the first one in the order (0, 1), (0, 2), (1, 2), (0, 3) and so on. `may` says of a point whether it
+    /// can be one of them. `None` with fewer than two such points.
+    pub fn best_pair(&self, may: impl Fn(usize) -> bool) -> Option<(usize, usize)> {
+        let pairs = || self.pairs().filter(|(a, b)| may(*a) && may(*b));
+        let most = pairs().fold(f64::NEG_INFINITY, |most, (a, b)| {
             if self.bound(a, b) < most {
                 most
             } else {
@@ -30,37 +31,38 @@ impl Posterior {
             }
         });
         let tied = most - TIE * most.abs().max(1.0);
-        let mut pairs = self.pairs();
-        pairs.find(|(a, b)| self.bound(*a, *b) >= tied && self.expected_best(*a, *b) >= tied)
+        pairs().find(|(a, b)| self.bound(*a, *b) >= tied && self.expected_best(*a, *b) >= tied)
     }
 
     /// The best point so far and its challenger, the lower index first: of all others the point that may be better by most, in
     /// the sense that the mean of its advantage over the best point plus `sds` of its standard deviations is largest; of points
-    /// within [`TIE`] of that, the first. `None` with fewer than two points.
+    /// within [`TIE`] of that, the first. `may` says of a point whether it can be one of them. `None` with fewer than two such
+    /// points.
     ///
     /// Pairs by [`best_pair`](Self::best_pair) are the best ones if the next answer is the last. Challenges look further ahead: a
     /// region of which nothing is known is visited even if one answer could not make it the best.
-    pub fn challenge(&self, sds: f64) -> Option<(usize, usize)> {
-        let best = self.best_point();
+    pub fn challenge(&self, sds: f64, may: impl Fn(usize) -> bool) -> Option<(usize, usize)> {
+        let best = self.best_point(&may)?;
         let promise = |other: usize| {
             let variance = self.covariance(best, best) + self.covariance(other, other)
                 - 2.0 * self.covariance(best, other);
             self.mean()[other] - self.mean()[best] + sds * variance.max(0.0).sqrt()
         };
-        let others = || (0..self.mean().len()).filter(|other| *other != best);
+        let others = || (0..self.mean().len()).filter(|other| *other != best && may(*other));
         let most = others().map(promise).fold(f64::NEG_INFINITY, f64::max);
         let tied = most - TIE * most.abs().max(1.0);
         let other = others().find(|other| promise(*other) >= tied)?;
         Some((best.min(other), best.max(other)))
     }
 
-    /// The point with the largest mean; of points within [`TIE`] of it, the first.
-    pub fn best_point(&self) -> usize {
-        let most = (self.mean().iter()).fold(f64::NEG_INFINITY, |most, mean| most.max(*mean));
+    /// Of the points that `may` be it, the one with the largest mean; of points within [`TIE`] of it, the first. `None` if there
+    /// is no such point.
+    pub fn best_point(&self, may: impl Fn(usize) -> bool) -> Option<usize> {
+        let points = || (0..self.mean().len()).filter(|point| may(*point));
+        let means = points().map(|point| self.mean()[point]);
+        let most = means.fold(f64::NEG_INFINITY, f64::max);
         let tied = most - TIE * most.abs().max(1.0);
-        (self.mean().iter())
-            .position(|mean| *mean >= tied)
-            .unwrap_or(0)
+        points().find(|point| self.mean()[*point] >= tied)
     }
 
     fn pairs(&self) -> impl Iterator<Item = (usize, usize)> {

@@ -24,18 +24,18 @@ fn without_answers_the_posterior_is_the_prior() {
     // √5 · (1/3) / 0.4 = 1.8634: 4 (1 + r + r²/3) exp(−r)
     assert!((prior.covariance(1, 2) - 2.495_239_254_563_323_5).abs() < 1e-12);
     // The most different pair: θ/√(2π), the same for all that are as far apart.
-    assert_eq!(prior.best_pair(), Some((0, 3)));
+    assert_eq!(prior.best_pair(|_| true), Some((0, 3)));
     let spread = (8.0 - 2.0 * prior.covariance(0, 3)).sqrt();
     let expected = spread / (2.0 * std::f64::consts::PI).sqrt();
     assert!((prior.expected_best(0, 3) - expected).abs() < 1e-14);
-    assert_eq!(prior.best_point(), 0);
+    assert_eq!(prior.best_point(|_| true), Some(0));
 }
 
 /// Of five points on a line, 2 was preferred to 1: 3 is the best, 2 is close to it, and of 0 little is known.
 #[test]
 fn a_challenger_is_the_point_that_may_be_better_by_most() {
     let posterior = Posterior::new(&line(5), &kernel(), &[choice(2, 1)]).unwrap();
-    assert_eq!(posterior.best_point(), 3);
+    assert_eq!(posterior.best_point(|_| true), Some(3));
     let advantage = |other: usize| {
         let mean = posterior.mean()[other] - posterior.mean()[3];
         let variance = posterior.covariance(3, 3) + posterior.covariance(other, other)
@@ -52,13 +52,20 @@ fn a_challenger_is_the_point_that_may_be_better_by_most() {
     ];
     assert!(expected.iter().all(|off| off.abs() < 1e-4), "{expected:?}");
     let turn = (near.0 - far.0) / (far.1 - near.1);
-    assert_eq!(posterior.challenge(0.99 * turn), Some((2, 3)));
-    assert_eq!(posterior.challenge(1.01 * turn), Some((0, 3)));
+    assert_eq!(posterior.challenge(0.99 * turn, |_| true), Some((2, 3)));
+    assert_eq!(posterior.challenge(1.01 * turn, |_| true), Some((0, 3)));
     // Of points that are tied by symmetry, the first.
     let prior = Posterior::new(&line(3), &kernel(), &[choice(1, 0), choice(1, 2)]).unwrap();
-    assert_eq!(prior.challenge(2.0), Some((0, 1)));
+    assert_eq!(prior.challenge(2.0, |_| true), Some((0, 1)));
+    // A point that cannot be presented is neither.
+    assert_eq!(posterior.best_point(|point| point != 3), Some(2));
+    assert_eq!(posterior.challenge(2.0, |point| point != 3), Some((2, 4)));
+    assert_eq!(posterior.challenge(2.0, |point| point > 2), Some((3, 4)));
+    assert_eq!(posterior.challenge(2.0, |point| point == 3), None);
+    assert_eq!(posterior.best_pair(|point| point > 2), Some((3, 4)));
+    assert_eq!(posterior.best_pair(|point| point == 3), None);
     let alone = Posterior::new(&[vec![0.5]], &kernel(), &[]).unwrap();
-    assert_eq!(alone.challenge(2.0), None);
+    assert_eq!(alone.challenge(2.0, |_| true), None);
 }
 
 /// One answer: the difference g of the two points solves g = c φ(z)/(√2 Φ(z)), z = g/√2, found by bisection.
@@ -203,7 +210,7 @@ proptest! {
         let most = all.iter().fold(f64::NEG_INFINITY, |m, (value, _)| m.max(*value));
         let tied = most - TIE * most.abs().max(1.0);
         let first = all.iter().find(|(value, _)| *value >= tied).map(|(_, pair)| *pair);
-        prop_assert_eq!(posterior.best_pair(), first);
+        prop_assert_eq!(posterior.best_pair(|_| true), first);
         // Answers never make a utility less certain.
         for i in 0..12 {
             prop_assert!(posterior.sd(i) <= sd * (1.0 + 1e-12));

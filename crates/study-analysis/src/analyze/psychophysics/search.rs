@@ -1,15 +1,17 @@
 //! What the searches of a study found: maps, and no test. A search decides nothing, because its pairs were chosen by the
 //! answers before them.
 
-use super::part_data::StudyData;
-use crate::analyze::select::{Include, Whose, state_counts};
-use std::collections::BTreeSet;
+use super::counting::Counting;
+use super::part_data::{Intervals, StudyData};
+use crate::analyze::Rules;
+use crate::analyze::exclude::Applied;
+use crate::analyze::select::Include;
+use std::collections::{BTreeMap, BTreeSet};
 use study_base::text::{PartId, ParticipantId};
 use study_plan::procedure::search::RecordedPair;
 use study_plan::protocol::{Answer, Part, SpaceRules};
-use study_session::outcome::FormId;
 use study_session::outcome::fold::History;
-use study_session::outcome::ratings::Origin;
+use study_session::outcome::{FormId, RatingRow};
 use study_stats::describe::{mean, sd};
 use study_stats::preference_gp::Posterior;
 
@@ -20,10 +22,29 @@ pub struct Exploration {
     pub part: PartId,
     /// Its space. Values below are those of its certified points, in their order.
     pub space: SpaceRules,
-    /// The participants who count, in the order of their sessions.
-    pub participants: Vec<Explored>,
+    /// The sessions that count, in their order. Two of the same participant are two searches.
+    pub searches: Vec<Explored>,
     /// All of them together; `None` with fewer than two.
     pub population: Option<Population>,
+    /// Whether pilots are among them.
+    pub pilot: bool,
+    /// Whether simulated participants are among them.
+    pub simulated: bool,
+    /// The effect of each preregistered exclusion rule.
+    pub exclusions: Vec<Applied>,
+}
+
+impl Exploration {
+    /// How many participants there are, of whom some may have searched in several sessions.
+    pub fn people(&self) -> usize {
+        by_participant(&self.searches).len()
+    }
+
+    /// Index of the best point: that of all together, or of the only search.
+    pub fn best(&self) -> Option<usize> {
+        let of_all = self.population.as_ref().map(|all| all.best);
+        of_all.or_else(|| self.searches.first().map(|own| own.best))
+    }
 }
 
 /// The search of one participant in one session.
@@ -33,14 +54,20 @@ pub struct Explored {
     pub participant: ParticipantId,
     /// Session, from 1.
     pub session: u32,
+    /// Whether it is a pilot's.
+    pub pilot: bool,
+    /// Whether it is a simulated participant's.
+    pub simulated: bool,
     /// The pairs in the order in which they were presented, with the corrected answers.
     pub pairs: Vec<ExploredPair>,
+    /// Points that were left out because the device failed at them, from 0.
+    pub left_out: Vec<usize>,
     /// The posterior mean of the utility of each point, in units of the noise of one impression, minus its mean over the
     /// points: only differences of utilities are known.
     pub mean: Vec<f64>,
     /// The posterior standard deviation of that difference.
     pub sd: Vec<f64>,
-    /// Index of the point with the largest mean.
+    /// Index of the point with the largest mean, of those that were not left out.
     pub best: usize,
 }
 
@@ -55,56 +82,62 @@ pub struct ExploredPair {
     pub preferred: Option<usize>,
 }
 
-/// The maps of several participants together. Each counts alike, however certain it is.
+/// The maps of several searches together. Each participant counts alike, however certain their map is; that of somebody with
+/// several sessions is the mean of them.
 #[derive(Debug, Clone)]
 pub struct Population {
     /// Mean over the participants' maps.
     pub mean: Vec<f64>,
-    /// Standard deviation between the participants' maps.
+    /// Standard deviation between the participants' maps; between the sessions of the only one.
     pub sd: Vec<f64>,
-    /// Index of the point with the largest mean.
+    /// Index of the point with the largest mean, of those that were not left out in any search.
     pub best: usize,
 }
 
-/// The explorations of all parts that search. Which participants count is decided as for all parts.
+/// The explorations of all parts that search. Which participants and trials count is decided as for all parts.
 pub fn explorations(study: &StudyData<'_>, include: Include) -> Vec<Exploration> {
-    let origin = |history: &History| {
-        let seat = history.start().map(|start| start.seat);
-        Origin::of(
-            seat.is_some_and(|seat| seat.is_simulated()),
-            seat.is_some_and(|seat| seat.is_pilot()),
-        )
-    };
-    let origins: Vec<Origin> = study
-        .sessions
-        .iter()
-        .map(|history| origin(history))
-        .collect();
-    let whose = Whose::of(&origins, include);
-    let unfinished = study.protocol.analysis.unfinished;
-    let left_out: BTreeSet<&ParticipantId> = (study.participants.iter())
-        .filter(|p| !state_counts(p.state, unfinished))
-        .map(|p| &p.participant)
-        .collect();
+    let counting = Counting::of(study, include);
+    let rows = study.rows.iter().filter(|row| counting.row(row));
+    let rows: Vec<&RatingRow> = rows.collect();
+    let intervals = Intervals::of(study.intervals);
+    let rules = Rules::of(study.protocol, "", include);
     let explore = |part: &Part| {
         let (space, _) = study.protocol.searched(part)?;
-        let participants: Vec<Explored> = (study.sessions.iter())
-            .filter(|history| whose.counts(origin(history)))
-            .filter_map(|history| explored(study, part, history))
-            .filter(|own| !left_out.contains(&own.participant))
+        let of_part = Counting::of_part(study, part, &rows, &intervals, &rules.exclude);
+        let kept: BTreeSet<_> = of_part.kept.iter().map(|row| key(row)).collect();
+        let excluded = of_part.all.iter().map(|row| key(row));
+        let excluded: BTreeSet<_> = excluded.filter(|key| !kept.contains(key)).collect();
+        let searches: Vec<Explored> = (study.sessions.iter())
+            .filter(|history| counting.session(history))
+            .filter_map(|history| explored(study, part, history, &excluded))
             .collect();
         Some(Exploration {
             part: part.id.clone(),
             space: space.clone(),
-            population: population(&participants),
-            participants,
+            population: population(space, &searches),
+            pilot: searches.iter().any(|own| own.pilot),
+            simulated: searches.iter().any(|own| own.simulated),
+            searches,
+            exclusions: of_part.exclusions,
         })
     };
     study.protocol.parts.iter().filter_map(explore).collect()
 }
 
-/// The search of a session; `None` if it has no answer to one.
-fn explored(study: &StudyData<'_>, part: &Part, history: &History) -> Option<Explored> {
+/// Participant, session and trial.
+type Key<'a> = (&'a ParticipantId, u32, u32);
+
+fn key(row: &RatingRow) -> Key<'_> {
+    (&row.participant, row.session, row.trial)
+}
+
+/// The search of a session without some trials; `None` if it has no answer to one.
+fn explored(
+    study: &StudyData<'_>,
+    part: &Part,
+    history: &History,
+    excluded: &BTreeSet<Key<'_>>,
+) -> Option<Explored> {
     let start = history.start()?;
     let protocol = study.protocol.of(&start.assigned);
     let (space, _) = study.protocol.searched(part)?;
@@ -112,6 +145,9 @@ fn explored(study: &StudyData<'_>, part: &Part, history: &History) -> Option<Exp
     let question = part.asks.first()?;
     let mut pairs = Vec::new();
     for (trial, attempt) in history.searched(&part.id) {
+        if excluded.contains(&(&start.participant, start.session, trial.trial)) {
+            continue;
+        }
         let [first, second] = &attempt.models[..] else {
             continue;
         };
@@ -149,13 +185,20 @@ fn explored(study: &StudyData<'_>, part: &Part, history: &History) -> Option<Exp
     }
     let posterior = search.posterior()?;
     let (mean, sd) = centered(&posterior);
+    let left_out = history.left_out(&part.id, space);
+    let left_out: Vec<usize> = left_out.iter().map(|out| out.point).collect();
+    let certified = space.lattice.certified();
+    let best = posterior.best_point(|index| !left_out.contains(&certified[index]))?;
     Some(Explored {
         participant: start.participant.clone(),
         session: start.session,
+        pilot: start.seat.is_pilot(),
+        simulated: start.seat.is_simulated(),
         pairs,
+        left_out,
         mean,
         sd,
-        best: posterior.best_point(),
+        best,
     })
 }
 
@@ -176,18 +219,50 @@ fn centered(posterior: &Posterior) -> (Vec<f64>, Vec<f64>) {
     )
 }
 
-fn population(participants: &[Explored]) -> Option<Population> {
-    if participants.len() < 2 {
+/// The searches of each participant.
+fn by_participant(searches: &[Explored]) -> BTreeMap<&ParticipantId, Vec<&Explored>> {
+    let mut own: BTreeMap<_, Vec<&Explored>> = BTreeMap::new();
+    for search in searches {
+        own.entry(&search.participant).or_default().push(search);
+    }
+    own
+}
+
+fn population(space: &SpaceRules, searches: &[Explored]) -> Option<Population> {
+    let points = searches.iter().map(|own| own.mean.len()).min()?;
+    let of_search = |own: &Explored| own.mean.clone();
+    let people = by_participant(searches);
+    let maps: Vec<Vec<f64>> = match people.len() {
+        1 => searches.iter().map(of_search).collect(),
+        _ => (people.values())
+            .map(|own| {
+                let at = |point: usize| own.iter().map(|one| one.mean[point]).sum::<f64>();
+                let all = own.len() as f64;
+                (0..points).map(|point| at(point) / all).collect()
+            })
+            .collect(),
+    };
+    if maps.len() < 2 {
         return None;
     }
-    let points = participants.iter().map(|own| own.mean.len()).min()?;
-    let at =
-        |point: usize| -> Vec<f64> { participants.iter().map(|own| own.mean[point]).collect() };
+    let at = |point: usize| -> Vec<f64> { maps.iter().map(|map| map[point]).collect() };
     let means: Option<Vec<f64>> = (0..points).map(|point| mean(&at(point))).collect();
     let sds: Option<Vec<f64>> = (0..points).map(|point| sd(&at(point))).collect();
     let means = means?;
-    let most = means.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let best = means.iter().position(|mean| *mean == most)?;
+    let certified = space.lattice.certified();
+    let is_out = |index: usize| {
+        let out = |own: &Explored| own.left_out.contains(&certified[index]);
+        searches.iter().any(out)
+    };
+    let may: Vec<usize> = (0..points).filter(|index| !is_out(*index)).collect();
+    let may = if may.is_empty() {
+        (0..points).collect()
+    } else {
+        may
+    };
+    let most = may.iter().map(|index| means[*index]);
+    let most = most.fold(f64::NEG_INFINITY, f64::max);
+    let best = may.into_iter().find(|index| means[*index] == most)?;
     Some(Population {
         mean: means,
         sd: sds?,
@@ -198,7 +273,68 @@ fn population(participants: &[Explored]) -> Option<Population> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use study_plan::procedure::{Ladder, Lattice};
+    use study_plan::protocol::{Axis, Vary};
     use study_stats::preference_gp::{Choice, Kernel};
+
+    fn space() -> SpaceRules {
+        SpaceRules {
+            id: PartId::new("s").unwrap(),
+            from: "a.toml".to_owned(),
+            axes: vec![Axis {
+                vary: Vary::Detent,
+                levels: Ladder::new(vec![0.5, 1.0, 1.5]).unwrap(),
+            }],
+            lattice: Lattice::new(vec![3], |_| true).unwrap(),
+        }
+    }
+
+    fn map(who: &str, session: u32, mean: [f64; 3], left_out: &[usize]) -> Explored {
+        Explored {
+            participant: ParticipantId::new(who).unwrap(),
+            session,
+            pilot: false,
+            simulated: false,
+            pairs: Vec::new(),
+            left_out: left_out.to_vec(),
+            mean: mean.to_vec(),
+            sd: vec![1.0; 3],
+            best: 0,
+        }
+    }
+
+    /// Two sessions of one participant are one person, whose map is their mean.
+    #[test]
+    fn people_count_alike_however_often_they_came() {
+        let twice = [
+            map("P01", 1, [3.0, 0.0, 0.0], &[]),
+            map("P01", 2, [1.0, 0.0, 2.0], &[]),
+        ];
+        let alone = population(&space(), &twice).unwrap();
+        assert_eq!((alone.mean[0], alone.best), (2.0, 0));
+        assert!((alone.sd[0] - 2.0_f64.sqrt()).abs() < 1e-12);
+        let [first, second] = twice;
+        let other = map("P02", 1, [-3.0, 4.0, 1.0], &[]);
+        let searches = vec![first.clone(), other, second];
+        let both = population(&space(), &searches).unwrap();
+        assert_eq!(both.mean, [-0.5, 2.0, 1.0]);
+        assert_eq!(both.best, 1);
+        let found = Exploration {
+            part: PartId::new("p").unwrap(),
+            space: space(),
+            population: Some(both),
+            pilot: false,
+            simulated: false,
+            exclusions: Vec::new(),
+            searches,
+        };
+        assert_eq!((found.people(), found.best()), (2, Some(1)));
+        // A point at which the device failed in a session is not what they recommend.
+        let failed = map("P02", 1, [-3.0, 4.0, 1.0], &[1]);
+        let best = population(&space(), &[first.clone(), failed]).unwrap().best;
+        assert_eq!(best, 2);
+        assert!(population(&space(), &[first]).is_none());
+    }
 
     /// Of two points, f₁ minus their mean is half of f₁ − f₂.
     #[test]

@@ -1,8 +1,8 @@
 //! The tracks and pairs of a study.
 
 use super::again::{again, by_condition};
+use super::counting::{Counting, PartRows};
 use super::discriminations::of_tracks;
-use super::excluded;
 use super::findings::{
     PartFacts, PartFinding, PartQuestion, identified, of_groups_and_sessions, of_model,
     of_preferences, of_realizations, told_apart,
@@ -19,19 +19,17 @@ use super::results::PartResults;
 use super::sequential::{self, sequential_effects};
 use super::trials::Asked;
 use crate::analyze::Rules;
-use crate::analyze::exclude;
 use crate::analyze::findings::Pair;
 use crate::analyze::record::{Field as _, Number as _};
 use crate::analyze::results::Correlation;
-use crate::analyze::select::{Include, Whose, state_counts};
+use crate::analyze::select::Include;
 use crate::analyze::warning::Warning;
 use std::collections::{BTreeMap, BTreeSet};
 use study_base::text::{ModelId, PartId, ParticipantId, counted};
 use study_plan::protocol::pairs::Pairs;
 use study_plan::protocol::parts::{Part, Presentations, Task, TrackRules};
 use study_plan::protocol::{Answer, Protocol, Role};
-use study_session::outcome::ratings::Origin;
-use study_session::outcome::{RatingRow, Status};
+use study_session::outcome::RatingRow;
 use study_stats::describe::{is_constant, mean};
 use study_stats::sequential::Answered;
 
@@ -42,35 +40,25 @@ use study_stats::sequential::Answered;
 /// presented.
 pub fn parts(study: &StudyData<'_>, include: Include) -> Vec<PartAnalysis> {
     let protocol = study.protocol;
-    let origin = |row: &RatingRow| Origin::of(row.simulated, row.pilot);
-    let origins: Vec<Origin> = study.rows.iter().map(origin).collect();
-    let whose = Whose::of(&origins, include);
-    let unfinished = protocol.analysis.unfinished;
-    let left_out: BTreeSet<&ParticipantId> = (study.participants.iter())
-        .filter(|p| !state_counts(p.state, unfinished))
-        .map(|p| &p.participant)
-        .collect();
-    let counts = |r: &&RatingRow| {
-        let counts = whose.counts(origin(r)) && !left_out.contains(&r.participant);
-        counts && !r.practice && r.status == Status::Ok
-    };
-    let rows: Vec<&RatingRow> = study.rows.iter().filter(counts).collect();
+    let counting = Counting::of(study, include);
+    let rows = study.rows.iter().filter(|row| counting.row(row));
+    let rows: Vec<&RatingRow> = rows.collect();
     let intervals = Intervals::of(study.intervals);
     let rules = Rules::of(protocol, "", include);
     let one = |part: &Part| {
-        let of_part = |r: &&&RatingRow| r.part.as_ref() == Some(&part.id);
-        let all: Vec<&RatingRow> = rows.iter().filter(of_part).copied().collect();
-        let judged = excluded::trials((protocol, part), &all, &intervals);
-        let (excluded_by, exclusions) = exclude::apply(&rules.exclude, &judged);
-        let kept = (all.iter().zip(&excluded_by)).filter(|(_, rule)| rule.is_none());
-        let rows: Vec<&RatingRow> = kept.map(|(row, _)| *row).collect();
+        let PartRows {
+            all,
+            kept: rows,
+            exclusions,
+        } = Counting::of_part(study, part, &rows, &intervals, &rules.exclude);
         let found = |rows: &[&RatingRow]| of_part_task(study, part, rows, &intervals, &rules);
         let mut own = found(&rows)?;
         if rows.len() < all.len() {
             own.results.before_exclusion = Some(found(&all)?.results.before_exclusion());
         }
         let who: BTreeSet<_> = rows.iter().map(|r| &r.participant).collect();
-        own.warnings.extend(searchers(protocol, &rows));
+        own.warnings
+            .extend(searchers(protocol, rows.iter().copied()));
         let facts = PartFacts {
             alpha: rules.alpha,
             participants: who.len(),
@@ -180,11 +168,15 @@ fn of_part_task(
     }
 }
 
-/// Participants who took part in the search that the study confirms, such as after the correction of an id.
-fn searchers(protocol: &Protocol, rows: &[&RatingRow]) -> Option<Warning> {
+/// Participants with some of these rows who took part in the search that the study confirms, such as after the correction of an
+/// id by an earlier release.
+fn searchers<'a>(
+    protocol: &Protocol,
+    rows: impl Iterator<Item = &'a RatingRow>,
+) -> Option<Warning> {
     let search = protocol.confirms.as_ref()?;
-    let both = |row: &&&RatingRow| !row.simulated && search.was_searcher(&row.participant);
-    let both: BTreeSet<_> = rows.iter().filter(both).map(|r| &r.participant).collect();
+    let both = |row: &&RatingRow| !row.simulated && search.was_searcher(&row.participant);
+    let both: BTreeSet<_> = rows.filter(both).map(|r| &r.participant).collect();
     let names: Vec<&str> = both.iter().map(|id| id.as_str()).collect();
     (!names.is_empty()).then(|| Warning {
         code: "searchers",
@@ -194,6 +186,13 @@ fn searchers(protocol: &Protocol, rows: &[&RatingRow]) -> Option<Warning> {
             names.join(", ")
         ),
     })
+}
+
+/// The same of all answers of a study that count, ratings as well.
+pub(crate) fn searchers_of(study: &StudyData<'_>, include: Include) -> Option<Warning> {
+    let counting = Counting::of(study, include);
+    let rows = study.rows.iter().filter(|row| counting.row(row));
+    searchers(study.protocol, rows)
 }
 
 /// A search has no test: what it found is confirmed with participants who did not search.

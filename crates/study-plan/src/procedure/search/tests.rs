@@ -117,7 +117,7 @@ fn a_journal_that_its_rule_would_not_give_is_found() {
         let rule = rule(choose, 9);
         let trials = run(&rule, &lattice, &[0.3, 0.9]);
         let search = || Search::new(&rule, &lattice, &mut stream()).unwrap();
-        assert_eq!(verify_search(search(), &trials), Ok(()));
+        assert_eq!(verify_search(search(), &trials, &[]), Ok(()));
         let text = serde_json::to_string(&rule).unwrap();
         assert_eq!(serde_json::from_str::<SearchRule>(&text).unwrap(), rule);
         // a trial without an answer is repeated
@@ -129,10 +129,10 @@ fn a_journal_that_its_rule_would_not_give_is_found() {
                 ..trials[6]
             },
         );
-        assert_eq!(verify_search(search(), &declined), Ok(()));
+        assert_eq!(verify_search(search(), &declined, &[]), Ok(()));
         let mut other = trials.clone();
         other[5].pair = [other[5].pair[0], other[5].pair[1] ^ 1];
-        let found = verify_search(search(), &other);
+        let found = verify_search(search(), &other, &[]);
         assert!(
             matches!(found, Err(SearchMismatch::Presented { trial: 6, .. })),
             "{found:?}"
@@ -143,11 +143,11 @@ fn a_journal_that_its_rule_would_not_give_is_found() {
             trial: 3,
             preferred: 99,
         };
-        assert_eq!(verify_search(search(), &other), Err(none));
+        assert_eq!(verify_search(search(), &other, &[]), Err(none));
         let mut other = trials.clone();
         other.push(trials[0]);
         let ended = SearchMismatch::Ended { trial: 10 };
-        assert_eq!(verify_search(search(), &other), Err(ended));
+        assert_eq!(verify_search(search(), &other, &[]), Err(ended));
     }
     // a changed answer shows in a trial after it
     let rule = rule(MODEL, 12);
@@ -156,9 +156,72 @@ fn a_journal_that_its_rule_would_not_give_is_found() {
     trials[3].preferred = trials[3].preferred.map(|p| a + b - p);
     let search = Search::new(&rule, &lattice, &mut stream()).unwrap();
     assert!(matches!(
-        verify_search(search, &trials),
+        verify_search(search, &trials, &[]),
         Err(SearchMismatch::Presented { .. })
     ));
+}
+
+/// A search of which points are left out presents them no more, and is replayed from its journal.
+#[test]
+fn a_point_that_is_left_out_is_proposed_no_more() {
+    let lattice = square(3);
+    for choose in [MODELS[0], MODELS[1], Choose::Sobol, Choose::Random] {
+        let rule = rule(choose, 12);
+        let fresh = || Search::new(&rule, &lattice, &mut stream()).unwrap();
+        let calm = run(&rule, &lattice, &[0.0, 1.0]);
+        let (mut search, mut trials, mut left_out) = (fresh(), Vec::new(), Vec::new());
+        while let Some(pair) = search.next() {
+            assert!(
+                left_out
+                    .iter()
+                    .all(|out: &LeftOut| !pair.contains(&out.point))
+            );
+            // The device plays neither the first point of the third pair nor that of the eighth.
+            let after = trials.len();
+            if [2, 7].contains(&after) && left_out.iter().all(|out| out.after < after) {
+                search.leave_out(pair[0]);
+                left_out.push(LeftOut {
+                    point: pair[0],
+                    after,
+                });
+                continue;
+            }
+            let answer = nearer(&lattice, &[0.0, 1.0], pair);
+            search.answer(&answer);
+            trials.push(RecordedPair {
+                pair,
+                preferred: Some(answer.preferred),
+            });
+        }
+        assert_eq!((trials.len(), left_out.len()), (12, 2));
+        assert_eq!(trials[..2], calm[..2]);
+        assert!(
+            trials[2..]
+                .iter()
+                .all(|t| !t.pair.contains(&left_out[0].point))
+        );
+        assert_eq!(verify_search(fresh(), &trials, &left_out), Ok(()));
+        let without = verify_search(fresh(), &trials, &[]);
+        let turned = SearchMismatch::Presented {
+            trial: 3,
+            recorded: trials[2].pair,
+            computed: calm[2].pair,
+        };
+        assert_eq!(without, Err(turned));
+        let mut again = fresh();
+        again.replay(&trials[..9], &left_out);
+        assert_eq!(again.next(), Some(trials[9].pair));
+        assert!(
+            !left_out
+                .iter()
+                .any(|out| again.best_point() == Some(out.point))
+        );
+    }
+    // The last two stay.
+    let mut search = Search::new(&rule(Choose::Sobol, 5), &square(2), &mut stream()).unwrap();
+    (0..4).for_each(|point| search.leave_out(point));
+    assert_eq!(search.next(), Some([2, 3]));
+    assert!(!search.can_leave_out(2) && !search.can_leave_out(0));
 }
 
 /// Whatever is answered, no point outside the certificate is proposed.

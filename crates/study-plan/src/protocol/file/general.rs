@@ -65,7 +65,7 @@ pub(super) const SESSION: &[Key] = keys! {
     /// Who types the participant's answers. Each has screens of their own.
     "entry": Kind::Word(Entry::WORDS), r#""experimenter""#, default(r#""participant""#);
     /// The longest interruption after which a session simply resumes. After a longer one
-    /// the operator chooses: restart the block, continue (which is recorded), or record a
+    /// the operator chooses: restart the block (not of a search), continue (which is recorded), or record a
     /// drop-out.
     "resume_within_h": Kind::not_negative("h"), "2.5", default("4");
     /// The longest pause between feeling and answering: the program was left or paused, waited

@@ -40,10 +40,14 @@ pub(super) fn verify_searches(
                 "trial {} does not present two points of its space in the planned order",
                 trial.trial
             ),
-            None => match verify_search(search, &session.history.compared(&part.id, space)) {
-                Ok(()) => continue,
-                Err(why) => why.to_string(),
-            },
+            None => {
+                let compared = session.history.compared(&part.id, space);
+                let left_out = session.history.left_out(&part.id, space);
+                match verify_search(search, &compared, &left_out) {
+                    Ok(()) => continue,
+                    Err(why) => why.to_string(),
+                }
+            }
         };
         let what = format!("search `{}`: {what}", part.id);
         found.push(Finding::problem(place, what));
