@@ -572,9 +572,13 @@ for (part in kept("identification")) {
       put("identification/information/corrected_ci95_hi", max(stimulus - all_lost * exp(-half), 0))
     }
   }
+  # Guesses of a single answer have no variance.
+  several <- own[sapply(own, sum) > 1]
+  n <- length(several)
+  if (n < length(own)) cat("Participants with a single answer are left out of the test against guesses.\n")
   if (n > 1) {
-    above <- sapply(own, function(m) sum(diag(m)) / sum(m) - guessed(m))
-    guesses <- sapply(own, function(m) {
+    above <- sapply(several, function(m) sum(diag(m)) / sum(m) - guessed(m))
+    guesses <- sapply(several, function(m) {
       all <- sum(m)
       product <- rowSums(m) * colSums(m)
       alone <- sum(product * (all - rowSums(m)) * (all - colSums(m)))
