@@ -531,11 +531,16 @@ escaped <- function(name) {
 for (part in kept("identification")) {
   put <- of_part(part)
   question <- setting(paste("identification", part))
-  named <- ratings[ratings$included & ratings$part == part & !is.na(ratings[[question]]), ]
+  # Of an answer that was corrected after the right label was told, the first one counts.
+  given <- as.character(ratings[[question]])
+  first <- ratings[["answer_before_feedback"]]
+  if (!is.null(first)) given <- ifelse(is.na(first), given, first)
+  here <- ratings$included & ratings$part == part & !is.na(given)
+  named <- ratings[here, ]
   if (nrow(named) == 0) next
   names <- labels$value[labels$table == "ratings" & labels$column == question]
   named$right <- factor(settings$value[match(paste("label", part, named$model), settings$key)], levels = names)
-  named$given <- factor(as.character(named[[question]]), levels = names)
+  named$given <- factor(given[here], levels = names)
   named$value <- (named$right == named$given) + 0
   original <- realizations$duplicate_of[match(named$model, realizations$id)]
   named$felt <- ifelse(is.na(original), as.character(named$model), as.character(original))
