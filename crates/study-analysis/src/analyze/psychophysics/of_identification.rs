@@ -52,7 +52,7 @@ pub(super) fn of_identification(
         task: "identification",
         trials: answers.len(),
         results,
-        warnings: (few_trials(answers.len(), labels.len()).into_iter())
+        warnings: (few_trials(own, answers.len()).into_iter())
             .chain(not_learned(study, part, own, rows))
             .collect(),
         names: Vec::new(),
@@ -89,17 +89,11 @@ fn shares(
     cells.into_iter().map(one).collect()
 }
 
-/// Fewest answers for each cell of the matrix that need no warning (Miller 1955).
-const TRIALS_OF_A_CELL: usize = 5;
-
-fn few_trials(trials: usize, labels: usize) -> Option<Warning> {
-    let needed = TRIALS_OF_A_CELL * labels * labels;
-    (trials > 0 && trials < needed).then(|| Warning {
+fn few_trials(own: &Identification, answers: usize) -> Option<Warning> {
+    let text = own.too_few(answers).filter(|_| answers > 0)?;
+    Some(Warning {
         code: "few-trials",
-        text: format!(
-            "{trials} answers among {labels} labels are fewer than {needed}, {TRIALS_OF_A_CELL} for each cell of the \
-             confusion matrix: information transfer is uncertain, although its bias is corrected"
-        ),
+        text,
     })
 }
 
