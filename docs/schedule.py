@@ -310,6 +310,17 @@ def pairs_of(seed, part, pairs, order, repetitions, interval_order, version, kin
         yield f"{b},{a}" if draw else f"{a},{b}"
 
 
+def practice_of(seed, part, models, rounds, draw, kind, number):
+    stream = Stream(seed, "schedule", "part", part, "practice", kind, str(number))
+    for _ in range(rounds):
+        once = list(models)
+        if draw == "rounds":
+            stream.shuffle(once)
+        else:
+            once = [models[stream.below(len(models))] for _ in models]
+        yield from once
+
+
 def constant_levels(seed, track, levels, repetitions, kind, number):
     stream = Stream(seed, "track", track, kind, str(number))
     for _ in range(repetitions):
@@ -326,6 +337,7 @@ def main():
     what.add_argument("--pairs", help="such as a/b,a/c, of a part")
     what.add_argument("--track", action="append", help="ID:METHOD:TRIALS:CATCH:EASY, of a part")
     what.add_argument("--constant", help="ID:LEVELS:REPETITIONS, levels by comma")
+    what.add_argument("--practice", help="ids by comma, of a part with a criterion")
     parser.add_argument("--part", help="its id")
     parser.add_argument("--repetitions", type=int)
     parser.add_argument("--order", help="blocked, shuffled, williams, latin-square or fixed")
@@ -333,6 +345,8 @@ def main():
     parser.add_argument("--min-distance", type=int)
     parser.add_argument("--interval-order", default="balanced", choices=["balanced", "random"])
     parser.add_argument("--order-version", type=int, default=1, choices=[1, 2])
+    parser.add_argument("--rounds", type=int)
+    parser.add_argument("--draw", default="rounds", choices=["rounds", "independent"])
     parser.add_argument("--kind", default="row", choices=["row", "pilot", "simulated"])
     parser.add_argument("--numbers", default="1", help="7 or 1-40")
     a = parser.parse_args()
@@ -359,6 +373,11 @@ def main():
 
         def lines(number):
             return tracks_of(a.seed, a.part, tracks, a.order_version, a.kind, number)
+    elif a.practice:
+        head, practice = "model", a.practice.split(",")
+
+        def lines(number):
+            return practice_of(a.seed, a.part, practice, a.rounds, a.draw, a.kind, number)
     else:
         track, levels, repetitions = a.constant.split(":")
         head = "level"

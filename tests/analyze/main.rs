@@ -8,6 +8,7 @@ mod docs;
 mod factors;
 mod findings;
 mod golden;
+mod identification;
 mod import;
 #[path = "../support/json_schema.rs"]
 mod json_schema;

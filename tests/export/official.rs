@@ -481,6 +481,68 @@ fn r_comes_to_the_same_numbers() {
     }
 }
 
+/// A participant with one answer has no variance of guesses, and of an answer that was corrected after the right label was told the
+/// first one counts.
+#[test]
+#[ignore = "needs R with lme4, lmerTest and ordinal: .ci/export runs it"]
+fn r_counts_the_answers_of_an_identification_as_the_program_does() {
+    let home = tempfile::tempdir().unwrap();
+    let kind = "identification";
+    let protocol = new(kind, home.path()).join("protocol.toml");
+    let text = fs::read_to_string(&protocol).unwrap();
+    let text = text.replace("repetitions = 6 ", "repetitions = 1 ");
+    let text = text.replace("feedback = \"practice\" ", "feedback = \"always\" ");
+    let groups = "\n[groups]\n[[groups.list]]\nid = \"all\"\nshare = 3\n[[groups.list]]\nid = \"one\"\nmodels = [\"low-soft\"]\n";
+    fs::write(&protocol, text + groups).unwrap();
+    let folder = rehearsed(&home.path().join(kind), 8, home.path(), &[]);
+    let table = fs::read_to_string(folder.join("ratings.csv")).unwrap();
+    let mut lines = table
+        .lines()
+        .map(|line| line.split(',').collect::<Vec<_>>());
+    let header = lines.next().unwrap();
+    let at = |name: &str| header.iter().position(|h| *h == name).unwrap();
+    let wrong = lines
+        .find(|row| row[at("practice")] == "false" && row[at("correct")] == "false")
+        .unwrap();
+    let right = wrong[at("model")].replace("low-", "light and ");
+    let right = right.replace("high-", "heavy and ");
+    let (code, out, err) = study(
+        &[
+            "correct",
+            folder.to_str().unwrap(),
+            wrong[at("participant")],
+            "--trial",
+            wrong[at("trial")],
+            "--question",
+            "which",
+            "--to",
+            &right,
+            "--reason",
+            "a slip",
+        ],
+        home.path(),
+    );
+    assert_eq!(code, 0, "{out}{err}");
+    let simulated = ["--include", "simulated"];
+    let (out, _) = export(&folder, "r", home.path(), "r", &simulated);
+    let exported = fs::read_to_string(out.join("ratings.csv")).unwrap();
+    assert!(
+        exported
+            .lines()
+            .next()
+            .unwrap()
+            .contains("answer_before_feedback")
+    );
+    let Some((good, said)) = r(&out, &["analysis.R"]) else {
+        return;
+    };
+    assert!(good && said.contains("numbers agree"), "{said}");
+    assert!(
+        said.contains("Participants with a single answer are left out"),
+        "{said}"
+    );
+}
+
 #[test]
 #[ignore = "needs R with lme4, lmerTest and ordinal: .ci/export runs it"]
 fn r_refuses_changed_tables_and_other_numbers() {

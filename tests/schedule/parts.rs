@@ -131,6 +131,58 @@ fn words(texts: &[&str]) -> Vec<String> {
     texts.iter().map(|text| (*text).to_owned()).collect()
 }
 
+/// The practice of an identification that has a criterion, in rounds and independently.
+#[test]
+fn a_script_makes_the_same_practice() {
+    for draw in ["rounds", "independent"] {
+        let text = format!(
+            "format = \"study-protocol/3\"\n[study]\nid = \"s\"\ntitle = \"s\"\nseed = 2007\n\
+             [design]\nparticipants = 10\n[analysis]\nprimary = \"which\"\n\
+             [device]\nkind = \"simulated\"\nlimits = {{ force_n = 12.0, velocity_mm_s = 1000.0 }}\n\
+             [[models]]\nid = \"a\"\nfile = \"a.toml\"\n[[models]]\nid = \"b\"\nfile = \"b.toml\"\n\
+             [[models]]\nid = \"c\"\nfile = \"c.toml\"\n\
+             [[parts]]\nid = \"which\"\nkind = \"identification\"\nprompt = \"?\"\nrepetitions = 1\n\
+             answers = [{{ label = \"1\", models = [\"a\", \"b\"] }}, {{ label = \"2\", models = [\"c\"] }}]\n\
+             practice = [\"c\", \"a\", \"b\"]\n\
+             criterion = {{ correct = 3, of = 4, rounds = 5, draw = \"{draw}\" }}\n"
+        );
+        let parsed = parse("protocol.toml", &text);
+        let found = parsed.findings.render(false);
+        let protocol = parsed.protocol.unwrap_or_else(|| panic!("{found}"));
+        let planner = Planner::new(&protocol, None).expect("a feasible design");
+        for kind in KINDS {
+            let mut ours = String::from("kind,number,position,model\n");
+            for number in 1..=4 {
+                let seat = kind(number);
+                let all = planner.plan(seat).expect("an order");
+                for trial in all.iter().filter(|t| t.practice) {
+                    let model = trial.model().expect("a realization");
+                    ours += &format!("{},{number},{},{model}\n", seat.stream(), trial.position);
+                }
+            }
+            assert_eq!(ours.lines().count(), 1 + 4 * 15);
+            let kind = kind(1).stream();
+            let arguments = words(&[
+                "--part",
+                "which",
+                "--practice",
+                "c,a,b",
+                "--rounds",
+                "5",
+                "--draw",
+                draw,
+                "--kind",
+                kind,
+            ]);
+            let Some(theirs) = theirs(&arguments) else {
+                println!("not compared: there is no python3");
+                return;
+            };
+            assert_eq!(ours, theirs, "{draw} {kind}");
+        }
+    }
+}
+
 #[test]
 fn a_script_makes_the_same_orders_of_tracks() {
     for version in [1, 2] {

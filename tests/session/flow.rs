@@ -7,6 +7,7 @@ mod blinding;
 mod device;
 mod exposure;
 mod forms;
+mod identification;
 mod interpreters;
 mod part_rig;
 mod parts;

@@ -127,3 +127,46 @@ fn a_checksum_that_lost_its_name_is_a_damaged_one() {
         assert!(refused.is_err(), "{damaged}");
     }
 }
+
+/// The end of practice is replayed: one that came too early, or too late, is a problem.
+#[test]
+fn practice_that_ended_before_or_after_its_criterion_is_a_problem() {
+    let home = tempfile::tempdir().unwrap();
+    let kind = "identification";
+    let run = |arguments: &[&str]| {
+        let (code, out, err) = crate::support::study(arguments, home.path());
+        assert_eq!(code, 0, "{out}{err}");
+    };
+    run(&["new", "--seed", "20261123", kind, "--kind", kind]);
+    let path = home.path().join("identification/protocol.toml");
+    let text = fs::read_to_string(&path).unwrap();
+    let text = text.replace("correct = 7, of = 8", "correct = 3, of = 4");
+    fs::write(&path, &text).unwrap();
+    run(&["rehearse", kind, "--participants", "2", "--out", "out"]);
+    let study = StudyFolder::open(&home.path().join("out/identification")).unwrap();
+    let verify = |criterion: &str| {
+        let text = text.replace("correct = 3, of = 4", criterion);
+        let protocol = study_plan::protocol::file::parse("p", &text)
+            .protocol
+            .unwrap();
+        problems(&study.verify(Some(&protocol)).unwrap())
+    };
+    assert_eq!(verify("correct = 3, of = 4"), [""; 0]);
+    let early = verify("correct = 20, of = 20");
+    assert_eq!(early.len(), 2, "{early:?}");
+    for problem in early {
+        assert!(
+            problem.contains("practice of `which`: it ended after")
+                && problem.ends_with("before 20 of the last 20 were correct"),
+            "{problem}"
+        );
+    }
+    let late = verify("correct = 1, of = 1");
+    assert_eq!(late.len(), 2, "{late:?}");
+    for problem in late {
+        assert!(
+            problem.ends_with("began although its criterion was reached"),
+            "{problem}"
+        );
+    }
+}

@@ -44,7 +44,7 @@ pub use control::{Control, Pick};
 pub use design::{Breaks, Design, FileOrders, Order, OrderVersion, PartsOrder};
 pub use factors::{Crossing, Factor};
 pub use groups::{Assign, Assigned, GroupRules, Groups, SessionPlan};
-pub use identification::{Criterion, Feedback, Identification, Label};
+pub use identification::{Criterion, Drawn, Feedback, Identification, Label};
 pub use kinds::QuestionKind;
 pub use outcomes::{Answers, BetterEnd, Clock, Measure, OutcomeRules, Telemetry, Transform};
 pub use pairs::{IntervalOrder, Pairs};

@@ -30,7 +30,9 @@ mod tracks;
 pub use crate::protocol::{Seat, Trial};
 pub use requeue::{Felt, Requeued, breaks_constraint, requeue};
 
-use crate::protocol::{FileOrders, Identification, Mushra, PartsOrder, Protocol, Stimuli, Task};
+use crate::protocol::{
+    Drawn, FileOrders, Identification, Mushra, PartsOrder, Protocol, Stimuli, Task,
+};
 use constraints::Violation;
 use pairs::PairOrders;
 use search::SearchOrders;
@@ -231,8 +233,8 @@ pub struct Planner {
 struct PartOrders {
     part: Option<PartId>,
     practice: Vec<ModelId>,
-    /// How often practice comes at most, in orders that are drawn; `None`: once, as listed.
-    rounds: Option<u32>,
+    /// How often practice comes at most, and how it is drawn; `None`: once, as listed.
+    rounds: Option<(u32, Drawn)>,
     seed: u64,
     /// Felt before each realization.
     reference: Option<ModelId>,
@@ -314,7 +316,9 @@ impl Planner {
             Ok(PartOrders {
                 part: id.cloned(),
                 practice: design.practice,
-                rounds: (part.task.identification()).and_then(|own| Some(own.criterion?.rounds)),
+                rounds: (part.task.identification())
+                    .and_then(|own| own.criterion)
+                    .map(|criterion| (criterion.rounds, criterion.draw)),
                 seed,
                 reference: part.task.reference().cloned(),
                 kind,
@@ -432,7 +436,7 @@ impl PartOrders {
 impl PartOrders {
     /// The realizations of the practice trials, in their order for a seat.
     fn practiced(&self, seat: Seat) -> Vec<ModelId> {
-        let (Some(rounds), Some(part)) = (self.rounds, &self.part) else {
+        let (Some((rounds, draw)), Some(part)) = (self.rounds, &self.part) else {
             return self.practice.clone();
         };
         let number = seat.number().to_string();
@@ -445,10 +449,17 @@ impl PartOrders {
             &number,
         ];
         let mut stream = Stream::new(self.seed, &path);
-        let round = |_| {
-            let mut models = self.practice.clone();
-            stream.shuffle(&mut models);
-            models
+        let round = |_| match draw {
+            Drawn::Rounds => {
+                let mut models = self.practice.clone();
+                stream.shuffle(&mut models);
+                models
+            }
+            Drawn::Independent => {
+                let n = self.practice.len() as u64;
+                let one = |_| self.practice[stream.below(n) as usize].clone();
+                (0..n).map(one).collect()
+            }
         };
         (0..rounds).flat_map(round).collect()
     }

@@ -195,11 +195,14 @@ fn webers_law(part: &PartAnalysis) -> Option<String> {
 fn information(part: &PartAnalysis) -> Option<String> {
     let found = part.results.over.identification.as_ref()?;
     let bits = &found.information;
+    let ci = match bits.corrected_ci95.lo.reason() {
+        Some(why) => format!(" (no interval: {why})"),
+        None => ci(bits.corrected_ci95.ends(), apa::two),
+    };
     Some(format!(
-        "Information transfer: {} bits of {}{}, as much as {} labels that are identified without an error.",
+        "Information transfer: {} bits of {}{ci}, as much as {} labels that are identified without an error.",
         apa::two(bits.corrected.number()?),
         apa::two(bits.stimulus.number()?),
-        ci(bits.corrected_ci95.ends(), apa::two),
         apa::one(bits.items.number()?),
     ))
 }
@@ -337,8 +340,9 @@ pub(super) fn methods(part: &PartAnalysis) -> String {
         text.push(
             "Participants' shares of correct answers were compared with those of guesses that have their own \
              preferences for labels. Information transfer is that of the summed confusion matrices less its bias \
-             (Miller, 1955); similarities and biases of labels are those of Luce's (1963) choice model by maximum \
-             likelihood. Intervals are by leaving out each participant in turn (Tukey, 1958)."
+             for fixed numbers of presentations (after Miller, 1955); similarities and biases of labels are those of Luce's \
+             (1963) choice model by maximum likelihood. Intervals are by leaving out each participant in turn (Tukey, 1958), \
+             that of information transfer on the logarithm of what it lacks of the stimulus information."
                 .to_owned(),
         );
     }

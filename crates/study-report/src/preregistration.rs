@@ -17,7 +17,8 @@ use study_base::text::{Untrusted, capital, counted, escaped_json};
 use study_plan::protocol::pairs::IntervalOrder;
 use study_plan::protocol::parts::{Part, Presentations, Task, TrackRules};
 use study_plan::protocol::{
-    Assign, Order, Protocol, Question, Role, Scale, SessionPlan, Unfinished,
+    Assign, Drawn, Feedback, Identification, Order, Protocol, Question, Role, Scale, SessionPlan,
+    Unfinished,
 };
 
 /// The document for people.
@@ -354,6 +355,36 @@ fn groups(p: &Protocol) -> Option<String> {
     Some(format!("Groups: {}; {assigned}.", all.join(", ")))
 }
 
+/// The practice of an identification, after a comma.
+fn practice(own: &Identification) -> String {
+    let n = own.presentations.practice.len();
+    match own.criterion {
+        None if n == 0 => String::new(),
+        None => format!(
+            ", after {}",
+            counted(n, "practice trial", "practice trials")
+        ),
+        Some(c) => {
+            let rounds = c.rounds as usize;
+            let most = match c.draw {
+                Drawn::Rounds => format!(
+                    "{} of {}",
+                    counted(rounds, "round", "rounds"),
+                    counted(n, "trial", "trials")
+                ),
+                Drawn::Independent => format!(
+                    "{}, each drawn on its own",
+                    counted(n * rounds, "trial", "trials")
+                ),
+            };
+            format!(
+                ", after practice until {} of the last {} answers are correct (at most {most})",
+                c.correct, c.of
+            )
+        }
+    }
+}
+
 /// What the trials of a part are.
 fn trials(p: &Protocol, part: &Part) -> String {
     let each = |own: &Presentations, what: &str| {
@@ -372,16 +403,16 @@ fn trials(p: &Protocol, part: &Part) -> String {
         Task::Magnitude(own) => each(own, "magnitude estimation"),
         Task::Mushra(own) => each(&own.presentations, "rating beside a reference"),
         Task::Identification(own) => format!(
-            "{}, each is given one of {}",
+            "{}, each is given one of {}{}, {}",
             each(&own.presentations, "identification"),
-            match own.criterion {
-                None => counted(own.labels.len(), "label", "labels"),
-                Some(c) => format!(
-                    "{}, after practice until {} of the last {} answers are correct",
-                    counted(own.labels.len(), "label", "labels"),
-                    c.correct,
-                    c.of
-                ),
+            counted(own.labels.len(), "label", "labels"),
+            practice(own),
+            match own.feedback {
+                Feedback::Practice if own.presentations.practice.is_empty() =>
+                    "the right label is never told",
+                Feedback::Practice => "the right label is told after each practice trial",
+                Feedback::Always => "the right label is told after each trial",
+                Feedback::Never => "the right label is never told",
             }
         ),
         Task::Pairs(pairs) => format!(

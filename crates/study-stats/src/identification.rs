@@ -107,8 +107,13 @@ impl Confusions {
 pub struct Information {
     /// The information transmitted (mutual information), by maximum likelihood: too high by chance.
     pub transmitted: f64,
-    /// The same less its bias by Miller (1955) and Madow: (K − R − C + 1)/(2N ln 2), where K cells of the
-    /// matrix, R rows and C columns are not empty. It may fall below 0, and is at most what perfect answers transmit.
+    /// The same less its bias: Σ (1 − n/r)(1 − n/c)/(2N ln 2) over the cells that are not empty, where a cell
+    /// has n of the r answers of its row and of the c of its column. It may fall below 0, and is never above `transmitted`.
+    ///
+    /// That is Miller's (1955) bias where the numbers of presentations are fixed. The entropy of a row of r answers with
+    /// shares p is too low by Σ (1 − p)/(2r ln 2), together (K − R)/(2N ln 2) of K cells and R rows. The share q of a
+    /// column has the variance Σ r p(1 − p)/N², so that its entropy is too low by (C − S)/(2N ln 2) of C columns, where S is the
+    /// sum of n²/(r c). Drawn presentations, as Miller's, have S = 1; perfect answers S = R, and no bias.
     pub corrected: f64,
     /// The entropy of the labels that were right: what perfect answers transmit.
     pub stimulus: f64,
@@ -131,15 +136,19 @@ pub fn information(found: &Confusions) -> Option<Information> {
         let shares = counts.iter().map(|c| c / n).filter(|p| *p > 0.0);
         -shares.map(|p| p * libm::log2(p)).sum::<f64>()
     };
-    let filled = |counts: &[f64]| counts.iter().filter(|c| **c > 0.0).count() as f64;
     let rows: Vec<f64> = labels.clone().map(|l| found.right(l)).collect();
-    let columns: Vec<f64> = labels.map(|l| found.given(l)).collect();
+    let columns: Vec<f64> = labels.clone().map(|l| found.given(l)).collect();
     let (stimulus, response) = (entropy(&rows), entropy(&columns));
-    let transmitted = stimulus + response - entropy(&found.counts);
-    let cells = filled(&found.counts) - filled(&rows) - filled(&columns) + 1.0;
+    let transmitted = (stimulus + response - entropy(&found.counts)).min(stimulus);
+    let cells = labels.flat_map(|right| (0..found.labels).map(move |given| (right, given)));
+    let elsewhere = cells.filter_map(|(right, given)| {
+        let n = found.count(right, given);
+        (n > 0.0).then(|| (1.0 - n / rows[right]) * (1.0 - n / columns[given]))
+    });
+    let bias = elsewhere.sum::<f64>() / (2.0 * n * LN_2);
     (n > 0.0).then_some(Information {
         transmitted,
-        corrected: (transmitted - cells / (2.0 * n * LN_2)).min(stimulus),
+        corrected: transmitted - bias,
         stimulus,
         response,
     })
@@ -232,9 +241,13 @@ pub struct Pooled {
     /// Its standard error by the jackknife (Tukey 1958): √((n − 1)/n · Σ (θᵢ − θ̄)²), where θᵢ is the statistic
     /// without participant i.
     pub se: Option<f64>,
-    /// `estimate` ± t(.975, n − 1)·`se`.
+    /// `estimate` ± t(.975, n − 1)·`se`; `None` if the error is 0, because participants who are alike do not tell
+    /// how much others differ.
     pub ci95: Option<(f64, f64)>,
 }
+
+/// An error below this is one of rounding.
+const NO_ERROR: f64 = 1e-10;
 
 /// Statistics of the sum of the participants' confusions, each with an error over participants if it
 /// is defined without every one of them. The bootstrap's interval would be too narrow and too high: resampled
@@ -256,7 +269,8 @@ pub fn pooled(
             let squares = left.and_then(|left| describe::sum_of_squares(&left));
             let se = squares.filter(|_| n > 1.0);
             let se = se.map(|squares| ((n - 1.0) / n * squares).sqrt());
-            let half = se.and_then(|se| Some(t_quantile(0.975, n - 1.0)? * se));
+            let error = se.filter(|se| *se > NO_ERROR);
+            let half = error.and_then(|se| Some(t_quantile(0.975, n - 1.0)? * se));
             estimate.map(|estimate| Pooled {
                 estimate,
                 se,
@@ -264,6 +278,31 @@ pub fn pooled(
             })
         })
         .collect()
+}
+
+/// The corrected information of all participants together, with its error and interval over them.
+///
+/// The error is that of what is lost, L = `stimulus` − `corrected`, which has an interval on its logarithm, L·e^±h with
+/// h = t(.975, n − 1)·`se`/L, so that near perfect answers it reaches further towards more errors than towards fewer. Information
+/// below 0 counts as 0 there, and the interval lies between 0 and `stimulus`. `None` without answers.
+pub fn transfer(participants: &[Confusions]) -> Option<Pooled> {
+    let all = information(&Confusions::sum(participants.iter())?)?;
+    let lost = |found: &Confusions| information(found).map(|own| own.stimulus - own.corrected);
+    let found = pooled(participants, |found| vec![lost(found)]);
+    let se = found.first().copied().flatten()?.se;
+    let least = (all.stimulus - all.corrected).min(all.stimulus);
+    let ci95 = se
+        .filter(|se| *se > NO_ERROR && least > 0.0)
+        .and_then(|se| {
+            let half = t_quantile(0.975, participants.len() as f64 - 1.0)? * se / least;
+            let left = |half: f64| (all.stimulus - least * libm::exp(half)).max(0.0);
+            Some((left(half), left(-half)))
+        });
+    Some(Pooled {
+        estimate: all.corrected,
+        se,
+        ci95,
+    })
 }
 
 /// The least share of the variance of guesses that an error over participants may have: so few

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::fmt::Write as _;
 use study_base::text::{ModelId, Untrusted};
-use study_plan::protocol::{Criterion, Design, Order, Protocol, Role, Trial};
+use study_plan::protocol::{Criterion, Design, Drawn, Order, Protocol, Role, Trial};
 use study_plan::schedule::balance::{Balance, Balances, Spread, balances};
 
 /// Ids up to this length are used in the tables.
@@ -57,12 +57,25 @@ pub(super) fn section(
                 correct,
                 of,
                 rounds,
-            }) => writeln!(
-                out,
-                "Practice, before every order: {}, each time in an order that is drawn, until {correct} of the last \
-                 {of} answers are correct, at most {rounds} times\n",
-                ids.join(", ")
-            ),
+                draw,
+            }) => {
+                let (how, most) = match draw {
+                    Drawn::Rounds => (
+                        "each time in an order that is drawn",
+                        format!("{rounds} times"),
+                    ),
+                    Drawn::Independent => (
+                        "each drawn on its own",
+                        format!("{} trials", ids.len() * rounds as usize),
+                    ),
+                };
+                writeln!(
+                    out,
+                    "Practice, before every order: {}, {how}, until {correct} of the last {of} answers are correct, \
+                     at most {most}\n",
+                    ids.join(", ")
+                )
+            }
         };
     }
     let code = |trial: &Trial| {

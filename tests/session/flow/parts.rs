@@ -2,10 +2,8 @@
 
 use super::part_rig::*;
 use super::rig::{DeviceMood, Rig};
-use study_base::text::QuestionId;
-use study_plan::protocol::{Answer, Control, QuestionKind, Seat, Stimuli, kinds};
-use study_session::outcome::{Event, Failure, FormId, RatingRow};
-use study_session::session::view::MessageKind;
+use study_plan::protocol::{Answer, QuestionKind, Seat, Stimuli, kinds};
+use study_session::outcome::{Event, Failure, FormId};
 use study_session::session::{Effect, Input, Screen};
 
 #[test]
@@ -318,134 +316,6 @@ fn feedback_says_if_the_answer_was_correct_and_only_where_it_is_wanted() {
             false => assert!(said.is_empty()),
         }
     }
-}
-
-/// The labels are those of the study in every language, and the right one is told where it is wanted.
-#[test]
-fn the_right_label_is_told_after_practice_or_always_or_never() {
-    for (feedback, practice, counted) in [
-        ("practice", true, false),
-        ("always", true, true),
-        ("never", false, false),
-    ] {
-        let more = format!("practice = [\"VVB-9\", \"XQZ-7\"]\nfeedback = \"{feedback}\"");
-        let mut protocol = identification(&more);
-        protocol.text.lang = Some("de".to_owned());
-        let mut rig = Rig::new(protocol.clone());
-        let mut said = Vec::new();
-        while rig.ending.is_none() {
-            match rig.view().screen {
-                Screen::Form { questions, .. } => {
-                    let options = match questions[0].kind.control() {
-                        Control::List { options, .. } => options.to_vec(),
-                        _ => panic!(),
-                    };
-                    assert_eq!(options, ["first", "no"]);
-                    rig.wait(1.0);
-                    let answer = Answer::Choice(vec!["first".to_owned()]);
-                    rig.send(Input::Answer(vec![(questions[0].id.clone(), answer)]));
-                }
-                _ => {
-                    rig.step();
-                }
-            }
-            if let Screen::Message { kind, text } = rig.view().screen
-                && kind == MessageKind::Feedback
-            {
-                said.push(text);
-            }
-        }
-        let rows = rig.session.history().rating_rows(&protocol);
-        let told = |row: &&RatingRow| if row.practice { practice } else { counted };
-        let expected: Vec<&str> = (rows.iter().filter(told))
-            .map(|row| match row.correct {
-                Some(true) => "Das war richtig.",
-                _ => "Das war nicht richtig. Es war: no",
-            })
-            .collect();
-        assert_eq!(said, expected, "{feedback}");
-        let right = |row: &RatingRow| row.model.as_ref().unwrap().as_str() == "XQZ-7";
-        assert!(rows.iter().all(|row| row.correct == Some(right(row))));
-        assert_eq!(rows.len(), 2 + 6);
-    }
-}
-
-/// Practice ends with the criterion, also after a resume, or goes through all rounds; its pages do not say
-/// how many trials are left.
-#[test]
-fn practice_ends_once_enough_of_the_last_answers_are_correct() {
-    let protocol = identification(
-        "practice = [\"XQZ-7\", \"KJW-3\"]\ncriterion = { correct = 3, of = 4, rounds = 5 }",
-    );
-    let named = protocol.parts[0].task.identification().unwrap();
-    let answer = |rig: &Rig, right: bool| {
-        let open = rig.session.history().open().unwrap();
-        let label = named.label_of(open.trial.model().unwrap()).unwrap();
-        let other = named.labels.iter().find(|l| l.text != label).unwrap();
-        let text = if right { label } else { &other.text };
-        vec![(
-            QuestionId::new("which").unwrap(),
-            Answer::Choice(vec![text.to_owned()]),
-        )]
-    };
-    // The third answer is the first correct one.
-    let practice = |first_right: usize, resumed: Option<usize>| {
-        let mut rig = Rig::new(protocol.clone());
-        let mut given = 0;
-        let mut quit = resumed;
-        loop {
-            let view = rig.view();
-            if let Some(progress) = view.progress.filter(|p| p.practice) {
-                assert_eq!(progress.total, None);
-            }
-            if view.progress.is_some_and(|p| !p.practice) {
-                break;
-            }
-            if quit == Some(given) && matches!(view.screen, Screen::Reference { .. }) {
-                quit = None;
-                rig.send(Input::Quit);
-                rig = Rig::back(protocol.clone(), rig.journal.clone(), 10.0);
-                continue;
-            }
-            match view.screen {
-                Screen::Form { .. } => {
-                    rig.wait(1.0);
-                    let answers = answer(&rig, given >= first_right);
-                    given += 1;
-                    rig.send(Input::Answer(answers));
-                }
-                _ => {
-                    rig.step();
-                }
-            }
-        }
-        let ended = rig.count(|e| matches!(e, Event::PracticeEnded { .. }));
-        let rows = rig.session.history().rating_rows(&protocol);
-        let rows = rows.iter().filter(|r| r.practice).count();
-        assert_eq!(rows, given);
-        (given, ended)
-    };
-    assert_eq!(practice(0, None), (4, 1));
-    assert_eq!(practice(2, None), (5, 1));
-    assert_eq!(practice(2, Some(4)), (5, 1));
-    // The criterion with the last answer of all: nothing is left to end.
-    assert_eq!(practice(7, None), (10, 0));
-    assert_eq!(practice(99, None), (10, 0));
-    // Each round has each realization once, in orders that differ between seats.
-    let orders: Vec<Vec<String>> = (1..=6)
-        .map(|row| {
-            let trials = study_plan::schedule::plan(&protocol, None, Seat::Row(row)).unwrap();
-            let own = trials.iter().filter(|t| t.practice);
-            own.map(|t| t.model().unwrap().to_string()).collect()
-        })
-        .collect();
-    for order in &orders {
-        assert!(
-            order.chunks(2).all(|round| round[0] != round[1]),
-            "{order:?}"
-        );
-    }
-    assert!(orders[1..].iter().any(|order| *order != orders[0]));
 }
 
 #[test]

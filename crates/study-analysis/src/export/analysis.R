@@ -494,8 +494,9 @@ for (part in kept("mushra")) {
 #' ## Identification
 #'
 #' The confusion matrix of all participants has the labels that were right as rows and those that were
-#' given as columns. Its information transfer is less its bias (Miller 1955); similarities and biases of
-#' labels are those of Luce's choice model, which is a log-linear model of rows and of pairs of cells, after
+#' given as columns. Its information transfer is less its bias for fixed numbers of presentations (after
+#' Miller 1955), with an interval on the logarithm of what is lost; similarities and biases of labels are
+#' those of Luce's choice model, which is a log-linear model of rows and of pairs of cells, after
 #' 1/labels was added to each cell. Participants are compared with guesses by a t test, whose standard
 #' error is at least half of that of guesses.
 
@@ -504,10 +505,9 @@ entropy <- function(counts) {
   -sum(p * log2(p))
 }
 corrected_bits <- function(counts) {
-  filled <- function(of) sum(of > 0)
-  cells <- filled(counts) - filled(rowSums(counts)) - filled(colSums(counts)) + 1
-  bits <- entropy(rowSums(counts)) + entropy(colSums(counts)) - entropy(counts) - cells / (2 * sum(counts) * log(2))
-  min(bits, entropy(rowSums(counts)))
+  elsewhere <- (1 - counts / rowSums(counts)) * (1 - t(t(counts) / colSums(counts)))
+  bias <- sum(elsewhere[counts > 0]) / (2 * sum(counts) * log(2))
+  entropy(rowSums(counts)) + entropy(colSums(counts)) - entropy(counts) - bias
 }
 biased_choice <- function(counts) {
   counts <- counts + 1 / nrow(counts)
@@ -531,11 +531,16 @@ escaped <- function(name) {
 for (part in kept("identification")) {
   put <- of_part(part)
   question <- setting(paste("identification", part))
-  named <- ratings[ratings$included & ratings$part == part & !is.na(ratings[[question]]), ]
+  # Of an answer that was corrected after the right label was told, the first one counts.
+  given <- as.character(ratings[[question]])
+  first <- ratings[["answer_before_feedback"]]
+  if (!is.null(first)) given <- ifelse(is.na(first), given, first)
+  here <- ratings$included & ratings$part == part & !is.na(given)
+  named <- ratings[here, ]
   if (nrow(named) == 0) next
   names <- labels$value[labels$table == "ratings" & labels$column == question]
   named$right <- factor(settings$value[match(paste("label", part, named$model), settings$key)], levels = names)
-  named$given <- factor(as.character(named[[question]]), levels = names)
+  named$given <- factor(given[here], levels = names)
   named$value <- (named$right == named$given) + 0
   original <- realizations$duplicate_of[match(named$model, realizations$id)]
   named$felt <- ifelse(is.na(original), as.character(named$model), as.character(original))
@@ -558,14 +563,27 @@ for (part in kept("identification")) {
   put("identification/information/corrected", bits)
   put("identification/information/transmitted", stimulus + entropy(colSums(counts)) - entropy(counts))
   put("identification/information/stimulus", stimulus)
-  put("identification/information/items", 2^bits)
+  put("identification/information/items", 2^max(bits, 0))
   n <- length(own)
   if (n > 1) {
-    left <- sapply(seq_len(n), function(i) corrected_bits(Reduce(`+`, own[-i])))
+    lost <- function(m) entropy(rowSums(m)) - corrected_bits(m)
+    left <- sapply(seq_len(n), function(i) lost(Reduce(`+`, own[-i])))
     se <- sqrt((n - 1) / n * sum((left - mean(left))^2))
-    put("identification/information/corrected_ci95_lo", bits - qt(0.975, n - 1) * se)
-    above <- sapply(own, function(m) sum(diag(m)) / sum(m) - guessed(m))
-    guesses <- sapply(own, function(m) {
+    # Participants who are alike have no interval.
+    if (se > 1e-10) {
+      all_lost <- min(lost(counts), stimulus)
+      half <- qt(0.975, n - 1) * se / all_lost
+      put("identification/information/corrected_ci95_lo", max(stimulus - all_lost * exp(half), 0))
+      put("identification/information/corrected_ci95_hi", max(stimulus - all_lost * exp(-half), 0))
+    }
+  }
+  # Guesses of a single answer have no variance.
+  several <- own[sapply(own, sum) > 1]
+  n <- length(several)
+  if (n < length(own)) cat("Participants with a single answer are left out of the test against guesses.\n")
+  if (n > 1) {
+    above <- sapply(several, function(m) sum(diag(m)) / sum(m) - guessed(m))
+    guesses <- sapply(several, function(m) {
       all <- sum(m)
       product <- rowSums(m) * colSums(m)
       alone <- sum(product * (all - rowSums(m)) * (all - colSums(m)))
@@ -574,7 +592,8 @@ for (part in kept("identification")) {
     se <- sqrt(max(var(above) / n, sum(guesses) / (4 * n^2)))
     test <- c(mean = mean(above), se = se, t = mean(above) / se, df = n - 1,
               p = 2 * pt(-abs(mean(above) / se), n - 1))
-    for (what in names(test)) put(paste0("identification/above_guessing/", what), test[[what]])
+    # Not of participants who each always gave the same label.
+    if (se > 0) for (what in names(test)) put(paste0("identification/above_guessing/", what), test[[what]])
   }
   for (i in seq_along(names)) for (j in seq_along(names)) if (i < j) {
     rate <- function(k, n) (k + 0.5) / (n + 1)

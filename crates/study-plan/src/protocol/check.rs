@@ -3,6 +3,7 @@
 //! No finding here prevents a study from running. Warnings that need the models'
 //! tables or the orders are given where these are loaded.
 
+mod counted_out;
 mod exposure;
 mod ladders;
 mod parts;

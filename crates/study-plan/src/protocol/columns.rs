@@ -317,7 +317,7 @@ table! {
         Track: text("track", "track").empty("the trial belongs to none").with_parts(),
         Level: number("level", "level of the comparison, in units of its family; of a track with `relative`, its distance from the standard as the track counts it")
             .empty("the trial has no family, or was never presented").with_parts(),
-        Correct: flag("correct", "whether the answer is correct, after corrections")
+        Correct: flag("correct", "whether the answer is correct, after corrections; of `answer_before_feedback`, if there is one")
             .empty("no answer is correct or wrong, or it was not answered").with_parts(),
         Replays: whole("replays", "how often the trial was felt again before the answer")
             .empty(NEVER_PRESENTED).with_replays(),
@@ -364,6 +364,8 @@ table! {
             .unit("s").empty("less than 1 s, or not answered").optional(),
         FeltAgainAfterS: number("felt_again_after_s", "pause after which an earlier attempt was felt again instead of answered, as it was longer than the protocol allows")
             .unit("s").empty("there was none, or its length is not known").optional(),
+        AnswerBeforeFeedback: text("answer_before_feedback", "answer of an identification before the right label was told, which is the one that is analyzed")
+            .empty("the answer was not corrected after that").optional().with_parts(),
     }
 }
 

@@ -36,8 +36,28 @@ pub struct Criterion {
     pub correct: u32,
     /// The last answers among which they are counted.
     pub of: u32,
-    /// How often the practice trials come at most, each time in an order that is drawn.
+    /// How often the practice trials come at most.
     pub rounds: u32,
+    /// How they are drawn. Absent from documents and fingerprints if it is in rounds.
+    #[serde(skip_serializing_if = "Drawn::is_in_rounds")]
+    pub draw: Drawn,
+}
+
+words! {
+    /// How the practice trials before a criterion are drawn.
+    Drawn {
+        /// In rounds, in each of which every practice trial comes once, in an order that is drawn. Whoever is told the
+        /// right labels can count out which are left.
+        Rounds = "rounds",
+        /// Each on its own, all of `practice` being as likely whatever came before.
+        Independent = "independent",
+    }
+}
+
+impl Drawn {
+    fn is_in_rounds(&self) -> bool {
+        *self == Self::Rounds
+    }
 }
 
 impl Criterion {
@@ -54,14 +74,29 @@ words! {
     Feedback {
         /// After each practice trial, so that the labels can be learned.
         Practice = "practice",
-        /// After each trial.
+        /// After each trial. Whoever counts then knows which labels are left in a block.
         Always = "always",
         /// Not at all.
         Never = "never",
     }
 }
 
+/// Fewest answers for each cell of a confusion matrix that need no warning (Miller 1955).
+const ANSWERS_OF_A_CELL: usize = 5;
+
 impl Identification {
+    /// What so many answers of all participants are too few for.
+    pub fn too_few(&self, answers: usize) -> Option<String> {
+        let labels = self.labels.len();
+        let needed = ANSWERS_OF_A_CELL * labels * labels;
+        (answers < needed).then(|| {
+            format!(
+                "{answers} answers among {labels} labels are fewer than {needed}, {ANSWERS_OF_A_CELL} for each cell of the \
+                 confusion matrix: information transfer is uncertain, although its bias is corrected"
+            )
+        })
+    }
+
     /// The label of a realization.
     pub fn label_of(&self, model: &ModelId) -> Option<&str> {
         let label = self.labels.iter().find(|l| l.models.contains(model));

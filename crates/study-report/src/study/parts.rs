@@ -6,7 +6,7 @@ use study_analysis::analyze::psychophysics::PartAnalysis;
 use study_base::text::counted;
 use study_plan::procedure::search::Acquire;
 use study_plan::procedure::{Choose, Rule, SearchRule};
-use study_plan::protocol::identification::{Criterion, Feedback};
+use study_plan::protocol::identification::{Criterion, Drawn, Feedback};
 use study_plan::protocol::pairs::IntervalOrder;
 use study_plan::protocol::parts::{Compared, Part, Task, TrackRules};
 use study_plan::protocol::{Protocol, Relative};
@@ -76,11 +76,16 @@ fn trials(protocol: &Protocol, part: &Part) -> String {
                 correct,
                 of,
                 rounds,
+                draw,
             }) = own.criterion
             {
                 let most = presented.practice.len() * rounds as usize;
+                let drawn = match draw {
+                    Drawn::Rounds => "each of its trials came once in a round",
+                    Drawn::Independent => "its trials were drawn independently",
+                };
                 text.push(format!(
-                    "Practice went on until {correct} of the last {of} answers were correct, for {} at most.",
+                    "Practice went on until {correct} of the last {of} answers were correct, for {} at most; {drawn}.",
                     counted(most, "trial", "trials")
                 ));
             }

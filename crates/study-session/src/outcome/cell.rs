@@ -309,6 +309,7 @@ row! {
         SessionId: session_id,
         PausedS: paused_s,
         FeltAgainAfterS: felt_again_after_s,
+        AnswerBeforeFeedback: answer_before_feedback,
         ..fidelity {
             Rendering: verdict,
             RenderedVaf: rendered_vaf,

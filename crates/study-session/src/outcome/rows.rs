@@ -84,6 +84,7 @@ pub struct RatingRow {
     pub session_id: Option<PartId>,
     pub paused_s: Option<f64>,
     pub felt_again_after_s: Option<f64>,
+    pub answer_before_feedback: Option<Answer>,
 }
 
 impl RatingRow {
@@ -146,6 +147,7 @@ impl RatingRow {
             session_id: None,
             paused_s: None,
             felt_again_after_s: None,
+            answer_before_feedback: None,
         }
     }
 }

@@ -6,7 +6,7 @@ use crate::outcome::fold::History;
 use crate::outcome::{Choice, Entry, Event, Failure, Moment, Start, State};
 use std::sync::Arc;
 use study_base::text::{ParticipantId, counted};
-use study_plan::protocol::{Assigned, Stimuli};
+use study_plan::protocol::{Assigned, Stimuli, Trial};
 use study_plan::schedule;
 
 /// Longest operator code, in characters.
@@ -227,14 +227,15 @@ impl Session {
     }
 
     /// The queue after a restart of the block under way: all its trials as planned,
-    /// then the others that are still to come.
+    /// then the others that are still to come. The practice of each part is a block of its own.
     fn restarted_queue(&self) -> Vec<u32> {
         let history = &self.history;
-        let Some(block) = history.next_trial().map(|t| t.block) else {
+        let Some(next) = history.next_trial() else {
             return Vec::new();
         };
-        let in_block = |trial: &u32| history.planned(*trial).is_some_and(|t| t.block == block);
-        let again = history.schedule().iter().filter(|t| t.block == block);
+        let same = |t: &Trial| t.block == next.block && t.part == next.part;
+        let in_block = |trial: &u32| history.planned(*trial).is_some_and(same);
+        let again = history.schedule().iter().filter(|t| same(t));
         let again: Vec<u32> = again.map(|t| t.trial).collect();
         let mut later: Vec<u32> = (history.queue.iter().copied())
             .filter(|t| !in_block(t))

@@ -199,6 +199,7 @@ mod tests {
             session_id: d.maybe(Draws::part),
             paused_s: d.maybe(Draws::number),
             felt_again_after_s: d.maybe(Draws::number),
+            answer_before_feedback: d.maybe(|d| Answer::Choice(vec![d.text()])),
         }
     }
 

@@ -1,6 +1,7 @@
 //! Verifying a results folder: every file is read again and compared.
 
 mod clocks;
+mod practice;
 mod searches;
 mod tables;
 mod telemetry;
@@ -50,7 +51,7 @@ impl Finding {
 impl StudyFolder {
     /// Verifies the checksums and the chain of every journal, the hashes of the frozen
     /// protocol, the number of telemetry samples and, given a protocol, the levels of
-    /// tracks, the pairs of searches and the derived tables.
+    /// tracks, the pairs of searches, the ends of practice and the derived tables.
     ///
     /// # Errors
     /// [`StoreError`] if a folder or journal cannot be read at all.
@@ -67,6 +68,7 @@ impl StudyFolder {
                 let place = place_of(session);
                 tracks::verify_tracks(session, protocol, &place, &mut found);
                 searches::verify_searches(session, protocol, &place, &mut found);
+                practice::verify_practice(session, protocol, &place, &mut found);
             }
             self.verify_tables(&sessions, protocol, &mut found)?;
         }

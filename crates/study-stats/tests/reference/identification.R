@@ -12,9 +12,19 @@ matrices <- list(
 entropy <- function(counts) { p <- counts[counts > 0] / sum(counts); -sum(p * log2(p)) }
 information <- function(m) {
   transmitted <- entropy(rowSums(m)) + entropy(colSums(m)) - entropy(m)
-  cells <- sum(m > 0) - sum(rowSums(m) > 0) - sum(colSums(m) > 0) + 1
-  c(transmitted = transmitted, corrected = min(transmitted - cells / (2 * sum(m) * log(2)), entropy(rowSums(m))),
+  expected <- outer(rowSums(m), colSums(m))
+  # Cells − rows − columns + the sum of n²/(r c): Miller's bias for fixed numbers of presentations.
+  cells <- sum(m > 0) - sum(rowSums(m) > 0) - sum(colSums(m) > 0) + sum((m^2 / expected)[m > 0])
+  c(transmitted = transmitted, corrected = transmitted - cells / (2 * sum(m) * log(2)),
     stimulus = entropy(rowSums(m)), response = entropy(colSums(m)))
+}
+# The interval of the corrected information, on the logarithm of what is lost.
+lost <- function(m) information(m)[["stimulus"]] - information(m)[["corrected"]]
+transfer_interval <- function(all) {
+  total <- information(Reduce(`+`, all))
+  least <- min(total[["stimulus"]] - total[["corrected"]], total[["stimulus"]])
+  half <- qt(0.975, length(all) - 1) * jackknife(all, lost) / least
+  pmax(total[["stimulus"]] - least * exp(c(half, -half)), 0)
 }
 
 # Luce's model is quasi-symmetry: a log-linear model of rows and of pairs of cells.
@@ -58,7 +68,8 @@ above_guessing <- function(all) {
 
 pooled <- Reduce(`+`, matrices)
 print(information(pooled))
-print(jackknife(matrices, function(m) information(m)[["corrected"]]))
+print(jackknife(matrices, lost))
+print(transfer_interval(matrices))
 print(choice(pooled))
 pairs <- combn(4, 2)
 for (i in seq_len(ncol(pairs))) {
@@ -73,6 +84,15 @@ print(above_guessing(matrices))
 # Everybody is right: the error is that of guesses.
 perfect <- lapply(1:5, function(i) diag(6, 3))
 print(above_guessing(perfect))
+
+# Near perfect answers of three participants, one of whom makes two errors.
+rare <- list(diag(10, 3), diag(10, 3), rbind(c(9, 1, 0), c(0, 10, 0), c(1, 0, 9)))
+print(information(Reduce(`+`, rare)))
+print(transfer_interval(rare))
+# Three participants near chance: less than nothing is transmitted.
+chance <- list(rbind(c(5, 5), c(5, 5)), rbind(c(6, 4), c(4, 6)), rbind(c(4, 6), c(5, 5)))
+print(information(Reduce(`+`, chance)))
+print(transfer_interval(chance))
 
 file <- commandArgs(TRUE)
 if (length(file) == 1) {
@@ -99,9 +119,12 @@ if (length(file) == 1) {
   bits <- information(total)
   compare("correct", sum(diag(total)) / sum(total))
   for (what in c("transmitted", "corrected", "stimulus")) compare(paste0("information/", what), bits[[what]])
-  se <- jackknife(own, function(m) information(m)[["corrected"]])
-  ends("information/corrected_ci95", bits[["corrected"]], se)
-  ends("information/items_ci95", bits[["corrected"]], se, function(x) 2^x)
+  interval <- transfer_interval(own)
+  for (end in 1:2) {
+    side <- c("_lo", "_hi")[end]
+    compare(paste0("information/corrected_ci95", side), interval[end])
+    compare(paste0("information/items_ci95", side), 2^interval[end])
+  }
   above <- above_guessing(own)
   for (what in names(above)) compare(paste0("above_guessing/", what), above[[what]])
   for (a in seq_along(labels)) {

@@ -2,10 +2,12 @@
 
     python3 identification.py golden > ../../../../tests/golden/psychophysics/identification_sim.json
     python3 identification.py simulate [STUDIES]
+    python3 identification.py bias [STUDIES]
 
 Needs numpy and SciPy. The choice model is fitted by iterative scaling, which the program does not use. `golden` writes answers
-of six participants and what follows from them; identification.R comes to the same numbers. `simulate` prints the tables of
-docs/calibration.md: the bias of information transfer, its intervals, and the test against guesses.
+of six participants and what follows from them; identification.R comes to the same numbers. `simulate` and `bias` print the tables of
+docs/calibration.md: the bias of information transfer, its intervals, and the test against guesses; and the bias of one matrix beside both
+formulas.
 """
 import json
 import sys
@@ -23,8 +25,11 @@ def entropy(counts):
 
 
 def bias(m):
-    cells = (m > 0).sum() - (m.sum(1) > 0).sum() - (m.sum(0) > 0).sum() + 1
-    return cells / (2 * m.sum() * np.log(2))
+    """Of fixed numbers of presentations."""
+    r, c = m.sum(1)[:, None], m.sum(0)[None]
+    filled = m > 0
+    elsewhere = (1 - m / np.where(r > 0, r, 1)) * (1 - m / np.where(c > 0, c, 1))
+    return elsewhere[filled].sum() / (2 * m.sum() * np.log(2))
 
 
 def transmitted(m):
@@ -32,7 +37,7 @@ def transmitted(m):
 
 
 def corrected(m):
-    return min(transmitted(m) - bias(m), entropy(m.sum(1)))
+    return transmitted(m) - bias(m)
 
 
 def choice(m):
@@ -75,6 +80,18 @@ def interval(own, statistic):
     se = np.sqrt((n - 1) / n * ((left - left.mean()) ** 2).sum())
     half = stats.t.ppf(0.975, n - 1) * se
     return statistic(total) - half, statistic(total) + half
+
+
+def transfer_interval(own):
+    """On the logarithm of what is lost of the entropy of the labels that were right."""
+    n, total = len(own), sum(own)
+    lost = lambda m: entropy(m.sum(1)) - corrected(m)
+    left = np.array([lost(total - m) for m in own])
+    se = np.sqrt((n - 1) / n * ((left - left.mean()) ** 2).sum())
+    most = entropy(total.sum(1))
+    least = min(lost(total), most)
+    half = stats.t.ppf(0.975, n - 1) * se / least
+    return max(most - least * np.exp(half), 0), max(most - least * np.exp(-half), 0)
 
 
 def above_guessing(own):
@@ -148,12 +165,12 @@ def golden():
         put("above_guessing/" + name, value)
     half = stats.t.ppf(0.975, 5) * se
     ends("above_guessing/ci95", (mean - half, mean + half))
-    bits = interval(own, corrected)
+    bits = transfer_interval(own)
     put("information/transmitted", transmitted(total))
     put("information/corrected", corrected(total))
     ends("information/corrected_ci95", bits)
     put("information/stimulus", entropy(total.sum(1)))
-    put("information/items", 2 ** corrected(total))
+    put("information/items", 2 ** max(corrected(total), 0))
     ends("information/items_ci95", (2 ** bits[0], 2 ** bits[1]))
     for a, right in enumerate(LABELS):
         for b, given in enumerate(LABELS):
@@ -212,61 +229,110 @@ def people_of(rng, n, k, scale, spread):
 
 
 def all_bits(m):
-    """Corrected information of several matrices."""
-    n = m.sum((1, 2))
-    p = m / n[:, None, None]
+    """Of several matrices: information by maximum likelihood, by Miller's formula for drawn and for fixed numbers of
+    presentations, and the entropy of the labels that were right."""
+    n = m.sum((-1, -2))
+    p = m / n[..., None, None]
 
     def h(p):
         return -(p * np.log2(np.where(p > 0, p, 1))).sum(-1)
 
-    raw = h(p.sum(2)) + h(p.sum(1)) - h(p.reshape(len(p), -1))
-    cells = (m > 0).sum((1, 2)) - (m.sum(2) > 0).sum(1) - (m.sum(1) > 0).sum(1) + 1
-    return raw, raw - cells / (2 * n * np.log(2))
+    most = h(p.sum(-1))
+    raw = most + h(p.sum(-2)) - h(p.reshape(*p.shape[:-2], -1))
+    r, c = m.sum(-1, keepdims=True), m.sum(-2, keepdims=True)
+    drawn = (m > 0).sum((-1, -2)) - (r > 0).sum((-1, -2)) - (c > 0).sum((-1, -2)) + 1
+    elsewhere = (1 - m / np.where(r > 0, r, 1)) * (1 - m / np.where(c > 0, c, 1))
+    fixed = np.where(m > 0, elsewhere, 0).sum((-1, -2))
+    unit = 2 * n * np.log(2)
+    return raw, raw - drawn / unit, raw - fixed / unit, most
+
+
+# Participants, labels, repetitions, similarity, its spread.
+STUDIES = [
+    (10, 4, 5, np.inf, 0.0),
+    (10, 8, 3, np.inf, 0.0),
+    (2, 4, 5, 1.0, 0.3),
+    (5, 4, 10, 1.0, 0.3),
+    (10, 4, 5, 1.0, 0.3),
+    (10, 6, 5, 1.5, 0.3),
+    (10, 10, 5, 1.0, 0.3),
+    (20, 4, 10, 1.0, 0.5),
+    (5, 4, 5, 0.4, 0.5),
+    (10, 4, 5, 0.4, 0.5),
+    (2, 4, 5, 0.25, 0.3),
+    (3, 4, 5, 0.25, 0.3),
+    (5, 4, 5, 0.25, 0.3),
+    (10, 4, 5, 0.25, 0.3),
+    (20, 4, 5, 0.25, 0.3),
+    (10, 8, 3, 0.3, 0.3),
+    (5, 4, 5, 0.2, 0.3),
+    (10, 4, 5, 0.2, 0.3),
+]
+
+
+def named(scale):
+    return "guesses" if np.isinf(scale) else f"e^(−d/{scale})"
 
 
 def simulate(studies):
-    print("| participants × labels × repetitions | similarity | true bits | maximum likelihood | corrected | jackknife holds | bootstrap holds | above guesses at .05 |")
-    print("|---|---|---|---|---|---|---|---|")
-    for n, k, repetitions, scale, spread in [
-        (10, 4, 5, np.inf, 0.0),
-        (10, 8, 3, np.inf, 0.0),
-        (5, 4, 10, 1.0, 0.3),
-        (10, 4, 5, 1.0, 0.3),
-        (10, 4, 5, 0.4, 0.5),
-        (10, 6, 5, 1.5, 0.3),
-        (10, 10, 5, 1.0, 0.3),
-        (20, 4, 10, 1.0, 0.5),
-    ]:
+    print("| participants × labels × repetitions | similarity | true bits | maximum likelihood | Miller, drawn | corrected | interval holds | ± t·se holds | bootstrap holds | no interval | above guesses at .05 |")
+    print("|---|---|---|---|---|---|---|---|---|---|---|")
+    for n, k, repetitions, scale, spread in STUDIES:
         rng = np.random.default_rng(1955)
-        mean = people_of(rng, 40_000, k, scale, spread).mean(0) / k
-        true = transmitted(mean)
+        true = transmitted(people_of(rng, 40_000, k, scale, spread).mean(0) / k)
         t = stats.t.ppf(0.975, n - 1)
-        raw, bits, jackknife, bootstrap, yes = [], [], 0, 0, 0
+        found, ours, symmetric, bootstrap, alike, yes = [], 0, 0, 0, 0, 0
         for _ in range(studies):
             shares = people_of(rng, n, k, scale, spread)
-            own = np.array([[rng.multinomial(repetitions, row) for row in p] for p in shares], float)
+            own = rng.multinomial(repetitions, shares).astype(float)
             total = own.sum(0)
-            (plain,), (estimate,) = all_bits(total[None])
-            raw.append(plain)
-            bits.append(estimate)
-            left = all_bits(total[None] - own)[1]
-            half = t * np.sqrt((n - 1) * left.var())
-            jackknife += abs(estimate - true) <= half
+            raw, drawn, estimate, most = all_bits(total)
+            found.append((raw, drawn, estimate))
+            left = all_bits(total - own)
+            se = np.sqrt((n - 1) * (left[3] - left[2]).var())
             weights = rng.multinomial(n, [1 / n] * n, size=400).astype(float)
-            drawn = all_bits(np.einsum("bn,nij->bij", weights, own))[1]
-            low, high = np.quantile(drawn, [0.025, 0.975])
+            low, high = np.quantile(all_bits(np.einsum("bn,nij->bij", weights, own))[2], [0.025, 0.975])
             bootstrap += low <= true <= high
             yes += above_guessing(own)[3] <= 0.05
-        share = lambda count: f"{count / studies:.3f}"
+            if se < 1e-10:
+                alike += 1
+                continue
+            least = min(most - estimate, most)
+            ends = most - least * np.exp(np.array([1, -1]) * t * se / least)
+            ours += max(ends[0], 0) <= true + 1e-12 and true - 1e-12 <= max(ends[1], 0)
+            symmetric += abs(estimate - true) <= t * se
+        raw, drawn, estimate = np.mean(found, 0)
+        share = lambda count, of=studies: f"{count / of:.3f}"
         print(
-            f"| {n} × {k} × {repetitions} | {'guesses' if np.isinf(scale) else f'e^(−d/{scale})'} | {true:.3f} | {np.mean(raw):.3f} | "
-            f"{np.mean(bits):.3f} | {share(jackknife)} | {share(bootstrap)} | {share(yes)} |",
+            f"| {n} × {k} × {repetitions} | {named(scale)} | {true:.3f} | {raw:.3f} | {drawn:.3f} | {estimate:.3f} | "
+            f"{share(ours, studies - alike)} | {share(symmetric, studies - alike)} | {share(bootstrap)} | {share(alike)} | {share(yes)} |",
             flush=True,
         )
 
 
+def one_matrix(studies):
+    """The bias of one matrix whose rows have fixed numbers of answers."""
+    print("| labels × answers to each | matrix | true bits | bias | Miller, drawn | fixed |")
+    print("|---|---|---|---|---|---|")
+    rng = np.random.default_rng(1955)
+    for k, n in [(4, 5), (4, 20), (4, 100), (8, 10), (8, 60)]:
+        for scale in [np.inf, 1.0, 0.4, 0.25, 0.15]:
+            shares = people_of(np.random.default_rng(28), 1, k, scale, 0.0)[0]
+            true = transmitted(shares / k)
+            m = rng.multinomial(n, shares, size=(studies, k)).astype(float)
+            raw, drawn, fixed, _ = all_bits(m)
+            print(
+                f"| {k} × {n} | {named(scale)} | {true:.3f} | {raw.mean() - true:+.4f} | {(raw - drawn).mean():+.4f} | "
+                f"{(raw - fixed).mean():+.4f} |",
+                flush=True,
+            )
+
+
 if __name__ == "__main__":
+    studies = int(sys.argv[2]) if len(sys.argv) > 2 else 1000
     if sys.argv[1:2] == ["golden"]:
         golden()
+    elif sys.argv[1:2] == ["bias"]:
+        one_matrix(studies)
     else:
-        simulate(int(sys.argv[2]) if len(sys.argv) > 2 else 1000)
+        simulate(studies)

@@ -15,7 +15,10 @@ pub(super) fn trials<'a>(
     intervals: &Intervals<'_>,
 ) -> Trials<'a> {
     let question = asked(protocol, part);
-    let answer = |row: &'a RatingRow| row.answers.get(question?).map(Given::of);
+    let answer = |row: &'a RatingRow| {
+        let first = row.answer_before_feedback.as_ref();
+        first.or_else(|| row.answers.get(question?)).map(Given::of)
+    };
     let is_number = |row: &&'a RatingRow| matches!(answer(row), Some(Given::Number(_)));
     let numbers: Vec<&RatingRow> = rows.iter().copied().filter(is_number).collect();
     let mut participants: BTreeMap<&ParticipantId, usize> = BTreeMap::new();

@@ -6,7 +6,7 @@ use crate::analyze::record::{
 };
 use std::collections::{BTreeMap, BTreeSet};
 use study_stats::identification::{
-    Confusions, Pooled, above_guessing, biased_choice, information, pooled, sensitivity,
+    Confusions, Pooled, above_guessing, biased_choice, information, pooled, sensitivity, transfer,
 };
 use study_stats::proportion::share;
 
@@ -41,13 +41,13 @@ statistics! {
     pub struct Transfer {
         /// by maximum likelihood, which is too high by chance
         transmitted: Stat,
-        /// the same without its bias, by Miller (1955) and Madow
+        /// the same without its bias, after Miller (1955) for fixed numbers of presentations
         corrected: Stat,
-        /// of the corrected one, by leaving out each participant in turn
+        /// of the corrected one, by leaving out each participant in turn, on the logarithm of what it lacks of the stimulus information
         corrected_ci95: Interval,
         /// what answers without an error transmit: the entropy of the labels that were right
         stimulus: Stat,
-        /// 2 to the power of the corrected one: so many labels are told apart without an error with as much information
+        /// 2 to the power of the corrected one, at least 1: so many labels are told apart without an error with as much information
         items: Stat,
         /// of the number of labels
         items_ci95: Interval,
@@ -177,6 +177,7 @@ pub fn identification(rows: &[LabelRow], labels: &[String]) -> (Identified, OwnC
 const NO_ANSWERS: &str = "there are no answers";
 const ONE_PARTICIPANT: &str = "there is one participant";
 const NEVER_RIGHT: &str = "a label was never right";
+const ALIKE: &str = "all participants are alike, which does not tell how much others would differ";
 
 /// The share of correct answers of clusters, such as participants: correct answers and answers.
 fn recall(clusters: &[(f64, f64)]) -> Recall {
@@ -241,7 +242,6 @@ fn over_all(all: &[Confusions], labels: &[String]) -> (Transfer, BTreeMap<PairNa
         let similarity = |(a, b): &(usize, usize)| Some(model.as_ref()?.log_similarity(*a, *b));
         let mut of: Vec<Option<f64>> = pairs.iter().map(similarity).collect();
         of.extend(pairs.iter().map(|(a, b)| sensitivity(m, *a, *b)));
-        of.push(information(m).map(|i| i.corrected));
         of
     };
     let found = pooled(all, of_pairs);
@@ -253,7 +253,11 @@ fn over_all(all: &[Confusions], labels: &[String]) -> (Transfer, BTreeMap<PairNa
     };
     let ends = |of: Option<Pooled>, shown: fn(f64) -> f64, none: &'static str| {
         let ends = of.and_then(|of| of.ci95);
-        let why = of.map_or_else(|| Why::from(none), |_| few.clone());
+        let why = match of.map(|of| of.se) {
+            None => Why::from(none),
+            Some(None) => few.clone(),
+            Some(Some(_)) => ALIKE.into(),
+        };
         Interval::or(ends.map(|(low, high)| (shown(low), shown(high))), why)
     };
     let same = |x: f64| x;
@@ -270,14 +274,15 @@ fn over_all(all: &[Confusions], labels: &[String]) -> (Transfer, BTreeMap<PairNa
     };
     let sum = Confusions::sum(all.iter());
     let bits = sum.as_ref().and_then(information);
-    let corrected = at(2 * pairs.len());
+    let corrected = transfer(all);
+    let items = |bits: f64| libm::exp2(bits.max(0.0));
     let transfer = Transfer {
         transmitted: Stat::or(bits.map(|i| i.transmitted), NO_ANSWERS),
         corrected: Stat::or(bits.map(|i| i.corrected), NO_ANSWERS),
         corrected_ci95: ends(corrected, same, NO_ANSWERS),
         stimulus: Stat::or(bits.map(|i| i.stimulus), NO_ANSWERS),
-        items: Stat::or(bits.map(|i| libm::exp2(i.corrected)), NO_ANSWERS),
-        items_ci95: ends(corrected, libm::exp2, NO_ANSWERS),
+        items: Stat::or(bits.map(|i| items(i.corrected)), NO_ANSWERS),
+        items_ci95: ends(corrected, items, NO_ANSWERS),
     };
     let pairs = pairs.iter().enumerate().map(of_pair).collect();
     (transfer, pairs)

@@ -52,7 +52,7 @@ pub(super) fn of_identification(
         task: "identification",
         trials: answers.len(),
         results,
-        warnings: (few_trials(answers.len(), labels.len()).into_iter())
+        warnings: (few_trials(own, answers.len()).into_iter())
             .chain(not_learned(study, part, own, rows))
             .collect(),
         names: Vec::new(),
@@ -89,21 +89,16 @@ fn shares(
     cells.into_iter().map(one).collect()
 }
 
-/// Fewest answers for each cell of the matrix that need no warning (Miller 1955).
-const TRIALS_OF_A_CELL: usize = 5;
-
-fn few_trials(trials: usize, labels: usize) -> Option<Warning> {
-    let needed = TRIALS_OF_A_CELL * labels * labels;
-    (trials > 0 && trials < needed).then(|| Warning {
+fn few_trials(own: &Identification, answers: usize) -> Option<Warning> {
+    let text = own.too_few(answers).filter(|_| answers > 0)?;
+    Some(Warning {
         code: "few-trials",
-        text: format!(
-            "{trials} answers among {labels} labels are fewer than {needed}, {TRIALS_OF_A_CELL} for each cell of the \
-             confusion matrix: information transfer is uncertain, although its bias is corrected"
-        ),
+        text,
     })
 }
 
-/// Participants whose practice ended before they reached its criterion.
+/// Participants whose practice ended before they reached its criterion, by the answers with which it ended: in the order in which they
+/// were given, as they were before any correction.
 fn not_learned(
     study: &StudyData<'_>,
     part: &Part,
@@ -114,19 +109,15 @@ fn not_learned(
     let counted_here: BTreeSet<(&str, u32)> = (rows.iter())
         .map(|r| (r.participant.as_str(), r.session))
         .collect();
-    let mut practiced: BTreeMap<(&str, u32), Vec<bool>> = BTreeMap::new();
-    let of_practice = |r: &&RatingRow| r.practice && r.part.as_ref() == Some(&part.id);
-    for row in study.rows.iter().filter(of_practice) {
-        let place = (row.participant.as_str(), row.session);
-        practiced.entry(place).or_default().extend(row.correct);
-    }
-    let reached = |place: &(&str, u32)| {
-        let answers = practiced.get(place);
-        // In order of the plan, so that answers to repeated trials may stand elsewhere: any of the windows counts.
-        answers.is_some_and(|all| (0..=all.len()).any(|end| criterion.is_reached(&all[..end])))
-    };
-    let missing: BTreeSet<&str> = (counted_here.iter())
-        .filter(|place| !reached(place))
+    let reached =
+        |answers: Vec<bool>| (0..=answers.len()).any(|end| criterion.is_reached(&answers[..end]));
+    let sessions = study.sessions.iter().filter_map(|history| {
+        let start = history.start()?;
+        let missed = !reached(history.practiced(part));
+        missed.then_some((start.participant.as_str(), start.session))
+    });
+    let missed: BTreeSet<(&str, u32)> = sessions.collect();
+    let missing: BTreeSet<&str> = (counted_here.intersection(&missed))
         .map(|place| place.0)
         .collect();
     let names: Vec<String> = missing

@@ -154,9 +154,15 @@ impl<'a> Intervals<'a> {
     }
 }
 
-/// The answer to the part's own question.
+/// The answer to the part's own question: the first, if the right one was told before it was corrected.
+pub(super) fn own_answer<'a>(part: &Part, row: &'a RatingRow) -> Option<&'a Answer> {
+    let first = row.answer_before_feedback.as_ref();
+    first.or_else(|| row.answers.get(part.asks.first()?))
+}
+
+/// The option that was chosen as the answer to the part's own question.
 pub(super) fn chosen<'a>(part: &Part, row: &'a RatingRow) -> Option<&'a str> {
-    match row.answers.get(part.asks.first()?)? {
+    match own_answer(part, row)? {
         Answer::Choice(chosen) => chosen.first().map(String::as_str),
         _ => None,
     }

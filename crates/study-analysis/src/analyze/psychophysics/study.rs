@@ -36,8 +36,8 @@ use study_stats::sequential::Answered;
 /// The analyses of all parts that are not ratings, of questionnaires, and of what ratings say of
 /// groups and sessions. Which participants count is decided as
 /// for ratings. Practice and trials without an answer do not count, nor do those that an
-/// exclusion rule excludes. Answers are the corrected ones, at the levels that were
-/// presented.
+/// exclusion rule excludes. Answers are the corrected ones, unless the right one was told before, at the
+/// levels that were presented.
 pub fn parts(study: &StudyData<'_>, include: Include) -> Vec<PartAnalysis> {
     let protocol = study.protocol;
     let counting = Counting::of(study, include);

@@ -170,6 +170,7 @@ impl Numbers {
             "transmitted",
             "corrected",
             "corrected_ci95_lo",
+            "corrected_ci95_hi",
             "stimulus",
             "items",
         ];

@@ -1,6 +1,6 @@
 //! Number of trials, duration, and doubtful designs of studies with parts.
 
-use super::{Spans, answers_s, pace};
+use super::{Spans, answers_s, counted_out, pace};
 use crate::procedure::{Rule, Staircase};
 use crate::protocol::{
     DeviceKind, Identification, IntervalOrder, Method, Mushra, Part, Protocol, Question, Role,
@@ -11,8 +11,6 @@ use study_base::text::{ModelId, PartId, counted};
 
 /// Fewest levels of a magnitude estimation that need no warning.
 const MAGNITUDE_LEVELS: usize = 5;
-/// Fewest trials for each cell of a confusion matrix that need no warning.
-const TRIALS_OF_A_CELL: usize = 5;
 /// Fewest trials of an adaptive track that need no warning: the threshold is then known
 /// to about half the standard deviation of the noise.
 const TRACK_TRIALS: u32 = 30;
@@ -109,6 +107,8 @@ pub(super) fn warnings(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Faul
         let doubts = [
             magnitudes(protocol, part),
             few_names(protocol, part),
+            counted_out::trials(part),
+            counted_out::practice(part),
             one_order(part),
             few_pairs(protocol, part),
         ];
@@ -184,18 +184,12 @@ fn magnitudes(protocol: &Protocol, part: &Part) -> Option<Fault> {
 /// So few trials that information transfer is uncertain, although its bias is corrected.
 fn few_names(protocol: &Protocol, part: &Part) -> Option<Fault> {
     let own = part.task.identification()?;
-    let (labels, presented) = (own.labels.len(), &own.presentations);
+    let presented = &own.presentations;
     let of_each = presented.models.len() * presented.repetitions as usize;
     let trials = of_each.saturating_mul(protocol.design.participants as usize);
-    let needed = TRIALS_OF_A_CELL * labels * labels;
-    (trials < needed).then(|| {
-        Fault::warning(format!(
-            "the part `{}` has {trials} trials over all participants: information transfer among {labels} labels takes \
-             {needed}, {TRIALS_OF_A_CELL} for each cell of the confusion matrix (Miller 1955)",
-            part.id
-        ))
-        .hint("raise repetitions or participants")
-    })
+    let what = own.too_few(trials)?;
+    let fault = Fault::warning(format!("the part `{}`: {what}", part.id));
+    Some(fault.hint("raise repetitions or participants"))
 }
 
 /// Pairs whose trials do not have both orders equally often.

@@ -196,7 +196,8 @@ impl Looked<'_> {
             for (j, id) in models.iter().enumerate() {
                 if models[..j].contains(id) || is_labeled(&labels, id) {
                     let fault = Fault::error(format!("`{id}` is there twice"));
-                    self.fault_at(&path, fault);
+                    let hint = "leave it with the one label that is right for it";
+                    self.fault_at(&path, fault.hint(hint));
                 }
             }
             let text = raw.text.clone();
@@ -206,7 +207,8 @@ impl Looked<'_> {
             let place = format!("{path}.practice[{i}]");
             if !is_labeled(&labels, id) && self.model(id, &place) {
                 let fault = Fault::error(format!("`{id}` has no label"));
-                self.fault_at(&place, fault.hint("its practice trial has no right answer"));
+                let hint = "give it a label in answers, or leave it out: its practice trial has no right answer";
+                self.fault_at(&place, fault.hint(hint));
             }
         }
         Some(labels)

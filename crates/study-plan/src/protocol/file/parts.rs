@@ -4,7 +4,7 @@ use super::spaces::RULES;
 use crate::procedure::SearchRule;
 use crate::protocol::keys::{Id, Key, Kind, Shape, Variants, Words as _, keys};
 use crate::protocol::section::{Section, Variant, shapes};
-use crate::protocol::{Criterion, Exposure, Feedback, IntervalOrder, Order, Presentations};
+use crate::protocol::{Criterion, Drawn, Exposure, Feedback, IntervalOrder, Order, Presentations};
 use std::collections::BTreeMap;
 use study_base::diagnostic::Fault;
 use study_base::diagnostic::table::Value;
@@ -51,8 +51,10 @@ const CRITERION: &[Key] = keys! {
     "correct": Kind::COUNT, "7", required;
     /// How many of the last answers are counted; not fewer than `correct`.
     "of": Kind::COUNT, "8", required;
-    /// How often the practice trials come at most, each time in an order that is drawn.
+    /// How often the practice trials come at most. If each is drawn on its own, there are as many trials in all.
     "rounds": Kind::Whole(1, 1000), "10", required;
+    /// How the practice trials are drawn.
+    "draw": Kind::Word(Drawn::WORDS), r#""independent""#, default(r#""rounds""#);
 };
 
 static SHAPES: [Shape; KINDS.len()] = shapes(&KINDS);
@@ -194,10 +196,12 @@ pub(super) const KINDS: [Variant<RawTask>; 7] = [
             "family": Kind::Id(Id::Part), r#""detent""#;
             /// When the participant is told whether the answer was correct, and which label was.
             "feedback": Kind::Word(Feedback::WORDS), r#""always""#, default(r#""practice""#);
-            /// The realizations of the practice trials of the part, in this order. Each has a label. The
-            /// levels of a family are called `FAMILY.STEP`, from 1 for the lowest of its ladder.
+            /// The realizations of the practice trials of the part: in this order without a `criterion`, and in an order that
+            /// is drawn with one. Each has a label. The levels of a family are called `FAMILY.STEP`, from 1 for the lowest of
+            /// its ladder.
             "practice": Kind::ModelIds, r#"["lambda-0.9991", "lambda-0.9995"]"#;
-            /// When practice ends. Without it the practice trials come once, as listed.
+            /// When practice ends. Without it the practice trials come once, as listed. The label that was given first counts, and
+            /// a declined answer does not.
             "criterion": Kind::Table(CRITERION), "{ correct = 7, of = 8, rounds = 10 }";
         },
         identification,
@@ -434,7 +438,8 @@ fn labels(section: &mut Section<'_, '_>) -> Option<Vec<RawLabel>> {
         let Some(text) = text else { continue };
         if labels.iter().any(|l| l.text.trim() == text.trim()) {
             let what = format!("the label `{}` is there twice", Untrusted(&text));
-            entry.fault_at("label", Fault::error(what));
+            let hint = "give each label once, with all of its realizations in one list";
+            entry.fault_at("label", Fault::error(what).hint(hint));
         }
         if models.is_empty() && levels.is_none() {
             let what = format!("no realization has the label `{}`", Untrusted(&text));
@@ -456,16 +461,18 @@ fn labels(section: &mut Section<'_, '_>) -> Option<Vec<RawLabel>> {
 
 fn criterion(mut section: Section<'_, '_>) -> Option<Criterion> {
     let (correct, of) = (section.whole("correct"), section.whole("of"));
-    let rounds = section.whole("rounds");
+    let (rounds, draw) = (section.whole("rounds"), section.word("draw"));
     let criterion = Criterion {
         correct: correct?,
         of: of?,
         rounds: rounds?,
+        draw: draw?,
     };
     let Criterion { correct, of, .. } = criterion;
     if correct > of {
         let what = format!("`{}` is never reached: {correct} of {of}", section.path());
-        section.fault_at("correct", Fault::error(what));
+        let hint = "lower correct, or raise of: correct of the last of answers";
+        section.fault_at("correct", Fault::error(what).hint(hint));
     }
     Some(criterion)
 }

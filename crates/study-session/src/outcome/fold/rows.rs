@@ -1,7 +1,7 @@
 //! The rows of the derived tables, from the history of a session.
 
 use super::trial::TrialHistory;
-use super::{GivenAnswer, History};
+use super::{Attempt, GivenAnswer, History};
 use crate::outcome::event::{FormId, Start};
 use crate::outcome::rows::{ParticipantRow, RatingRow, Status};
 use std::collections::BTreeMap;
@@ -67,6 +67,10 @@ impl History {
             _ => None,
         });
         let entry = model.and_then(|id| protocol.model(id));
+        let before_feedback = counted.and_then(|a| before_feedback(trial, part, a, &given));
+        let is_primary =
+            primary.is_some_and(|g| part.is_some_and(|p| p.asks.first() == Some(&g.question)));
+        let asked_first = before_feedback.as_ref().filter(|_| is_primary);
         let track = trial.track().and_then(|id| protocol.track(id));
         let played = shown.and_then(|a| a.ended).map(|e| e.playback);
         // Without telemetry nothing was counted.
@@ -117,7 +121,7 @@ impl History {
             attempt: shown.map(|a| a.number),
             status: match felt.given_up {
                 true => Status::Failed,
-                false => status_of(primary.map(|g| &g.answer)),
+                false => status_of(asked_first.or(primary.map(|g| &g.answer))),
             },
             vaf: entry.and_then(|m| m.vaf),
             covariates: entry.map(|m| m.covariates.clone()).unwrap_or_default(),
@@ -128,7 +132,7 @@ impl History {
                 .and_then(|_| shown?.level)
                 .map(|level| level.presented)
                 .or_else(|| protocol.level_of(shown.and(model)?)),
-            correct: correct(trial, track, part, &given),
+            correct: correct(trial, track, part, &given, before_feedback.as_ref()),
             replays: shown.map(|a| a.replays),
             fidelity: worst.cloned(),
             host_late_ms: played.and_then(|p| Some(p.host_late_ms?[1])),
@@ -139,6 +143,7 @@ impl History {
             session_id: start.assigned.session_id.clone(),
             paused_s: done.and_then(|d| d.paused_s),
             felt_again_after_s: felt.again_after_s,
+            answer_before_feedback: before_feedback,
         }
     }
 
@@ -153,22 +158,42 @@ fn asks(part: Option<&Part>, question: &QuestionId) -> bool {
     part.is_none_or(|part| part.asks.contains(question))
 }
 
-/// Whether the answer to a trial of a track or of identification is correct.
+/// The answer to the question of a part.
+fn answer_of<'a>(part: Option<&Part>, given: &[&'a GivenAnswer]) -> Option<&'a Answer> {
+    let question = part?.asks.first()?;
+    let given = given.iter().find(|g| g.question == *question)?;
+    Some(&given.answer)
+}
+
+/// The answer to a trial of identification that was given before the right label was told, if it was
+/// corrected after that.
+fn before_feedback(
+    trial: &Trial,
+    part: Option<&Part>,
+    attempt: &Attempt,
+    given: &[&GivenAnswer],
+) -> Option<Answer> {
+    let own = part?.task.identification()?;
+    let first = attempt.told.as_ref()?;
+    // Nothing is told of an answer that was declined.
+    own.is_correct(trial.model()?, first)?;
+    let corrected = own.tells(trial.practice) && answer_of(part, given) != Some(first);
+    corrected.then(|| first.clone())
+}
+
+/// Whether the answer to a trial of a track or of identification is correct. Of an answer that was corrected after
+/// the right label was told, the one before counts.
 fn correct(
     trial: &Trial,
     track: Option<&TrackRules>,
     part: Option<&Part>,
     given: &[&GivenAnswer],
+    before_feedback: Option<&Answer>,
 ) -> Option<bool> {
-    let part = part?;
-    let question = part.asks.first()?;
-    let given = given.iter().find(|g| g.question == *question)?;
+    let answer = before_feedback.or_else(|| answer_of(part, given))?;
     match &trial.stimuli {
-        Stimuli::Track { intervals, .. } => track?.is_correct(intervals, &given.answer),
-        Stimuli::One { model } => {
-            let own = part.task.identification()?;
-            own.is_correct(model, &given.answer)
-        }
+        Stimuli::Track { intervals, .. } => track?.is_correct(intervals, answer),
+        Stimuli::One { model } => part?.task.identification()?.is_correct(model, answer),
         Stimuli::Rated { .. } | Stimuli::Pair { .. } | Stimuli::Search { .. } => None,
     }
 }

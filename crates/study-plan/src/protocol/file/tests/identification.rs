@@ -121,6 +121,15 @@ fn what_is_wrong_with_labels_is_said() {
         // Without the label of `a` its practice trial has no right answer either.
         let more = if to == "[]" { 2 } else { 1 };
         assert_eq!(found.len(), more, "{found:?}");
+        // Those without a suggestion beside the caret say what to do next.
+        let faults = parse("p", &text).findings.faults;
+        let asked = ["there twice", "has no label", "never reached"];
+        for fault in faults
+            .iter()
+            .filter(|f| asked.iter().any(|a| f.message.contains(a)))
+        {
+            assert!(fault.hint.is_some(), "{fault:?}");
+        }
     }
 }
 
@@ -138,6 +147,29 @@ fn a_criterion_is_about_the_last_answers() {
     assert!(!reached(&[true, true, false, false]));
     let trials = crate::schedule::plan(&protocol, None, Seat::Row(1)).unwrap();
     assert_eq!(trials.iter().filter(|t| t.practice).count(), 2 * 4);
+    // As many trials, each drawn on its own; documents written before the key were drawn in rounds.
+    let independent = text.replace("rounds = 4", "rounds = 4, draw = \"independent\"");
+    let drawn = |text: &str| {
+        let trials = crate::schedule::plan(&read(text), None, Seat::Row(1)).unwrap();
+        let practice = trials.into_iter().filter(|t| t.practice);
+        practice
+            .map(|t| t.model().unwrap().as_str().to_owned())
+            .collect::<String>()
+    };
+    assert_eq!(drawn(&independent).len(), 2 * 4);
+    let rounds = drawn(&text).into_bytes();
+    assert!(rounds.chunks(2).all(|round| round[0] != round[1]));
+    assert_eq!(
+        drawn(&text.replace("rounds = 4", "rounds = 4, draw = \"rounds\"")),
+        drawn(&text)
+    );
+    let stated = |text: &str| {
+        let protocol = read(text);
+        let own = protocol.parts[0].task.identification().unwrap();
+        serde_json::to_value(own.criterion).unwrap()
+    };
+    assert!(stated(&text).get("draw").is_none());
+    assert_eq!(stated(&independent)["draw"], "independent");
 }
 
 /// Levels of a family are realizations with labels, too.
@@ -230,7 +262,7 @@ fn too_few_trials_for_a_confusion_matrix_are_a_warning() {
     assert_eq!(warned("participants = 3"), None);
     let said = warned("participants = 2").unwrap();
     assert!(
-        said.contains("18 trials") && said.contains("takes 20"),
+        said.contains("18 answers among 2 labels are fewer than 20, 5 for each cell"),
         "{said}"
     );
 }
