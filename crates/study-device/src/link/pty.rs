@@ -5,7 +5,7 @@ use super::cable::{Cable, MAX_WAITING};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fd::OwnedFd;
 use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
-use rustix::io::Errno;
+use rustix::io::{Errno, FdFlags, fcntl_setfd};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 use std::path::Path;
@@ -26,8 +26,12 @@ impl Pty {
     /// [`LinkError`] if the system provides none.
     pub fn open() -> Result<Self, LinkError> {
         let failed = |e: Errno| LinkError::System(format!("no pseudo-terminal: {e}"));
-        let flags = OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC;
+        let flags = OpenptFlags::RDWR | OpenptFlags::NOCTTY;
+        // Other systems have no such flag, and a child that starts between both calls keeps the terminal.
+        #[cfg(target_os = "linux")]
+        let flags = flags | OpenptFlags::CLOEXEC;
         let master = openpt(flags).map_err(failed)?;
+        fcntl_setfd(&master, FdFlags::CLOEXEC).map_err(failed)?;
         grantpt(&master).map_err(failed)?;
         unlockpt(&master).map_err(failed)?;
         let path = ptsname(&master, Vec::new()).map_err(failed)?;
