@@ -495,7 +495,7 @@ pub fn unlike(curves: &[Source<'_>]) -> Vec<String> {
 
 /// One recording of all curves, one after the other, as the bytes of its CSV file. Each line of the
 /// header begins with what it says: `measured force curve` with the next ones in short, `target`, `instrument`, `source` (one for each curve),
-/// `quasi-static` where a time was made up, `units not stated`, `resolution`, `credit`, `license`.
+/// `quasi-static` where a time was made up, `resolution`, `credit`, `license`.
 ///
 /// Velocity and acceleration are differences within a curve.
 pub fn join(curves: &[Source<'_>], stated: Stated<'_>) -> Vec<u8> {
@@ -550,20 +550,6 @@ pub fn join(curves: &[Source<'_>], stated: Stated<'_>) -> Vec<u8> {
             "the file has no time; {usual_hz} rows a second are assumed, and bounds of mass and damping rest on that"
         );
         line("quasi-static", Some(&text));
-    }
-    let assumed: Vec<&str> = (curves.iter())
-        .flat_map(|source| source.curve.assumed.iter().map(String::as_str))
-        .fold(Vec::new(), |mut all, unit| {
-            if !all.contains(&unit) {
-                all.push(unit);
-            }
-            all
-        });
-    if !assumed.is_empty() {
-        line(
-            "units not stated",
-            Some(&format!("{} assumed", assumed.join(", "))),
-        );
     }
     let steps = [("x", x_mm, "mm"), ("F", f_n, "N")].map(|(name, values, unit)| {
         let step =

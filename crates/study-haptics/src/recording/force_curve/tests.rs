@@ -59,17 +59,6 @@ fn a_unit_that_nobody_stated_is_told() {
     assert_eq!(bare.assumed, ["force in gf", "displacement in mm"]);
     let half = read("force_n,displacement\n0,0\n0.6,1\n0.1,0\n").unwrap();
     assert_eq!(half.assumed, ["displacement in mm"]);
-    let header = |curve| {
-        let source = Source {
-            curve,
-            file: "a.csv",
-            sha256: "aa",
-        };
-        String::from_utf8(join(&[source], Stated::default())).unwrap()
-    };
-    let said = "units not stated: force in gf, displacement in mm assumed";
-    assert!(header(&bare).contains(said));
-    assert!(!header(&read(FINE).unwrap()).contains("not stated"));
 }
 
 #[test]
