@@ -44,8 +44,9 @@ fn correct(folder: &Path, practice: bool, most: usize) {
             row[0] == who && row[3] == practice.to_string() && row[4] == "false" && row[5] == "ok"
         });
         for row in wrong.take(most) {
-            let right = row[2].replace("low-", "light and ");
-            let right = right.replace("high-", "heavy and ");
+            let order = ["low-soft", "low-crisp", "high-soft", "high-crisp"];
+            let place = order.iter().position(|model| *model == row[2]).unwrap();
+            let right = (place + 1).to_string();
             let arguments = [
                 "correct",
                 "out",

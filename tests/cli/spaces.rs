@@ -223,7 +223,7 @@ fn confirmed(at: &Path, pairs: &str) {
     }
     // Both parts are felt as the search was.
     for expected in [
-        "gap_s = 0.8 ",
+        "gap_s = 0.8",
         "exposure = { min_s = 1, max_s = 5.5, replays = 1 }",
     ] {
         assert_eq!(text.matches(expected).count(), 2, "{expected}: {text}");
