@@ -7,6 +7,7 @@
 
 mod counts;
 mod factors;
+mod functions;
 mod identification;
 mod means;
 mod outcomes;

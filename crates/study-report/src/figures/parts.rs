@@ -1,34 +1,32 @@
 //! The figures of a part that is no rating: psychometric functions with their data, tracks
 //! with their reversals, preferences, thresholds and sensitivities of the participants.
 
+use super::functions::{
+    MAX_PANELS, cut, grid, level_axis, level_label, of_everybody, place, psychometric,
+};
 use super::identification::confusions;
 use super::weber::webers_law;
 use super::{Canvas, Drawn, MAX_DRAWN, cell, drawn, head, rows_height};
 use crate::apa::digits;
-use crate::chart::{Axis, Color, Dash, Figure, Look, Mark, PALETTE, Panel, Shape, Whisker};
+use crate::chart::{Axis, Color, Dash, Look, Mark, PALETTE, Panel, Shape, Whisker};
 use crate::chart::{Label, shortened};
 use std::collections::BTreeMap;
 use study_analysis::analyze::psychophysics::results::{
-    At, CellName, ConditionName, Function, GeometricMean, Sensitivity,
+    At, CellName, ConditionName, GeometricMean, Sensitivity,
 };
 use study_analysis::analyze::psychophysics::{LevelData, PartAnalysis, TrackData, TrackTrial};
 use study_analysis::analyze::results::{Interval, Number as _};
-use study_stats::psychometric::{Curve, Spacing};
+use study_stats::psychometric::Spacing;
 
 /// What the files of these figures are called before the number of the part.
 pub const PREFIX: &str = "part-";
-
-/// Largest number of panels of a figure.
-const MAX_PANELS: usize = 12;
-
-/// Height of a row of panels, px.
-const ROW: f64 = 168.0;
 
 /// All figures that the data allow, of the part with this number, from 1.
 pub fn of_part(number: usize, part: &PartAnalysis) -> Vec<Drawn> {
     let name = |kind: &str| format!("{PREFIX}{number}-{kind}");
     let all = [
         psychometric(&name("psychometric"), part),
+        of_everybody(&name("functions"), part),
         thresholds(&name("thresholds"), part),
         webers_law(&name("webers-law"), part),
         tracks(&name("tracks"), part),
@@ -45,150 +43,6 @@ pub fn of_part(number: usize, part: &PartAnalysis) -> Vec<Drawn> {
     };
     let all = all.into_iter().flatten();
     all.map(|drawn| drawn.noted(note)).collect()
-}
-
-/// A grid of panels, with as many columns as there is room for.
-fn grid(c: Canvas, name: &str, title: &str, panels: Vec<Panel>) -> Figure {
-    let columns = c.pick(3, 2).min(panels.len().max(1));
-    let rows = panels.len().div_ceil(columns);
-    let mut figure = c.figure(name, title, ROW * rows as f64 + 24.0);
-    figure.columns = columns;
-    figure.panels = panels;
-    figure
-}
-
-/// "; the first 12 of 30 are drawn".
-fn cut(all: usize) -> String {
-    match all > MAX_PANELS {
-        true => format!(" The first {MAX_PANELS} of {all} are drawn; the file has all data."),
-        false => String::new(),
-    }
-}
-
-fn level_label(part: &PartAnalysis) -> String {
-    part.data
-        .dimension
-        .clone()
-        .unwrap_or_else(|| "level".to_owned())
-}
-
-/// An axis of levels on the scale of their functions.
-fn level_axis(spacing: Spacing, label: &str, levels: impl IntoIterator<Item = f64>) -> Axis {
-    match spacing {
-        Spacing::Lin => Axis::around(label, levels),
-        Spacing::Log => Axis::of_logarithms(label, levels),
-    }
-}
-
-/// Where a level is on such an axis.
-fn place(spacing: Spacing, level: f64) -> f64 {
-    spacing.place(level).unwrap_or(f64::NAN)
-}
-
-/// What was fitted to a cell.
-fn fitted<'a>(part: &'a PartAnalysis, cell: &LevelData) -> Option<&'a Function> {
-    let name = CellName::of(&cell.participant, &cell.condition);
-    part.results.psy.get(&name)
-}
-
-/// The function of a cell, of the posterior, on its scale.
-fn curve(part: &PartAnalysis, cell: &LevelData) -> Option<Curve> {
-    let means = &fitted(part, cell)?.posterior;
-    let gamma = means.gamma.as_ref();
-    Some(Curve {
-        core: cell.core,
-        threshold: cell
-            .spacing
-            .place(means.threshold.median.as_ref()?.number()?)?,
-        width: means.width.mean.number()?,
-        gamma: part.data.guess.or_else(|| gamma?.mean.number())?,
-        lambda: means.lambda.mean.number()?,
-    })
-}
-
-fn psychometric(name: &str, part: &PartAnalysis) -> Option<Drawn> {
-    let cells = &part.data.levels;
-    if cells.is_empty() {
-        return None;
-    }
-    let mut data = vec![head([
-        "participant",
-        "condition",
-        "level",
-        "positive",
-        "trials",
-        "fitted",
-    ])];
-    for cell in cells {
-        let curve = curve(part, cell);
-        for l in &cell.levels {
-            data.push(vec![
-                cell.participant.clone(),
-                cell.condition.clone(),
-                digits(l.level),
-                digits(l.positive),
-                digits(l.trials),
-                self::cell(curve.map(|c| c.value(place(cell.spacing, l.level)))),
-            ]);
-        }
-    }
-    let shares = match part.data.guess {
-        Some(_) => "share correct",
-        None => "share of “yes”",
-    };
-    let all = cells.iter().flat_map(|c| c.levels.iter().map(|l| l.level));
-    let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| {
-        (a.min(x), b.max(x))
-    });
-    let panel = |cell: &LevelData| {
-        let spacing = cell.spacing;
-        let x = level_axis(spacing, &level_label(part), [low, high]);
-        let (from, to) = (x.low, x.high);
-        let mut panel = Panel::new(x, Axis::new(shares, -0.04, 1.04));
-        panel.title = format!(
-            "{} · {}",
-            shortened(&cell.participant, 14),
-            shortened(&cell.condition, 18)
-        );
-        let curve = curve(part, cell);
-        if let Some(curve) = curve {
-            let at = |i: u32| from + (to - from) * f64::from(i) / 120.0;
-            let line = (0..=120).map(|i| (at(i), curve.value(at(i)))).collect();
-            panel = panel.with(Look::plain(PALETTE[1]).stroke(1.8), Mark::Line(line));
-            let ci95 = fitted(part, cell).and_then(|f| f.posterior.threshold.ci95.as_ref());
-            if let Some((low, high)) = ci95.and_then(Interval::ends) {
-                let at = curve.value(curve.threshold);
-                let (low, high) = (place(spacing, low), place(spacing, high));
-                let bar = Mark::ErrorBarsAcross(vec![Whisker { at, low, high }]);
-                panel = panel.with(Look::plain(PALETTE[1]).stroke(1.8), bar);
-            }
-        }
-        // Larger points rest on more trials.
-        for (size, least, most) in [(4.0, 0.0, 2.5), (6.5, 2.5, 7.5), (9.0, 7.5, f64::INFINITY)] {
-            let own = cell
-                .levels
-                .iter()
-                .filter(|l| least <= l.trials && l.trials < most);
-            let points = own.map(|l| (place(spacing, l.level), l.positive / l.trials));
-            let points = points.collect();
-            panel = panel.with(Look::plain(PALETTE[0]).size(size), Mark::Points(points));
-        }
-        panel
-    };
-    let caption = format!(
-        "Psychometric functions. Points: {shares} by level, larger with more trials (up to 2, 7, more). \
-         Line: the function of the posterior medians of the threshold and means of the rest. Bar: threshold with its 95 % interval.{}",
-        cut(cells.len())
-    );
-    let title = "Psychometric functions by participant and condition";
-    Some(drawn(name, caption, data, |c: Canvas| {
-        grid(
-            c,
-            name,
-            title,
-            cells.iter().take(MAX_PANELS).map(panel).collect(),
-        )
-    }))
 }
 
 fn tracks(name: &str, part: &PartAnalysis) -> Option<Drawn> {
@@ -218,6 +72,11 @@ fn tracks(name: &str, part: &PartAnalysis) -> Option<Drawn> {
             ]);
         }
     }
+    let label = level_label(part);
+    // A label has the height of its row.
+    let short = if label.chars().count() > 16 { "level" } else { label.as_str() };
+    let drawn_tracks = tracks.iter().take(MAX_PANELS);
+    let levels: Vec<f64> = drawn_tracks.flat_map(|t| t.trials.iter().map(|x| x.level)).collect();
     let panel = |track: &TrackData| {
         // Of a track without a function, such as same-different, the level itself.
         let of_track = |cell: &&LevelData| cell.condition == track.condition;
@@ -228,9 +87,8 @@ fn tracks(name: &str, part: &PartAnalysis) -> Option<Drawn> {
             let at = |(i, t): (usize, &TrackTrial)| ((i + 1) as f64, place(spacing, t.level));
             all.map(at).collect()
         };
-        let levels = track.trials.iter().map(|t| t.level);
         let x = Axis::new("trial", 0.0, track.trials.len() as f64 + 1.0);
-        let mut panel = Panel::new(x, level_axis(spacing, &level_label(part), levels));
+        let mut panel = Panel::new(x, level_axis(spacing, short, levels.iter().copied()));
         panel.title = format!(
             "{} · {}",
             shortened(&track.participant, 14),
@@ -245,10 +103,10 @@ fn tracks(name: &str, part: &PartAnalysis) -> Option<Drawn> {
             let dashed = Look::plain(PALETTE[1]).stroke(1.2).dashed(Dash::Dashed);
             panel = panel.with(dashed, Mark::Line(across));
         }
-        for (shape, positive) in [(Shape::Disc, true), (Shape::Ring, false)] {
+        for (shape, size, positive) in [(Shape::Disc, 4.0, true), (Shape::Ring, 7.0, false)] {
             let look = Look {
                 shape,
-                ..Look::plain(PALETTE[0]).size(4.5).stroke(1.2)
+                ..Look::plain(PALETTE[0]).size(size)
             };
             let own = |i: usize| track.trials[i].positive == positive;
             panel = panel.with(look, Mark::Points(points(&own)));
@@ -261,7 +119,7 @@ fn tracks(name: &str, part: &PartAnalysis) -> Option<Drawn> {
         panel.with(look, Mark::Points(points(&turned)))
     };
     let caption = format!(
-        "Tracks: the level presented in each trial. Filled: positive answer; open: not. Diamonds: \
+        "Tracks: the level presented in each trial ({label}). Filled: positive answer; open rings: not. Diamonds: \
          reversals. The line joins the trials that the rule proposed, so that easy trials stand off it. \
          Dashed: the estimate of the rule.{}",
         cut(tracks.len())
@@ -283,6 +141,19 @@ struct Row {
     ci95: Option<(f64, f64)>,
     /// Over participants.
     mean: bool,
+    /// The same in the pooled model.
+    together: Option<(f64, (f64, f64))>,
+}
+
+impl Row {
+    /// Everything that has to be on the axis.
+    fn ends(&self) -> impl Iterator<Item = f64> {
+        let (low, high) = self.ci95.unwrap_or((self.value, self.value));
+        let together = self.together.into_iter();
+        [low, high, self.value]
+            .into_iter()
+            .chain(together.flat_map(|(value, (low, high))| [value, low, high]))
+    }
 }
 
 /// Values with their intervals, one below the other, in a panel for each condition.
@@ -290,36 +161,50 @@ fn forest(
     name: &str,
     (title, caption, label): (&str, String, &str),
     panels: Vec<(String, Vec<Row>)>,
-    zero: Option<f64>,
+    (zero, spacing): (Option<f64>, Spacing),
 ) -> Option<Drawn> {
     let most = panels.iter().map(|p| p.1.len()).max()?;
     if most == 0 || most > MAX_DRAWN {
         return None;
     }
-    let mut data = vec![head(["condition", "name", "value", "ci95_lo", "ci95_hi"])];
+    let pooled = panels.iter().any(|(_, rows)| rows.iter().any(|row| row.together.is_some()));
+    let mut names = head(["condition", "name", "value", "ci95_lo", "ci95_hi"]);
+    if pooled {
+        names.extend(head(["together", "together_ci95_lo", "together_ci95_hi"]));
+    }
+    let mut data = vec![names];
     for (condition, rows) in &panels {
         for row in rows {
-            data.push(vec![
+            let mut line = vec![
                 condition.clone(),
                 row.name.clone(),
                 digits(row.value),
                 cell(row.ci95.map(|e| e.0)),
                 cell(row.ci95.map(|e| e.1)),
-            ]);
+            ];
+            if pooled {
+                let ends = row.together.map(|t| t.1);
+                line.push(cell(row.together.map(|t| t.0)));
+                line.extend([cell(ends.map(|e| e.0)), cell(ends.map(|e| e.1))]);
+            }
+            data.push(line);
         }
     }
-    let ends = panels.iter().flat_map(|(_, rows)| rows);
-    let ends = ends.flat_map(|row| {
-        let (low, high) = row.ci95.unwrap_or((row.value, row.value));
-        [low, high, row.value]
-    });
+    let ends = panels.iter().flat_map(|(_, rows)| rows.iter().flat_map(Row::ends));
     let ends: Vec<f64> = ends.chain(zero).collect();
+    // A level without a place, such as 0 over logarithms, needs an axis of levels.
+    let spacing = match ends.iter().all(|x| spacing.place(*x).is_some()) {
+        true => spacing,
+        false => Spacing::Lin,
+    };
+    // Two marks of a row, one below the other.
+    let below = if pooled { 0.16 } else { 0.0 };
     let panel = |(condition, rows): &(String, Vec<Row>)| {
         let names: Vec<String> = rows.iter().map(|r| shortened(&r.name, 20)).collect();
         let mut axis = Axis::of_names("", &names).reversed();
         axis.columns = 20;
         let (low, high) = (axis.low, axis.high);
-        let mut panel = Panel::new(Axis::around(label, ends.iter().copied()), axis);
+        let mut panel = Panel::new(level_axis(spacing, label, ends.iter().copied()), axis);
         panel.title = shortened(condition, 30);
         if let Some(zero) = zero {
             let line = Mark::Line(vec![(zero, low), (zero, high)]);
@@ -329,7 +214,9 @@ fn forest(
             let own = rows.iter().enumerate().filter(|(_, r)| r.mean == mean);
             let color = PALETTE[usize::from(mean)];
             let bars = own.clone().filter_map(|(i, r)| {
-                let ((low, high), at) = (r.ci95?, i as f64);
+                let (low, high) = r.ci95?;
+                let (low, high) = (place(spacing, low), place(spacing, high));
+                let at = i as f64 - below;
                 Some(Whisker { at, low, high })
             });
             let look = Look {
@@ -339,10 +226,22 @@ fn forest(
                     .size(if mean { 10.0 } else { 7.0 })
             };
             panel = panel.with(look, Mark::ErrorBarsAcross(bars.collect()));
-            let points = own.map(|(i, r)| (r.value, i as f64)).collect();
-            panel = panel.with(look, Mark::Points(points));
+            let points = own.map(|(i, r)| (place(spacing, r.value), i as f64 - below));
+            panel = panel.with(look, Mark::Points(points.collect()));
         }
-        panel
+        let open = Look {
+            shape: Shape::Ring,
+            ..Look::plain(PALETTE[6]).stroke(1.2).size(7.0)
+        };
+        let together = || (rows.iter().enumerate()).filter_map(|(i, r)| Some((i as f64 + 0.2, r.together?)));
+        let bars = together().map(|(at, (_, (low, high)))| Whisker {
+            at,
+            low: place(spacing, low),
+            high: place(spacing, high),
+        });
+        panel = panel.with(open, Mark::ErrorBarsAcross(bars.collect()));
+        let points = together().map(|(at, (value, _))| (place(spacing, value), at));
+        panel.with(open, Mark::Points(points.collect()))
     };
     Some(drawn(name, caption, data, |c: Canvas| {
         let columns = c.pick(2, 1).min(panels.len());
@@ -371,6 +270,7 @@ fn by_condition<R>(
             value: value?,
             ci95,
             mean,
+            together: None,
         })
     };
     let conditions = cells.chunk_by(|a, b| a.0.condition == b.0.condition);
@@ -388,7 +288,7 @@ fn by_condition<R>(
 }
 
 fn thresholds(name: &str, part: &PartAnalysis) -> Option<Drawn> {
-    let panels = by_condition(
+    let mut panels = by_condition(
         &part.results.psy,
         |function| {
             let found = &function.posterior.threshold;
@@ -401,11 +301,31 @@ fn thresholds(name: &str, part: &PartAnalysis) -> Option<Drawn> {
             Some((found.geometric_mean.number(), found.ci95.ends()))
         },
     );
-    let caption = "Thresholds (posterior medians) with 95 % intervals. Diamond: geometric mean over \
-                   participants with its t interval.";
+    let mut caption = "Thresholds (posterior medians) with 95 % intervals. Diamond: geometric mean over \
+                       participants with its t interval."
+        .to_owned();
+    let model = part.results.over.psy_population.as_ref();
+    if let Some(model) = model.filter(|model| model.has_converged()) {
+        caption += " Open rings: the same learned together, the mean that of the population.";
+        for (condition, rows) in &mut panels {
+            for row in rows {
+                let found = if row.mean {
+                    model.threshold.get(condition.as_str())
+                } else {
+                    model.participant.get(&CellName::of(&row.name, condition))
+                };
+                row.together = found.and_then(|found| Some((found.median.number()?, found.ci95.ends()?)));
+            }
+        }
+    }
+    let spacings = part.data.levels.iter().map(|cell| cell.spacing);
+    let spacing = match spacings.clone().all(|s| s == Spacing::Log) {
+        true => Spacing::Log,
+        false => Spacing::Lin,
+    };
     let label = format!("threshold, {}", level_label(part));
     let title = "Thresholds by participant";
-    forest(name, (title, caption.to_owned(), &label), panels, None)
+    forest(name, (title, caption, &label), panels, (None, spacing))
 }
 
 fn sensitivities(name: &str, part: &PartAnalysis) -> Option<Drawn> {
@@ -416,7 +336,8 @@ fn sensitivities(name: &str, part: &PartAnalysis) -> Option<Drawn> {
     let caption = "Sensitivity d′ with 95 % intervals. Diamond: mean over participants with its t interval. \
                    Line: no sensitivity.";
     let title = "Sensitivity by participant";
-    forest(name, (title, caption.to_owned(), "d′"), panels, Some(0.0))
+    let text = (title, caption.to_owned(), "d′");
+    forest(name, text, panels, (Some(0.0), Spacing::Lin))
 }
 
 /// Realization, ability and interval, the most preferred first.
@@ -429,6 +350,7 @@ fn abilities(part: &PartAnalysis) -> Vec<Row> {
                 value: item.ability.number()?,
                 ci95: item.ability_ci95.ends(),
                 mean: false,
+                together: None,
             })
         })
         .collect();
@@ -447,7 +369,7 @@ fn preferences(name: &str, part: &PartAnalysis) -> Option<Drawn> {
         name,
         (title, caption, "ability"),
         vec![(String::new(), rows)],
-        Some(0.0),
+        (Some(0.0), Spacing::Lin),
     )
 }
 

@@ -1,7 +1,7 @@
 //! Weber's law: increments over the standards of a part.
 
 use super::{Canvas, Drawn, MAX_DRAWN, cell, drawn, head};
-use crate::apa::digits;
+use crate::apa::{digits, interval, number};
 use crate::chart::{Axis, Dash, Look, Mark, PALETTE, Panel, Whisker};
 use std::collections::BTreeMap;
 use study_analysis::analyze::psychophysics::PartAnalysis;
@@ -86,19 +86,37 @@ pub(super) fn webers_law(name: &str, part: &PartAnalysis) -> Option<Drawn> {
             let (low, high) = ci95.unwrap_or((*mean, *mean));
             [low, high]
         });
-        let x = Axis::of_logarithms("standard", points().map(|p| p.0));
-        let y = Axis::of_logarithms("increment at threshold", points().map(|p| p.1).chain(ends));
+        let of = |quantity: &str| match &part.data.family {
+            Some(family) => format!("{quantity}, {family}"),
+            None => quantity.to_owned(),
+        };
+        let mut standards: Vec<f64> = points().map(|p| p.0).collect();
+        standards.sort_by(f64::total_cmp);
+        standards.dedup();
+        let ticks = standards.iter().map(|s| (s.ln(), digits(*s))).collect();
+        let x = Axis::of_logarithms(&of("standard"), standards.iter().copied()).at(ticks);
+        let y = of("increment at threshold");
+        let y = Axis::of_logarithms(&y, points().map(|p| p.1).chain(ends));
         let mut panel = Panel::new(x, y);
-        for own in people.values() {
+        for (i, own) in people.values().enumerate() {
             let mut own: Vec<(f64, f64)> = own.iter().map(|p| (p.0.ln(), p.1.ln())).collect();
             own.sort_by(|a, b| a.0.total_cmp(&b.0));
-            panel = panel.with(Look::plain(PALETTE[6]).stroke(0.8), Mark::Line(own));
+            let thin = Look::plain(PALETTE[6]).stroke(0.8);
+            panel = match i {
+                0 => panel.named("a participant", thin, Mark::Line(own)),
+                _ => panel.with(thin, Mark::Line(own)),
+            };
         }
         let look = Look::plain(PALETTE[0]).stroke(1.6);
         if groups.len() > 1 {
-            panel = panel.with(look.dashed(Dash::Dashed).stroke(1.0), Mark::Line(line(1.0)));
+            let dashed = Look::plain(PALETTE[1]).dashed(Dash::Dashed).stroke(1.4);
+            panel = panel.named("Weber's law: exponent 1", dashed, Mark::Line(line(1.0)));
             if let Some(exponent) = law.exponent.number() {
-                panel = panel.with(look, Mark::Line(line(exponent)));
+                let interval = law.exponent_ci95.ends().map_or(String::new(), |ends| {
+                    format!(" {}", interval(ends, |x| number(x, 2)))
+                });
+                let name = format!("mean exponent {}{interval}", number(exponent, 2));
+                panel = panel.named(&name, look, Mark::Line(line(exponent)));
             }
         }
         let bars = groups.iter().filter_map(|(standard, _, ci95)| {
@@ -114,4 +132,70 @@ pub(super) fn webers_law(name: &str, part: &PartAnalysis) -> Option<Drawn> {
         c.figure(name, "Increments over standards", c.pick(320.0, 270.0))
             .with(panel)
     }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::parts::of_part;
+    use study_analysis::preregister::complete_parts;
+
+    /// Three standards, levels counted from them.
+    const PROTOCOL: &str = r#"
+format = "study-protocol/3"
+study = { id = "example", title = "An example", seed = 1 }
+design = { participants = 10 }
+device = { kind = "simulated", limits = { force_n = 12.0, velocity_mm_s = 1000.0 } }
+analysis = { primary = "more" }
+
+[[families]]
+id = "friction"
+from = "static.toml"
+vary = "friction"
+range = [0.02, 1.6]
+steps = 80
+unit = "N"
+
+[[parts]]
+id = "more"
+kind = "discrimination"
+prompt = "Which one had more friction?"
+tracks = ["low", "middle", "high"]
+"#;
+
+    /// The standards are on the axis, with their unit; what the lines are stands beside them.
+    #[test]
+    fn the_figure_names_its_standards_and_lines() {
+        let mut text = PROTOCOL.to_owned();
+        for (id, standard) in [("low", 0.2), ("middle", 0.4), ("high", 0.8)] {
+            text += &format!(
+                "[[tracks]]\nid = \"{id}\"\nmethod = \"2ifc\"\nfamily = \"friction\"\nstandard = {standard}\n\
+                 relative = \"fraction\"\nprocedure = {{ rule = \"quest+\", trials = 40 }}\n"
+            );
+        }
+        let parsed = study_plan::protocol::file::parse("protocol.toml", &text);
+        let part = complete_parts(&parsed.protocol.unwrap(), 4).remove(0);
+        let figures = of_part(1, &part);
+        let figure = |name: &str| figures.iter().find(|f| f.name == name).unwrap();
+        let weber = figure("part-1-webers-law");
+        for picture in [&weber.wide, &weber.narrow] {
+            let svg = picture.to_svg();
+            for text in [
+                ">0.2<",
+                ">0.4<",
+                ">0.8<",
+                "standard, friction (N)",
+                "increment at threshold, friction (N)",
+                "exponent 1",
+                "mean exponent",
+            ] {
+                assert!(svg.contains(text), "{text}");
+            }
+        }
+        // Functions of everybody, and thresholds on their scale beside those learned together.
+        let functions = figure("part-1-functions");
+        assert_eq!(functions.wide.to_svg().matches(">high<").count(), 1);
+        let thresholds = figure("part-1-thresholds");
+        assert!(thresholds.data.starts_with("condition,name,value,ci95_lo,ci95_hi"));
+        assert!(functions.data.lines().count() > 10);
+    }
 }
