@@ -5,6 +5,7 @@
 //! cargo bench --bench pooling -- --groups 500 --file pooling.csv     # groups of simulated participants
 //! cargo bench --bench pooling -- --ranks 2000 --file ranks.csv       # populations drawn from the prior
 //! cargo bench --bench pooling -- --table --file pooling.csv          # what is in a file
+//! cargo bench --bench pooling -- --picture ranks.svg --file ranks.csv
 //! ```
 //!
 //! A file has one line for each group. What is there is not simulated again, so that a run can be
@@ -12,6 +13,8 @@
 //! Seeds are fixed. Tables have Monte Carlo errors.
 #![allow(clippy::print_stdout)]
 
+#[path = "common/ranks.rs"]
+mod pictured;
 #[path = "common/tracks.rs"]
 mod tracks;
 
@@ -56,6 +59,14 @@ fn main() {
     let mine = |i: &u64| i % shards == own - 1;
     if arguments.iter().any(|a| a == "--table") {
         return table(&file);
+    }
+    if let Some(picture) = value("--picture") {
+        let ranks: Vec<Vec<f64>> = (rows(&file).into_iter())
+            .filter(|row| row.0 == "ranks")
+            .map(|row| row.2)
+            .collect();
+        let svg = pictured::picture(&RANKED, &ranks);
+        return std::fs::write(picture, svg).expect("the picture can be written");
     }
     if let Some(n) = number("--ranks") {
         let jobs = (0..n).filter(mine).map(|i| ("ranks".to_owned(), i));
