@@ -32,7 +32,11 @@ fn wanted(text: &str) -> Result<Wanted, String> {
     let expected = || "write participant=1.5, mean=1.2 or contrast=1.3".to_owned();
     let (name, within) = text.split_once('=').ok_or_else(expected)?;
     let about = About::ALL.into_iter().find(|a| a.1 == name.trim());
-    let within: Option<f64> = within.trim().parse().ok().filter(|x: &f64| x.is_finite() && *x > 0.0);
+    let within: Option<f64> = within
+        .trim()
+        .parse()
+        .ok()
+        .filter(|x: &f64| x.is_finite() && *x > 0.0);
     match (about, within) {
         (Some((about, _)), Some(within)) => Ok(Wanted { about, within }),
         _ => Err(expected()),

@@ -31,7 +31,10 @@ const STUDIES_WITHOUT_TEST: u64 = 40;
 
 /// The part that is meant: the one of the flag, or the one that asks the primary question;
 /// `None` if that is a part of ratings.
-pub(super) fn meant<'p>(protocol: &'p Protocol, flag: Option<&PartId>) -> Result<Option<&'p Part>, PlanError> {
+pub(super) fn meant<'p>(
+    protocol: &'p Protocol,
+    flag: Option<&PartId>,
+) -> Result<Option<&'p Part>, PlanError> {
     let primary = &protocol.analysis.primary;
     let found = match flag {
         Some(id) => Some(

@@ -3,8 +3,8 @@
 use super::{Assumptions, Cell, Pilot, Scale, Settings, Test, Vaf};
 use crate::analyze::ALPHA;
 use study_base::text::{PartId, QuestionId, Untrusted};
-use study_plan::protocol::parts::Task;
 use study_plan::procedure::ProcedureError;
+use study_plan::protocol::parts::Task;
 use study_plan::protocol::power::{PowerPlan, PowerScale};
 use study_plan::protocol::procedures::Procedure;
 use study_plan::protocol::{Protocol, Role, check};
@@ -81,7 +81,9 @@ pub enum PlanError {
     #[error("part `{0}` has no tracks with levels, whose procedures could be compared")]
     NoThresholds(PartId),
     /// Procedures where ratings are primary.
-    #[error("the primary question is not that of tracks with levels: name the part whose procedures are compared")]
+    #[error(
+        "the primary question is not that of tracks with levels: name the part whose procedures are compared"
+    )]
     NoTracks,
     /// A procedure that a ladder does not allow.
     #[error("procedure `{name}`: {1}", name = .0.as_str())]

@@ -72,12 +72,14 @@ impl Quality {
             return;
         }
         let n = errors.len() as f64;
-        self.square.add(errors.iter().map(|e| e.0 * e.0).sum::<f64>() / n);
+        self.square
+            .add(errors.iter().map(|e| e.0 * e.0).sum::<f64>() / n);
         self.error.add(errors.iter().map(|e| e.0).sum::<f64>() / n);
         self.holds.add(errors.iter().map(|e| e.2).sum::<f64>() / n);
         let halves: Vec<f64> = errors.iter().filter_map(|e| e.1).collect();
         if !halves.is_empty() {
-            self.half.add(halves.iter().sum::<f64>() / halves.len() as f64);
+            self.half
+                .add(halves.iter().sum::<f64>() / halves.len() as f64);
         }
     }
 
@@ -193,8 +195,14 @@ mod tests {
     fn errors_are_logarithms_of_ratios() {
         let mut all = Quality::default();
         let ratios = Compared { ratios: true };
-        all.add_all(ratios, &[(found(2.0, 1.0, 4.0), 1.0), (found(1.0, 0.5, 2.0), 1.0)]);
-        all.add_all(ratios, &[(found(0.5, 0.4, 0.6), 1.0), (found(-1.0, -2.0, 0.0), 1.0)]);
+        all.add_all(
+            ratios,
+            &[(found(2.0, 1.0, 4.0), 1.0), (found(1.0, 0.5, 2.0), 1.0)],
+        );
+        all.add_all(
+            ratios,
+            &[(found(0.5, 0.4, 0.6), 1.0), (found(-1.0, -2.0, 0.0), 1.0)],
+        );
         let l = std::f64::consts::LN_2;
         assert!((all.square.mean().unwrap() - (l * l / 2.0 + l * l) / 2.0).abs() < 1e-12);
         assert!((all.error.mean().unwrap() - (l / 2.0 - l) / 2.0).abs() < 1e-12);
@@ -211,8 +219,14 @@ mod tests {
         let mut all = Quality::default();
         let differences = Compared { ratios: false };
         all.add_all(differences, &[(found(-0.5, -1.0, 1.0), 0.25)]);
-        assert_eq!((all.error.mean(), all.half.mean()), (Some(-0.75), Some(1.0)));
-        assert_eq!((all.error.error(), differences.contrast(3.0, 1.0)), (None, 2.0));
+        assert_eq!(
+            (all.error.mean(), all.half.mean()),
+            (Some(-0.75), Some(1.0))
+        );
+        assert_eq!(
+            (all.error.error(), differences.contrast(3.0, 1.0)),
+            (None, 2.0)
+        );
         let mut both = all;
         both.merge(&all);
         assert_eq!((both.error.studies, both.error.mean()), (2, Some(-0.75)));

@@ -78,7 +78,10 @@ fn trial_minutes(protocol: &Protocol, part: &Part) -> f64 {
     let minutes = |protocol: &Protocol| {
         let mut protocol = protocol.clone();
         protocol.design.breaks = None;
-        (check::minutes(&protocol), f64::from(check::trials(&protocol)))
+        (
+            check::minutes(&protocol),
+            f64::from(check::trials(&protocol)),
+        )
     };
     let ((all, trials), (rest, others)) = (minutes(protocol), minutes(&without));
     (all - rest) / (trials - others).max(1.0)

@@ -5,8 +5,8 @@
 use super::decide::{Outcome, is_lost, verdict};
 use super::precision::{Compared, Precision};
 use super::{Cell, STREAM, Settings, Test};
-use crate::analyze::psychophysics::results::CellName;
 use crate::analyze::psychophysics::decided::{self, Estimated, NoModel};
+use crate::analyze::psychophysics::results::CellName;
 use crate::analyze::psychophysics::{Asked, TrialCount, TrialSettings};
 use std::f64::consts::SQRT_2;
 use study_base::rng::Stream;
@@ -176,7 +176,10 @@ impl<'a> TracksJudge<'a> {
         precision.alone.participant.add_all(scale, &known);
         precision.alone.mean.add_all(scale, &pair(mean, typical));
         let of_contrast = differing.and_then(|d| d.contrast);
-        precision.alone.contrast.add_all(scale, &pair(of_contrast, contrast));
+        precision
+            .alone
+            .contrast
+            .add_all(scale, &pair(of_contrast, contrast));
         if k < self.world.pooled {
             match self.together(&answers, k) {
                 Err(NoModel) => {}
@@ -284,11 +287,22 @@ impl<'a> TracksJudge<'a> {
     fn together(&self, answers: &Answers, k: u64) -> Result<Option<decided::Together>, NoModel> {
         let id = |at: usize| self.conditions[at].rules.condition().as_str();
         let cells: Vec<decided::Answered> = (answers.cells.iter())
-            .map(|cell| (CellName::of(&cell.name, id(cell.condition)), cell.levels.clone()))
+            .map(|cell| {
+                (
+                    CellName::of(&cell.name, id(cell.condition)),
+                    cell.levels.clone(),
+                )
+            })
             .collect();
         let conditions: Vec<(&str, Asked, &TrialSettings)> = (0..self.conditions.len())
             .filter(|at| answers.cells.iter().any(|cell| cell.condition == *at))
-            .filter_map(|at| Some((id(at), self.conditions[at].asked()?, &self.conditions[at].settings)))
+            .filter_map(|at| {
+                Some((
+                    id(at),
+                    self.conditions[at].asked()?,
+                    &self.conditions[at].settings,
+                ))
+            })
             .collect();
         decided::together(&cells, &conditions, self.settings.seed.wrapping_add(k))
     }
@@ -333,7 +347,12 @@ pub(super) fn of_participant(typical: Curve, own: f64, ratios: bool) -> Curve {
 }
 
 /// Runs a track by its rule; the answers by trial.
-pub(super) fn run(track: &TrackWorld, mut state: Track, curve: &Curve, draws: &mut Stream) -> Vec<Level> {
+pub(super) fn run(
+    track: &TrackWorld,
+    mut state: Track,
+    curve: &Curve,
+    draws: &mut Stream,
+) -> Vec<Level> {
     let levels = track.ladder.levels();
     let mut answered = Vec::new();
     while let Some(proposal) = state.next() {

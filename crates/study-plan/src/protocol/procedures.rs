@@ -26,12 +26,7 @@ words! {
 
 impl Procedure {
     /// All of them.
-    pub const ALL: [Self; 4] = [
-        Self::Own,
-        Self::Staircase,
-        Self::QuestPlus,
-        Self::Constant,
-    ];
+    pub const ALL: [Self; 4] = [Self::Own, Self::Staircase, Self::QuestPlus, Self::Constant];
 }
 
 /// Levels of constant stimuli, where the protocol has none.
@@ -101,7 +96,8 @@ impl Protocol {
             Procedure::Constant => {
                 let levels = above(ladder, standard);
                 let count = LEVELS.min(levels.len());
-                let place = |i: usize| (i * (levels.len() - 1) + (count - 1) / 2) / (count - 1).max(1);
+                let place =
+                    |i: usize| (i * (levels.len() - 1) + (count - 1) / 2) / (count - 1).max(1);
                 let rule = Constant {
                     levels: (0..count).map(|i| levels[place(i)]).collect(),
                     repetitions: 1,
@@ -110,8 +106,13 @@ impl Protocol {
             }
             Procedure::Staircase | Procedure::Own => {
                 let family = track.family().and_then(|id| self.family(id));
-                let ratios = family.is_some_and(|f| f.spacing == Spacing::Log) && track.relative.is_none();
-                let down = if track.method.guess_rate().is_some() { 3 } else { 1 };
+                let ratios =
+                    family.is_some_and(|f| f.spacing == Spacing::Log) && track.relative.is_none();
+                let down = if track.method.guess_rate().is_some() {
+                    3
+                } else {
+                    1
+                };
                 of_trials(&staircase(ladder, standard, ratios, down), trials)
             }
         }
@@ -122,19 +123,30 @@ impl Protocol {
 fn above(ladder: &Ladder, standard: Option<f64>) -> Vec<f64> {
     let levels = ladder.levels();
     let from = standard.map_or(0, |s| levels.partition_point(|level| *level <= s));
-    levels.get(from..).filter(|l| !l.is_empty()).unwrap_or(levels).to_vec()
+    levels
+        .get(from..)
+        .filter(|l| !l.is_empty())
+        .unwrap_or(levels)
+        .to_vec()
 }
 
 /// 1-up-`down`-down from three quarters of the ladder.
 fn staircase(ladder: &Ladder, standard: Option<f64>, ratios: bool, down: u32) -> Rule {
     let levels = above(ladder, standard);
     let (low, high) = (levels[0], levels[levels.len() - 1]);
-    let scale = if ratios && low > 0.0 { Scale::Log } else { Scale::Lin };
+    let scale = if ratios && low > 0.0 {
+        Scale::Log
+    } else {
+        Scale::Lin
+    };
     let distance = |from: f64, to: f64| match scale {
         Scale::Log => libm::log10(to / from),
         Scale::Lin | Scale::Db => to - from,
     };
-    let mut gaps: Vec<f64> = levels.windows(2).map(|two| distance(two[0], two[1])).collect();
+    let mut gaps: Vec<f64> = levels
+        .windows(2)
+        .map(|two| distance(two[0], two[1]))
+        .collect();
     gaps.sort_by(f64::total_cmp);
     let gap = gaps.get(gaps.len() / 2).copied().unwrap_or(0.0);
     let span = distance(low, high);
@@ -228,8 +240,7 @@ family = "friction"
 
     const LOG: &str = "range = [0.02, 0.6]\nsteps = 30\nscale = \"log\"";
     const LIN: &str = "range = [0.02, 1.6]\nsteps = 80";
-    const QUEST: &str =
-        "method = \"2ifc\"\nstandard = 0.0\nprocedure = { rule = \"quest+\", trials = 40, sd_below = 0.01 }";
+    const QUEST: &str = "method = \"2ifc\"\nstandard = 0.0\nprocedure = { rule = \"quest+\", trials = 40, sd_below = 0.01 }";
     const CONSTANT: &str = "method = \"2ifc\"\nstandard = 0.0\nprocedure = { rule = \"constant\", levels = [0.02, 0.6], repetitions = 10 }";
     const RELATIVE: &str = "method = \"2ifc\"\nstandard = 0.4\nrelative = \"increment\"\nprocedure = { rule = \"quest+\", trials = 40 }";
     const YES: &str =
@@ -261,9 +272,10 @@ family = "friction"
     fn quest_has_the_grids_of_a_protocol_that_gives_none() {
         let own = study(LOG, QUEST);
         let other = study(LOG, CONSTANT);
-        let (Rule::QuestPlus(of_file), Rule::QuestPlus(made)) =
-            (&own.tracks[0].rule, rule(&other, Procedure::QuestPlus, Some(40)))
-        else {
+        let (Rule::QuestPlus(of_file), Rule::QuestPlus(made)) = (
+            &own.tracks[0].rule,
+            rule(&other, Procedure::QuestPlus, Some(40)),
+        ) else {
             panic!("another rule")
         };
         assert_eq!(of_file.parameters, made.parameters);
@@ -279,9 +291,11 @@ family = "friction"
             (LOG, YES, Scale::Log, 1),
         ] {
             let protocol = study(family, track);
-            let changed = protocol.with_procedure(&protocol.parts[0], Procedure::Staircase, Some(80));
+            let changed =
+                protocol.with_procedure(&protocol.parts[0], Procedure::Staircase, Some(80));
             let changed = changed.unwrap();
-            let coarse = crate::protocol::check::coarse(&changed, &std::collections::BTreeMap::new(), false);
+            let coarse =
+                crate::protocol::check::coarse(&changed, &std::collections::BTreeMap::new(), false);
             assert!(coarse.is_empty(), "{family}");
             let Rule::Staircase(made) = &changed.tracks[0].rule else {
                 panic!("another rule")
@@ -318,7 +332,11 @@ family = "friction"
         let Rule::Constant(made) = rule(&protocol, Procedure::Constant, Some(40)) else {
             panic!("another rule")
         };
-        assert!(made.levels.iter().all(|level| *level > 0.8), "{:?}", made.levels);
+        assert!(
+            made.levels.iter().all(|level| *level > 0.8),
+            "{:?}",
+            made.levels
+        );
         assert_eq!(made.levels.len(), 8);
     }
 }

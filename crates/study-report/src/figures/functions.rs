@@ -42,7 +42,11 @@ pub(super) fn level_label(part: &PartAnalysis) -> String {
 }
 
 /// An axis of levels on the scale of their functions.
-pub(super) fn level_axis(spacing: Spacing, label: &str, levels: impl IntoIterator<Item = f64>) -> Axis {
+pub(super) fn level_axis(
+    spacing: Spacing,
+    label: &str,
+    levels: impl IntoIterator<Item = f64>,
+) -> Axis {
     match spacing {
         Spacing::Lin => Axis::around(label, levels),
         Spacing::Log => Axis::of_logarithms(label, levels),
@@ -150,8 +154,17 @@ pub(super) fn psychometric(name: &str, part: &PartAnalysis) -> Option<Drawn> {
 
 /// The same panel with the shares of positive answers by level, in points of three sizes; the numbers of
 /// trials are those from which on a point is larger.
-fn with_points(mut panel: Panel, levels: &[Level], spacing: Spacing, [few, many]: [f64; 2]) -> Panel {
-    for (size, least, most) in [(4.0, 0.0, few), (6.5, few, many), (9.0, many, f64::INFINITY)] {
+fn with_points(
+    mut panel: Panel,
+    levels: &[Level],
+    spacing: Spacing,
+    [few, many]: [f64; 2],
+) -> Panel {
+    for (size, least, most) in [
+        (4.0, 0.0, few),
+        (6.5, few, many),
+        (9.0, many, f64::INFINITY),
+    ] {
         let own = (levels.iter()).filter(|l| least <= l.trials && l.trials < most);
         let points = own.map(|l| (place(spacing, l.level), l.positive / l.trials));
         let points = points.collect();
@@ -164,7 +177,10 @@ fn with_points(mut panel: Panel, levels: &[Level], spacing: Spacing, [few, many]
 pub(super) fn of_everybody(name: &str, part: &PartAnalysis) -> Option<Drawn> {
     let mut conditions: BTreeMap<&str, Vec<&LevelData>> = BTreeMap::new();
     for cell in &part.data.levels {
-        conditions.entry(cell.condition.as_str()).or_default().push(cell);
+        conditions
+            .entry(cell.condition.as_str())
+            .or_default()
+            .push(cell);
     }
     conditions.retain(|_, cells| cells.len() > 1);
     if conditions.is_empty() || conditions.len() > MAX_PANELS {
@@ -183,10 +199,22 @@ pub(super) fn of_everybody(name: &str, part: &PartAnalysis) -> Option<Drawn> {
         };
         Some((curve, center.ci95.ends()))
     };
-    let mut data = vec![head(["condition", "level", "positive", "trials", "typical"])];
+    let mut data = vec![head([
+        "condition",
+        "level",
+        "positive",
+        "trials",
+        "typical",
+    ])];
     let mut panels = Vec::new();
-    let all = part.data.levels.iter().flat_map(|c| c.levels.iter().map(|l| l.level));
-    let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+    let all = part
+        .data
+        .levels
+        .iter()
+        .flat_map(|c| c.levels.iter().map(|l| l.level));
+    let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| {
+        (a.min(x), b.max(x))
+    });
     let shares = share_label(part);
     for (condition, cells) in &conditions {
         let spacing = cells[0].spacing;
@@ -209,7 +237,8 @@ pub(super) fn of_everybody(name: &str, part: &PartAnalysis) -> Option<Drawn> {
             let at = |i: u32| from + (to - from) * f64::from(i) / 120.0;
             Mark::Line((0..=120).map(|i| (at(i), curve.value(at(i)))).collect())
         };
-        let mut panel = Panel::new(x, Axis::new(shares, -0.04, 1.04)).titled(&shortened(condition, 30));
+        let mut panel =
+            Panel::new(x, Axis::new(shares, -0.04, 1.04)).titled(&shortened(condition, 30));
         for own in &curves {
             panel = panel.with(Look::plain(PALETTE[6]).stroke(0.8), line(own));
         }
@@ -232,7 +261,9 @@ pub(super) fn of_everybody(name: &str, part: &PartAnalysis) -> Option<Drawn> {
          with more trials. Such points lie on a flatter function than anybody's."
     );
     let title = "Psychometric functions of all participants by condition";
-    Some(drawn(name, caption, data, |c: Canvas| grid(c, name, title, panels.clone())))
+    Some(drawn(name, caption, data, |c: Canvas| {
+        grid(c, name, title, panels.clone())
+    }))
 }
 
 /// What the share of positive answers is.

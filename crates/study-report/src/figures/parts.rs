@@ -74,9 +74,15 @@ fn tracks(name: &str, part: &PartAnalysis) -> Option<Drawn> {
     }
     let label = level_label(part);
     // A label has the height of its row.
-    let short = if label.chars().count() > 16 { "level" } else { label.as_str() };
+    let short = if label.chars().count() > 16 {
+        "level"
+    } else {
+        label.as_str()
+    };
     let drawn_tracks = tracks.iter().take(MAX_PANELS);
-    let levels: Vec<f64> = drawn_tracks.flat_map(|t| t.trials.iter().map(|x| x.level)).collect();
+    let levels: Vec<f64> = drawn_tracks
+        .flat_map(|t| t.trials.iter().map(|x| x.level))
+        .collect();
     let panel = |track: &TrackData| {
         // Of a track without a function, such as same-different, the level itself.
         let of_track = |cell: &&LevelData| cell.condition == track.condition;
@@ -167,7 +173,9 @@ fn forest(
     if most == 0 || most > MAX_DRAWN {
         return None;
     }
-    let pooled = panels.iter().any(|(_, rows)| rows.iter().any(|row| row.together.is_some()));
+    let pooled = panels
+        .iter()
+        .any(|(_, rows)| rows.iter().any(|row| row.together.is_some()));
     let mut names = head(["condition", "name", "value", "ci95_lo", "ci95_hi"]);
     if pooled {
         names.extend(head(["together", "together_ci95_lo", "together_ci95_hi"]));
@@ -190,7 +198,9 @@ fn forest(
             data.push(line);
         }
     }
-    let ends = panels.iter().flat_map(|(_, rows)| rows.iter().flat_map(Row::ends));
+    let ends = panels
+        .iter()
+        .flat_map(|(_, rows)| rows.iter().flat_map(Row::ends));
     let ends: Vec<f64> = ends.chain(zero).collect();
     // A level without a place, such as 0 over logarithms, needs an axis of levels.
     let spacing = match ends.iter().all(|x| spacing.place(*x).is_some()) {
@@ -233,7 +243,8 @@ fn forest(
             shape: Shape::Ring,
             ..Look::plain(PALETTE[6]).stroke(1.2).size(7.0)
         };
-        let together = || (rows.iter().enumerate()).filter_map(|(i, r)| Some((i as f64 + 0.2, r.together?)));
+        let together =
+            || (rows.iter().enumerate()).filter_map(|(i, r)| Some((i as f64 + 0.2, r.together?)));
         let bars = together().map(|(at, (_, (low, high)))| Whisker {
             at,
             low: place(spacing, low),
@@ -301,9 +312,10 @@ fn thresholds(name: &str, part: &PartAnalysis) -> Option<Drawn> {
             Some((found.geometric_mean.number(), found.ci95.ends()))
         },
     );
-    let mut caption = "Thresholds (posterior medians) with 95 % intervals. Diamond: geometric mean over \
+    let mut caption =
+        "Thresholds (posterior medians) with 95 % intervals. Diamond: geometric mean over \
                        participants with its t interval."
-        .to_owned();
+            .to_owned();
     let model = part.results.over.psy_population.as_ref();
     if let Some(model) = model.filter(|model| model.has_converged()) {
         caption += " Open rings: the same learned together, the mean that of the population.";
@@ -314,7 +326,8 @@ fn thresholds(name: &str, part: &PartAnalysis) -> Option<Drawn> {
                 } else {
                     model.participant.get(&CellName::of(&row.name, condition))
                 };
-                row.together = found.and_then(|found| Some((found.median.number()?, found.ci95.ends()?)));
+                row.together =
+                    found.and_then(|found| Some((found.median.number()?, found.ci95.ends()?)));
             }
         }
     }

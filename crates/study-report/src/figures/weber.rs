@@ -195,7 +195,11 @@ tracks = ["low", "middle", "high"]
         let functions = figure("part-1-functions");
         assert_eq!(functions.wide.to_svg().matches(">high<").count(), 1);
         let thresholds = figure("part-1-thresholds");
-        assert!(thresholds.data.starts_with("condition,name,value,ci95_lo,ci95_hi"));
+        assert!(
+            thresholds
+                .data
+                .starts_with("condition,name,value,ci95_lo,ci95_hi")
+        );
         assert!(functions.data.lines().count() > 10);
     }
 }

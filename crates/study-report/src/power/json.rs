@@ -33,7 +33,8 @@ pub fn document(report: &Report) -> Value {
     if let Some(part) = &plan.part {
         document["part"] = json!(part.as_str());
     }
-    if let Some(ratios) = super::precision::has_ratios(report).filter(|_| !report.wanted.is_empty()) {
+    if let Some(ratios) = super::precision::has_ratios(report).filter(|_| !report.wanted.is_empty())
+    {
         let candidates = super::precision::candidates(report);
         let values = super::precision::wanted_values(&report.wanted, ratios, &candidates);
         document["wanted"] = json!(values);

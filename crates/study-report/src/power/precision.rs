@@ -185,7 +185,9 @@ pub(super) fn value(precision: &Precision) -> Value {
     let estimates = |e: &Estimates| {
         let all = About::ALL.into_iter();
         let known = all.filter(|(about, _)| about.of(e).square.studies > 0);
-        known.map(|(about, name)| (name.to_owned(), quality(about.of(e)))).collect::<serde_json::Map<_, _>>()
+        known
+            .map(|(about, name)| (name.to_owned(), quality(about.of(e))))
+            .collect::<serde_json::Map<_, _>>()
     };
     json!({
         "trials": precision.trials.mean(),
@@ -243,7 +245,11 @@ pub(super) fn cheapest(
 }
 
 /// Sentences on what reaches the precisions that are wanted.
-pub(super) fn sentences(wanted: &[Wanted], ratios: bool, candidates: &[Candidate<'_>]) -> Vec<String> {
+pub(super) fn sentences(
+    wanted: &[Wanted],
+    ratios: bool,
+    candidates: &[Candidate<'_>],
+) -> Vec<String> {
     let mut found = Vec::new();
     for one in wanted {
         let goal = if ratios {
@@ -264,7 +270,9 @@ pub(super) fn sentences(wanted: &[Wanted], ratios: bool, candidates: &[Candidate
                     best.name,
                     half_width(best.half, ratios)
                 ),
-                None => format!("{about} within {goal}, {name}: not reached by the designs compared"),
+                None => {
+                    format!("{about} within {goal}, {name}: not reached by the designs compared")
+                }
             });
         }
     }

@@ -1,7 +1,8 @@
 //! Procedures beside each other: page and document.
 
 use super::precision::{
-    Candidate, KINDS, Wanted, half_width, has_ratios, known, sentences, typical, value, wanted_values,
+    Candidate, KINDS, Wanted, half_width, has_ratios, known, sentences, typical, value,
+    wanted_values,
 };
 use super::{Report, document as of_report};
 use crate::apa;
@@ -48,8 +49,7 @@ impl Row<'_> {
         KINDS.map(|(_, of)| {
             let square = &of(self.precision).participant.square;
             let (mean, error) = (square.mean()?, square.error()?);
-            (mean > 0.0 && self.minutes > 0.0)
-                .then(|| (1.0 / (mean * self.minutes), error / mean))
+            (mean > 0.0 && self.minutes > 0.0).then(|| (1.0 / (mean * self.minutes), error / mean))
         })
     }
 }
@@ -58,7 +58,9 @@ fn rows(all: &[Compared]) -> Vec<Row<'_>> {
     let mut found = Vec::new();
     for one in all {
         for (cell, precision) in known(&one.report) {
-            let minutes = one.alternative.minutes(precision.trials.mean().unwrap_or_default());
+            let minutes = one
+                .alternative
+                .minutes(precision.trials.mean().unwrap_or_default());
             found.push(Row {
                 of: one,
                 cell,
@@ -79,7 +81,11 @@ fn relative(row: &Row<'_>, first: &Row<'_>) -> [Option<(f64, f64)>; 2] {
         let is_first = row.of.alternative.procedure == first.of.alternative.procedure
             && row.of.alternative.asked == first.of.alternative.asked
             && row.cell == first.cell;
-        let error = if is_first { 0.0 } else { (ea * ea + eb * eb).sqrt() };
+        let error = if is_first {
+            0.0
+        } else {
+            (ea * ea + eb * eb).sqrt()
+        };
         Some((a / b, a / b * error))
     };
     [one(0), one(1)]
@@ -100,16 +106,26 @@ fn candidates<'a>(rows: &[Row<'a>]) -> Vec<Candidate<'a>> {
 pub fn compared(all: &[Compared], wanted: &[Wanted], page: Page) -> String {
     let (width, paint) = (page.width.clamp(60, 100), Paint(page.color));
     let rows = rows(all);
-    let (Some(first), Some(ratios)) = (rows.first(), all.first().and_then(|a| has_ratios(&a.report)))
-    else {
+    let (Some(first), Some(ratios)) = (
+        rows.first(),
+        all.first().and_then(|a| has_ratios(&a.report)),
+    ) else {
         return String::new();
     };
     let mut out = paint.dim(&format!(
         "\n{:<11}{:>7}{:>7}{:>6}  {:<15}{:<14}  {:<15}{}\n",
-        "procedure", "partic.", "trials", "min", "alone: error", "per minute", "together: error", "per minute"
+        "procedure",
+        "partic.",
+        "trials",
+        "min",
+        "alone: error",
+        "per minute",
+        "together: error",
+        "per minute"
     ));
     for row in &rows {
-        let [alone, together] = KINDS.map(|(_, of)| typical(&of(row.precision).participant, ratios));
+        let [alone, together] =
+            KINDS.map(|(_, of)| typical(&of(row.precision).participant, ratios));
         let [own, pooled] = relative(row, first).map(|found| {
             found.map_or(String::new(), |(x, error)| match error > 0.0 {
                 true => format!("{} ± {}", apa::number(x, 2), apa::number(error, 2)),
@@ -117,13 +133,26 @@ pub fn compared(all: &[Compared], wanted: &[Wanted], page: Page) -> String {
             })
         });
         out += &start(row);
-        out += &format!("  {}{}  {}{pooled}", pad(&alone, 15), pad(&own, 14), pad(&together, 15));
+        out += &format!(
+            "  {}{}  {}{pooled}",
+            pad(&alone, 15),
+            pad(&own, 14),
+            pad(&together, 15)
+        );
         out = out.trim_end().to_owned() + "\n";
     }
     let test = (first.of.report.plan.settings.tests.first()).map_or("", |t| t.as_str());
     out += &paint.dim(&format!(
         "\n{:<11}{:>7}{:>7}{:>6}  {:<13}{:<10}{:<10}{:<10}{}\n",
-        "95 % within", "partic.", "trials", "min", "participant", "together", "mean", "contrast", test
+        "95 % within",
+        "partic.",
+        "trials",
+        "min",
+        "participant",
+        "together",
+        "mean",
+        "contrast",
+        test
     ));
     for row in &rows {
         let half = |quality: &study_analysis::power::Quality| {
@@ -133,7 +162,11 @@ pub fn compared(all: &[Compared], wanted: &[Wanted], page: Page) -> String {
         let (alone, together) = (&row.precision.alone, &row.precision.together);
         let tests = row.of.report.result(&row.cell).map(|r| r.tests.as_slice());
         let power = tests.and_then(<[_]>::first).map_or(String::new(), |test| {
-            format!("{} ± {}", apa::share(test.power, 3), apa::share(test.mcse, 3))
+            format!(
+                "{} ± {}",
+                apa::share(test.power, 3),
+                apa::share(test.mcse, 3)
+            )
         });
         out += &start(row);
         out += &format!(

@@ -179,7 +179,12 @@ pub(crate) fn together(
             levels: levels.clone(),
         })
         .collect();
-    let model = population(&cells, &settings.ok_or(NoModel)?, (seed, "power"), Effort::SIMULATION);
+    let model = population(
+        &cells,
+        &settings.ok_or(NoModel)?,
+        (seed, "power"),
+        Effort::SIMULATION,
+    );
     let model = model.ok_or(NoModel)?;
     if !model.has_converged() {
         return Ok(None);
@@ -208,7 +213,10 @@ pub(crate) fn together(
     });
     Ok(cells.map(|cells| Together {
         cells,
-        mean: model.threshold.get(&ConditionName::from(first)).and_then(of),
+        mean: model
+            .threshold
+            .get(&ConditionName::from(first))
+            .and_then(of),
         contrast,
     }))
 }

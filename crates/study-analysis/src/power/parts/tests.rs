@@ -2,9 +2,9 @@ use super::super::tracks::{TrackWorld, TracksWorld, Truth, of_participant, run};
 use super::super::{Assumptions, Scale, Vaf, merge, run_chunk};
 use super::*;
 use crate::analyze::psychophysics::results::CellName;
+use crate::analyze::psychophysics::{TrialCount, TrialSettings};
 use crate::analyze::results::Number as _;
 use study_base::text::{ModelId, PartId};
-use crate::analyze::psychophysics::{TrialCount, TrialSettings};
 use study_plan::procedure::{Constant, Ladder, Rule, Track};
 use study_plan::protocol::parts::{Compared, FitRules, Method, TrackRules};
 use study_stats::distribution::normal_upper;
@@ -256,7 +256,9 @@ fn thresholds_are_those_of_the_analysis() {
     let levels = run(&track, fresh, &typical, &mut draws);
     assert_eq!(levels.len(), 400);
     let asked = track.asked().unwrap();
-    let found = decided::threshold(asked, &levels, &track.settings).unwrap().value;
+    let found = decided::threshold(asked, &levels, &track.settings)
+        .unwrap()
+        .value;
     assert!((found - 0.5).abs() < 0.1, "{found}");
     let counts: Vec<TrialCount> = (levels.iter())
         .map(|l| TrialCount {

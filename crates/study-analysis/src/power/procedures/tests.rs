@@ -86,13 +86,22 @@ fn precision_is_that_of_the_formulas() {
     let variance = 0.3f64.powi(2) + 0.1f64.powi(2) + open;
     let near = |found: &super::super::Moments, expected: f64| {
         let (mean, error) = (found.mean().unwrap(), found.error().unwrap());
-        assert!((mean - expected).abs() < 4.0 * error, "{mean} ± {error}, {expected}");
+        assert!(
+            (mean - expected).abs() < 4.0 * error,
+            "{mean} ± {error}, {expected}"
+        );
     };
     near(&alone.mean.square, variance / 8.0);
-    near(&alone.mean.half, 2.364_624 * 0.965_030 * (variance / 8.0).sqrt());
+    near(
+        &alone.mean.half,
+        2.364_624 * 0.965_030 * (variance / 8.0).sqrt(),
+    );
     let of_contrast = 2.0 * (0.1f64.powi(2) + open) / 8.0;
     near(&alone.contrast.square, of_contrast);
-    near(&alone.contrast.half, 2.364_624 * 0.965_030 * of_contrast.sqrt());
+    near(
+        &alone.contrast.half,
+        2.364_624 * 0.965_030 * of_contrast.sqrt(),
+    );
     near(&alone.mean.holds, 0.95);
     near(&alone.contrast.holds, 0.95);
     assert_eq!(precision.together.participant.square.studies, 0);
@@ -106,7 +115,10 @@ fn thresholds_learned_together_are_nearer() {
     let found = alternatives(&protocol, &flags(4, 3), &[Procedure::Own], &[30]).unwrap();
     let precision = result(&found[0].plan, 8).precision.unwrap();
     let (alone, together) = (&precision.alone, &precision.together);
-    assert_eq!(together.participant.square.studies + precision.not_converged, 3);
+    assert_eq!(
+        together.participant.square.studies + precision.not_converged,
+        3
+    );
     assert_eq!(alone.participant.square.studies, 4);
     assert!(together.participant.square.mean() < alone.participant.square.mean());
     assert!(together.participant.half.mean() < alone.participant.half.mean());
@@ -118,8 +130,15 @@ fn thresholds_learned_together_are_nearer() {
     assert_eq!(precision.trials.mean(), Some(64.0));
     // The minutes are those of study check for the part.
     let minutes = found[0].minutes(64.0);
-    let all = check::minutes(&protocol.with_procedure(&protocol.parts[0], Procedure::Own, Some(30)).unwrap());
-    assert!(minutes > 0.8 * all - 2.0 && minutes < all, "{minutes} {all}");
+    let all = check::minutes(
+        &protocol
+            .with_procedure(&protocol.parts[0], Procedure::Own, Some(30))
+            .unwrap(),
+    );
+    assert!(
+        minutes > 0.8 * all - 2.0 && minutes < all,
+        "{minutes} {all}"
+    );
 }
 
 /// Other procedures have other answers of the same participants.
@@ -165,5 +184,8 @@ fn only_tracks_with_levels_have_procedures() {
     };
     assert!(matches!(of(&protocol, &other), PlanError::NoPart(_)));
     protocol.tracks.clear();
-    assert!(matches!(of(&protocol, &flags(1, 0)), PlanError::NoThresholds(_)));
+    assert!(matches!(
+        of(&protocol, &flags(1, 0)),
+        PlanError::NoThresholds(_)
+    ));
 }

@@ -93,7 +93,9 @@ fn thresholds_are_levels_and_contrasts_those_of_their_names() {
 #[test]
 fn levels_without_ratios_have_differences() {
     let settings = settings(WidthPrior::Even, &["a", "z"]);
-    let values = population(&three(), &settings, (1, "part"), Effort::ANALYSIS).unwrap().values();
+    let values = population(&three(), &settings, (1, "part"), Effort::ANALYSIS)
+        .unwrap()
+        .values();
     let [a, z] = ["a", "z"].map(|c| values.number(&format!("threshold/{c}/median")).unwrap());
     let difference = values.number("a|z/difference/median").unwrap();
     assert!((difference - (a - z)).abs() < 0.02, "{difference} {a} {z}");
@@ -104,8 +106,14 @@ fn levels_without_ratios_have_differences() {
 fn not_every_study_has_a_population() {
     let mut settings = settings(WidthPrior::OfRatios, &["a", "z"]);
     let one = [cell("A", "a", 0.1), cell("A", "z", 0.2)];
-    assert_eq!(population(&one, &settings, (1, "part"), Effort::ANALYSIS), None);
-    assert_eq!(population(&[], &settings, (1, "part"), Effort::ANALYSIS), None);
+    assert_eq!(
+        population(&one, &settings, (1, "part"), Effort::ANALYSIS),
+        None
+    );
+    assert_eq!(
+        population(&[], &settings, (1, "part"), Effort::ANALYSIS),
+        None
+    );
     // Tracks over different scales are no conditions of one model.
     settings.insert("z".to_owned(), fit(WidthPrior::Even, CHOICE));
     let model = population(&three(), &settings, (1, "part"), Effort::ANALYSIS).unwrap();
@@ -115,7 +123,10 @@ fn not_every_study_has_a_population() {
     let yes_no = fit(WidthPrior::OfRatios, Experiment::YesNo);
     settings.insert("z".to_owned(), yes_no);
     settings.insert("a".to_owned(), fit(WidthPrior::OfRatios, Experiment::YesNo));
-    assert_eq!(population(&three(), &settings, (1, "part"), Effort::ANALYSIS), None);
+    assert_eq!(
+        population(&three(), &settings, (1, "part"), Effort::ANALYSIS),
+        None
+    );
 }
 
 /// Of draws that cannot be relied upon nothing is said but that.
