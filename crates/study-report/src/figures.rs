@@ -7,6 +7,7 @@
 
 mod counts;
 mod factors;
+mod forest;
 mod functions;
 mod identification;
 mod means;
@@ -16,6 +17,7 @@ mod parts;
 mod rendering;
 mod strips;
 mod subjects;
+mod thresholds;
 mod traces;
 mod vaf;
 mod weber;

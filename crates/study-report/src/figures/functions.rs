@@ -240,7 +240,7 @@ pub(super) fn of_everybody(name: &str, part: &PartAnalysis) -> Option<Drawn> {
         let mut panel =
             Panel::new(x, Axis::new(shares, -0.04, 1.04)).titled(&shortened(condition, 30));
         for own in &curves {
-            panel = panel.with(Look::plain(PALETTE[6]).stroke(0.8), line(own));
+            panel = panel.with(Look::plain(PALETTE[6]).stroke(0.9).pale(), line(own));
         }
         let people = cells.len() as f64;
         panel = with_points(panel, &answers, spacing, [2.5 * people, 7.5 * people]);

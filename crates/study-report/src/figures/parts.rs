@@ -1,21 +1,19 @@
 //! The figures of a part that is no rating: psychometric functions with their data, tracks
 //! with their reversals, preferences, thresholds and sensitivities of the participants.
 
+use super::forest::{Row, by_condition, forest};
 use super::functions::{
     MAX_PANELS, cut, grid, level_axis, level_label, of_everybody, place, psychometric,
 };
 use super::identification::confusions;
+use super::thresholds::{by_conditions, by_participant};
 use super::weber::webers_law;
-use super::{Canvas, Drawn, MAX_DRAWN, cell, drawn, head, rows_height};
+use super::{Canvas, Drawn, MAX_DRAWN, cell, drawn, head};
 use crate::apa::digits;
-use crate::chart::{Axis, Color, Dash, Look, Mark, PALETTE, Panel, Shape, Whisker};
-use crate::chart::{Label, shortened};
-use std::collections::BTreeMap;
-use study_analysis::analyze::psychophysics::results::{
-    At, CellName, ConditionName, GeometricMean, Sensitivity,
-};
+use crate::chart::{Axis, Dash, Label, Look, Mark, PALETTE, Panel, Shape, Whisker, shortened};
+use study_analysis::analyze::psychophysics::results::{At, GeometricMean, Sensitivity};
 use study_analysis::analyze::psychophysics::{LevelData, PartAnalysis, TrackData, TrackTrial};
-use study_analysis::analyze::results::{Interval, Number as _};
+use study_analysis::analyze::results::Number as _;
 use study_stats::psychometric::Spacing;
 
 /// What the files of these figures are called before the number of the part.
@@ -27,7 +25,8 @@ pub fn of_part(number: usize, part: &PartAnalysis) -> Vec<Drawn> {
     let all = [
         psychometric(&name("psychometric"), part),
         of_everybody(&name("functions"), part),
-        thresholds(&name("thresholds"), part),
+        by_participant(&name("thresholds"), part),
+        by_conditions(&name("thresholds-by-condition"), part),
         webers_law(&name("webers-law"), part),
         tracks(&name("tracks"), part),
         sensitivities(&name("sensitivities"), part),
@@ -140,214 +139,13 @@ fn tracks(name: &str, part: &PartAnalysis) -> Option<Drawn> {
     }))
 }
 
-/// A value with its interval.
-struct Row {
-    name: String,
-    value: f64,
-    ci95: Option<(f64, f64)>,
-    /// Over participants.
-    mean: bool,
-    /// The same in the pooled model.
-    together: Option<(f64, (f64, f64))>,
-}
-
-impl Row {
-    /// Everything that has to be on the axis.
-    fn ends(&self) -> impl Iterator<Item = f64> {
-        let (low, high) = self.ci95.unwrap_or((self.value, self.value));
-        let together = self.together.into_iter();
-        [low, high, self.value]
-            .into_iter()
-            .chain(together.flat_map(|(value, (low, high))| [value, low, high]))
-    }
-}
-
-/// Values with their intervals, one below the other, in a panel for each condition.
-fn forest(
-    name: &str,
-    (title, caption, label): (&str, String, &str),
-    panels: Vec<(String, Vec<Row>)>,
-    (zero, spacing): (Option<f64>, Spacing),
-) -> Option<Drawn> {
-    let most = panels.iter().map(|p| p.1.len()).max()?;
-    if most == 0 || most > MAX_DRAWN {
-        return None;
-    }
-    let pooled = panels
-        .iter()
-        .any(|(_, rows)| rows.iter().any(|row| row.together.is_some()));
-    let mut names = head(["condition", "name", "value", "ci95_lo", "ci95_hi"]);
-    if pooled {
-        names.extend(head(["together", "together_ci95_lo", "together_ci95_hi"]));
-    }
-    let mut data = vec![names];
-    for (condition, rows) in &panels {
-        for row in rows {
-            let mut line = vec![
-                condition.clone(),
-                row.name.clone(),
-                digits(row.value),
-                cell(row.ci95.map(|e| e.0)),
-                cell(row.ci95.map(|e| e.1)),
-            ];
-            if pooled {
-                let ends = row.together.map(|t| t.1);
-                line.push(cell(row.together.map(|t| t.0)));
-                line.extend([cell(ends.map(|e| e.0)), cell(ends.map(|e| e.1))]);
-            }
-            data.push(line);
-        }
-    }
-    let ends = panels
-        .iter()
-        .flat_map(|(_, rows)| rows.iter().flat_map(Row::ends));
-    let ends: Vec<f64> = ends.chain(zero).collect();
-    // A level without a place, such as 0 over logarithms, needs an axis of levels.
-    let spacing = match ends.iter().all(|x| spacing.place(*x).is_some()) {
-        true => spacing,
-        false => Spacing::Lin,
-    };
-    // Two marks of a row, one below the other.
-    let below = if pooled { 0.16 } else { 0.0 };
-    let panel = |(condition, rows): &(String, Vec<Row>)| {
-        let names: Vec<String> = rows.iter().map(|r| shortened(&r.name, 20)).collect();
-        let mut axis = Axis::of_names("", &names).reversed();
-        axis.columns = 20;
-        let (low, high) = (axis.low, axis.high);
-        let mut panel = Panel::new(level_axis(spacing, label, ends.iter().copied()), axis);
-        panel.title = shortened(condition, 30);
-        if let Some(zero) = zero {
-            let line = Mark::Line(vec![(zero, low), (zero, high)]);
-            panel = panel.with(Look::plain(Color::INK).stroke(1.0), line);
-        }
-        for mean in [false, true] {
-            let own = rows.iter().enumerate().filter(|(_, r)| r.mean == mean);
-            let color = PALETTE[usize::from(mean)];
-            let bars = own.clone().filter_map(|(i, r)| {
-                let (low, high) = r.ci95?;
-                let (low, high) = (place(spacing, low), place(spacing, high));
-                let at = i as f64 - below;
-                Some(Whisker { at, low, high })
-            });
-            let look = Look {
-                shape: if mean { Shape::Diamond } else { Shape::Disc },
-                ..Look::plain(color)
-                    .stroke(1.5)
-                    .size(if mean { 10.0 } else { 7.0 })
-            };
-            panel = panel.with(look, Mark::ErrorBarsAcross(bars.collect()));
-            let points = own.map(|(i, r)| (place(spacing, r.value), i as f64 - below));
-            panel = panel.with(look, Mark::Points(points.collect()));
-        }
-        let open = Look {
-            shape: Shape::Ring,
-            ..Look::plain(PALETTE[6]).stroke(1.2).size(7.0)
-        };
-        let together =
-            || (rows.iter().enumerate()).filter_map(|(i, r)| Some((i as f64 + 0.2, r.together?)));
-        let bars = together().map(|(at, (_, (low, high)))| Whisker {
-            at,
-            low: place(spacing, low),
-            high: place(spacing, high),
-        });
-        panel = panel.with(open, Mark::ErrorBarsAcross(bars.collect()));
-        let points = together().map(|(at, (value, _))| (place(spacing, value), at));
-        panel.with(open, Mark::Points(points.collect()))
-    };
-    Some(drawn(name, caption, data, |c: Canvas| {
-        let columns = c.pick(2, 1).min(panels.len());
-        let rows = panels.len().div_ceil(columns) as f64;
-        let mut figure = c.figure(name, title, rows * (rows_height(most) + 70.0));
-        figure.columns = columns;
-        figure.panels = panels.iter().map(panel).collect();
-        figure
-    }))
-}
-
-/// A number, and its interval.
-type Estimated = (Option<f64>, Option<(f64, f64)>);
-
-/// Participants of a condition with a value, then the mean.
-fn by_condition<R>(
-    cells: &BTreeMap<CellName, R>,
-    value: impl Fn(&R) -> Estimated,
-    mean: impl Fn(&ConditionName) -> Option<Estimated>,
-) -> Vec<(String, Vec<Row>)> {
-    let mut cells: Vec<(&CellName, &R)> = cells.iter().collect();
-    cells.sort_by_key(|(name, _)| &name.condition);
-    let row = |name: &str, (value, ci95): Estimated, mean: bool| {
-        Some(Row {
-            name: name.to_owned(),
-            value: value?,
-            ci95,
-            mean,
-            together: None,
-        })
-    };
-    let conditions = cells.chunk_by(|a, b| a.0.condition == b.0.condition);
-    let rows = conditions.map(|own| {
-        let condition = &own[0].0.condition;
-        let of_cell =
-            |(cell, found): &(&CellName, &R)| row(cell.participant.as_str(), value(found), false);
-        let mut rows: Vec<Row> = own.iter().filter_map(of_cell).collect();
-        if rows.len() > 1 {
-            rows.extend(mean(condition).and_then(|mean| row("mean", mean, true)));
-        }
-        (condition.as_str().to_owned(), rows)
-    });
-    rows.filter(|(_, rows)| !rows.is_empty()).collect()
-}
-
-fn thresholds(name: &str, part: &PartAnalysis) -> Option<Drawn> {
-    let mut panels = by_condition(
-        &part.results.psy,
-        |function| {
-            let found = &function.posterior.threshold;
-            let ci95 = found.ci95.as_ref().and_then(Interval::ends);
-            (found.median.as_ref().and_then(|m| m.number()), ci95)
-        },
-        |condition| {
-            let found = &part.results.over.psy_group.get(condition)?;
-            let found = &found.posterior_threshold;
-            Some((found.geometric_mean.number(), found.ci95.ends()))
-        },
-    );
-    let mut caption =
-        "Thresholds (posterior medians) with 95 % intervals. Diamond: geometric mean over \
-                       participants with its t interval."
-            .to_owned();
-    let model = part.results.over.psy_population.as_ref();
-    if let Some(model) = model.filter(|model| model.has_converged()) {
-        caption += " Open rings: the same learned together, the mean that of the population.";
-        for (condition, rows) in &mut panels {
-            for row in rows {
-                let found = if row.mean {
-                    model.threshold.get(condition.as_str())
-                } else {
-                    model.participant.get(&CellName::of(&row.name, condition))
-                };
-                row.together =
-                    found.and_then(|found| Some((found.median.number()?, found.ci95.ends()?)));
-            }
-        }
-    }
-    let spacings = part.data.levels.iter().map(|cell| cell.spacing);
-    let spacing = match spacings.clone().all(|s| s == Spacing::Log) {
-        true => Spacing::Log,
-        false => Spacing::Lin,
-    };
-    let label = format!("threshold, {}", level_label(part));
-    let title = "Thresholds by participant";
-    forest(name, (title, caption, &label), panels, (None, spacing))
-}
-
 fn sensitivities(name: &str, part: &PartAnalysis) -> Option<Drawn> {
     let panels = by_condition(&part.results.sdt, Sensitivity::d, |condition| {
         let found = part.results.over.sdt_group.get(condition)?;
         Some((found.d.mean.number(), found.d.ci95.ends()))
     });
-    let caption = "Sensitivity d′ with 95 % intervals. Diamond: mean over participants with its t interval. \
-                   Line: no sensitivity.";
+    let caption = "Sensitivity d′ with 95 % intervals. Diamond and shade: mean over participants with its t \
+                   interval. Line: no sensitivity.";
     let title = "Sensitivity by participant";
     let text = (title, caption.to_owned(), "d′");
     forest(name, text, panels, (Some(0.0), Spacing::Lin))
