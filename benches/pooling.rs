@@ -1,9 +1,11 @@
 //! Partial pooling: how close the thresholds of participants and groups come to the truth, and
-//! whether the intervals hold it; and simulation-based calibration.
+//! whether the intervals hold it; simulation-based calibration; and the power for Weber fractions of .10 and .14.
 //!
 //! ```text
 //! cargo bench --bench pooling -- --groups 500 --file pooling.csv     # groups of simulated participants
 //! cargo bench --bench pooling -- --ranks 2000 --file ranks.csv       # populations drawn from the prior
+//! cargo bench --bench pooling -- --picture ranks.svg --file ranks.csv
+//! cargo bench --bench pooling -- --weber 500 --file weber.csv        # studies of Weber fractions
 //! cargo bench --bench pooling -- --table --file pooling.csv          # what is in a file
 //! ```
 //!
@@ -12,9 +14,16 @@
 //! Seeds are fixed. Tables have Monte Carlo errors.
 #![allow(clippy::print_stdout)]
 
+#[path = "common/draws.rs"]
+mod draws;
+#[path = "common/ranks.rs"]
+mod pictured;
 #[path = "common/tracks.rs"]
 mod tracks;
+#[path = "common/weber.rs"]
+mod weber;
 
+use draws::Random;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{OpenOptions, read_to_string};
@@ -29,7 +38,6 @@ use study_stats::psychometric::hierarchy::{
     Cell, Condition, Effort, PopulationPriors, partial_pooling,
 };
 use study_stats::psychometric::{Core, Experiment, Level, Priors, Support, WidthPrior, posterior};
-use study_stats::random::RandomSource;
 use tracks::{grid_rules, levels, ratio_ladder, simulate};
 
 /// Of natural logarithms of thresholds, between participants.
@@ -57,9 +65,26 @@ fn main() {
     if arguments.iter().any(|a| a == "--table") {
         return table(&file);
     }
+    if let Some(picture) = value("--picture") {
+        let ranks: Vec<Vec<f64>> = (rows(&file).into_iter())
+            .filter(|row| row.0 == "ranks")
+            .map(|row| row.2)
+            .collect();
+        let svg = pictured::picture(&RANKED, &ranks);
+        return std::fs::write(picture, svg).expect("the picture can be written");
+    }
     if let Some(n) = number("--ranks") {
         let jobs = (0..n).filter(mine).map(|i| ("ranks".to_owned(), i));
         return run(&file, jobs.collect(), |_, i| ranks(i));
+    }
+    if let Some(n) = number("--weber") {
+        let all = weber::all(&only);
+        let studies = (0..n).filter(mine);
+        let jobs = studies.flat_map(|i| all.iter().map(move |one| (one.name.clone(), i)));
+        return run(&file, jobs.collect(), |name, i| {
+            let one = all.iter().find(|one| one.name == name);
+            one.expect("it is one of them").study(i)
+        });
     }
     let scenarios: Vec<Scenario> = scenarios()
         .into_iter()
@@ -311,23 +336,6 @@ fn holds((low, high): (f64, f64), truth: f64) -> f64 {
     f64::from(u8::from(low <= truth && truth <= high))
 }
 
-/// Random numbers of a stream for the functions of study-stats.
-struct Random(Stream);
-
-impl RandomSource for Random {
-    fn below(&mut self, n: u64) -> u64 {
-        self.0.below(n)
-    }
-
-    fn shuffle(&mut self, items: &mut [usize]) {
-        self.0.shuffle(items);
-    }
-
-    fn normal(&mut self) -> f64 {
-        self.0.normal()
-    }
-}
-
 /// Parameters of [`ranks`].
 const RANKED: [&str; 8] = ["μ first", "μ second", "contrast", "τ", "σ", "ν", "κ", "λ"];
 
@@ -423,6 +431,11 @@ fn table(file: &str) {
     if let Some(found) = all.remove("ranks") {
         print_ranks(&found);
     }
+    let (weber, all): (Vec<_>, Vec<_>) =
+        (all.into_iter()).partition(|(name, _)| name.starts_with("Weber "));
+    if !weber.is_empty() {
+        weber::print(&weber);
+    }
     if all.is_empty() {
         return;
     }
@@ -493,27 +506,43 @@ fn table(file: &str) {
     }
 }
 
-/// χ² of the ranks over twenty classes, and their numbers.
+/// χ² of the ranks over twenty classes, and their numbers. Populations whose fit failed have no ranks. Ranks
+/// that are uniform have a mean of ½ and a standard deviation of √(1/12), .2887.
 fn print_ranks(found: &[Vec<f64>]) {
-    let converged = found.iter().filter(|r| r[RANKED.len()] == 1.0);
+    let known: Vec<&Vec<f64>> = found.iter().filter(|r| r[0].is_finite()).collect();
+    let converged = known.iter().filter(|r| r[RANKED.len()] == 1.0);
     println!(
-        "{} populations, {} converged\n",
+        "{} populations, {} fitted, {} converged\n",
         found.len(),
+        known.len(),
         converged.count()
     );
-    println!("| parameter | χ², 19 df | p | numbers of ranks in 20 classes |\n|---|---|---|---|");
+    println!(
+        "| parameter | χ², 19 df | p | mean rank | sd | below .025 or above .975 | numbers of ranks in 20 classes |\n|---|---|---|---|---|---|---|"
+    );
+    let n = known.len() as f64;
     for (k, name) in RANKED.iter().enumerate() {
+        let ranks: Vec<f64> = known.iter().map(|r| r[k]).collect();
         let mut counts = [0.0; 20];
-        for ranks in found {
-            counts[((ranks[k] * 20.0) as usize).min(19)] += 1.0;
+        for rank in &ranks {
+            counts[((rank * 20.0) as usize).min(19)] += 1.0;
         }
-        let expected = found.len() as f64 / 20.0;
+        let expected = n / 20.0;
         let chi2: f64 = counts
             .iter()
             .map(|c| (c - expected) * (c - expected) / expected)
             .sum();
         let p = study_stats::distribution::chi2_upper(chi2, 19.0).unwrap_or_default();
         let listed: Vec<String> = counts.iter().map(f64::to_string).collect();
-        println!("| {name} | {chi2:.1} | {p:.3} | {} |", listed.join(" "));
+        let (mean, sd) = (describe::mean(&ranks), describe::sd(&ranks));
+        let (mean, sd) = (mean.unwrap_or_default(), sd.unwrap_or_default());
+        let outside = ranks.iter().filter(|rank| !(0.025..=0.975).contains(*rank));
+        let outside = outside.count() as f64 / n;
+        println!(
+            "| {name} | {chi2:.1} | {p:.3} | {mean:.3} ± {:.3} | {sd:.3} | {outside:.3} ± {:.3} | {} |",
+            sd / n.sqrt(),
+            (outside * (1.0 - outside) / n).sqrt(),
+            listed.join(" ")
+        );
     }
 }

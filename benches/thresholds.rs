@@ -7,9 +7,12 @@
 //! prints the same tables for any number of threads. The table after it is of a ladder whose levels
 //! are spaced by equal ratios, fitted over the level and over its logarithm (`--ratios`: only that).
 //! `--grid` prints bias and coverage over thresholds, lapses, trials and rules, with the priors of
-//! Schütt et al. and with those of tracks.
+//! Schütt et al. and with those of tracks. `--linear` is of a ladder in equal steps above a standard,
+//! fitted over the level and over the logarithm of its distance from the standard.
 #![allow(clippy::print_stdout)]
 
+#[path = "common/linear.rs"]
+mod linear;
 #[path = "common/tracks.rs"]
 mod tracks;
 
@@ -30,7 +33,7 @@ const SD: f64 = 0.2;
 const WIDTH: f64 = 3.289_707_253_902_944;
 
 fn main() {
-    let (mut tracks, mut ratios_only, mut grid_only) = (200, false, false);
+    let (mut tracks, mut ratios_only, mut grid_only, mut linear_only) = (200, false, false, false);
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         if argument == "--tracks" {
@@ -39,10 +42,14 @@ fn main() {
         }
         ratios_only |= argument == "--ratios";
         grid_only |= argument == "--grid";
+        linear_only |= argument == "--linear";
     }
     println!("{tracks} tracks each\n");
     if grid_only {
         return grid(tracks);
+    }
+    if linear_only {
+        return linear::print(tracks);
     }
     if !ratios_only {
         equal_differences(tracks);

@@ -1,6 +1,7 @@
 //! `study power`: how many participants, realizations and repetitions?
 
 mod assume;
+mod procedures;
 mod shards;
 mod slurm;
 
@@ -25,6 +26,8 @@ pub(super) struct Args {
     protocol: Option<PathBuf>,
     #[command(flatten)]
     assume: assume::Assume,
+    #[command(flatten)]
+    compare: procedures::Compare,
     /// Print only the closed-form results, without simulation
     #[arg(long, conflicts_with_all = ["shards", "merge", "slurm"])]
     closed: bool,
@@ -96,6 +99,9 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         return run(&again, console);
     };
     let loaded = load::load(path)?;
+    if args.compare.is_asked() {
+        return procedures::run(&loaded.protocol, args, console);
+    }
     let plan = assume::plan(&loaded.protocol, &args.assume, console)?;
     if args.closed && plan.settings.part.is_some() {
         return Err(Failure::usage(
@@ -110,6 +116,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let mut report = Report {
         title: loaded.protocol.study.title.clone(),
         study: loaded.protocol.study.id.clone(),
+        wanted: args.compare.wanted(&plan)?,
         plan,
         results: Vec::new(),
         missing_units: 0,

@@ -233,7 +233,7 @@ fn a_track_of_a_study_gives_the_threshold_of_its_table() {
             table[id]
         );
     }
-    let figures = ["psychometric", "thresholds", "tracks"];
+    let figures = ["psychometric", "functions", "thresholds", "tracks"];
     report(
         folder.path(),
         "questplus",

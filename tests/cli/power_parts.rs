@@ -162,6 +162,107 @@ fn tracks_have_power_by_their_own_rule_and_fit() {
     }
 }
 
+/// Precision of each design, and procedures beside each other.
+#[test]
+fn procedures_of_tracks_are_compared() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    let questplus = new("questplus", dir);
+    let protocol = dir.join("questplus/protocol.toml");
+    let text = fs::read_to_string(&protocol).unwrap();
+    fs::write(
+        &protocol,
+        text.replace("participants = 10", "participants = 3"),
+    )
+    .unwrap();
+    let run = |more: &[&str]| {
+        let own = [
+            "power",
+            &questplus,
+            "--studies",
+            "10",
+            "--participants",
+            "3",
+        ];
+        study(&[&own[..], more].concat(), dir)
+    };
+    let (code, page, err) = run(&["--pooled", "2", "--precision", "mean=9,participant=1.01"]);
+    assert_eq!(code, 0, "{err}");
+    for part in [
+        "a participant's threshold",
+        "the mean threshold",
+        "together: the pooled model, in the first 2 studies",
+        "the mean threshold within × 9.00, alone: 3 participants",
+        "a participant's threshold within × 1.01, alone: not reached",
+    ] {
+        let words: Vec<&str> = page.split_whitespace().collect();
+        assert!(words.join(" ").contains(part), "{part}\n{page}");
+    }
+    assert!(page.lines().all(|l| l.chars().count() <= 100), "{page}");
+    let compared = [
+        "--procedure",
+        "own,constant",
+        "--trials",
+        "8,16",
+        "--pooled",
+        "0",
+    ];
+    let (code, text, err) = run(&[&compared[..], &["--json", "--threads", "1"]].concat());
+    assert_eq!(code, 0, "{err}");
+    assert_eq!(
+        run(&[&compared[..], &["--json", "--threads", "2"]].concat()).1,
+        text
+    );
+    let found: Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(found["format"], "study-power-procedures/1");
+    let designs = found["designs"].as_array().unwrap();
+    let known: Vec<_> = (designs.iter())
+        .map(|d| {
+            (
+                d["procedure"].as_str().unwrap(),
+                d["trials_asked"].as_u64().unwrap(),
+            )
+        })
+        .collect();
+    assert_eq!(
+        known,
+        [("own", 8), ("constant", 8), ("own", 16), ("constant", 16)]
+    );
+    assert_eq!(designs[0]["per_minute"]["alone"]["relative"], 1.0);
+    let trials = |at: usize| designs[at]["precision"]["trials"].as_f64().unwrap();
+    let minutes = |at: usize| designs[at]["minutes"].as_f64().unwrap();
+    assert!((minutes(2) / minutes(0) - trials(2) / trials(0)).abs() < 1e-9);
+    assert!(
+        designs[0]["precision"]["alone"]["participant"]["rms_mcse"]
+            .as_f64()
+            .unwrap()
+            > 0.0
+    );
+    let (code, page, err) = run(&[&compared[..], &["--out", "compared"]].concat());
+    assert_eq!(code, 0, "{err}");
+    assert!(
+        page.contains("per minute") && page.contains("constant"),
+        "{page}"
+    );
+    assert!(page.lines().all(|l| l.chars().count() <= 100), "{page}");
+    assert!(dir.join("compared/procedures.json").is_file());
+    let abx = new("abx", dir);
+    for (protocol, more, what) in [
+        (&questplus, &["--procedure", "psi"][..], "own, staircase"),
+        (&questplus, &["--precision", "mean=0.9"], "a factor above 1"),
+        (&questplus, &["--precision", "median=2"], "participant=1.5"),
+        (
+            &questplus,
+            &["--trials", "8", "--closed"],
+            "cannot be used with",
+        ),
+        (&abx, &["--trials", "8"], "no tracks with levels"),
+    ] {
+        let (code, _, err) = study(&[&["power", protocol], more].concat(), dir);
+        assert!(code != 0 && err.contains(what), "{err}");
+    }
+}
+
 /// What a protocol has and the simulation has not is said.
 #[test]
 fn what_is_not_simulated_is_said() {

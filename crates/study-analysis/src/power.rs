@@ -22,16 +22,22 @@ mod part_plan;
 mod parts;
 mod pilot;
 mod plan;
+mod precision;
+mod procedures;
 mod simulate;
 mod tally;
+mod tracks;
 
 pub use expected::{Floor, Reach, Smallest, candidates, closed, design, floor, reach, smallest};
 pub use factors::FactorsWorld;
-pub use parts::{PairsWorld, PartWorld, TrackWorld, TracksWorld, Truth};
+pub use parts::{PairsWorld, PartWorld};
 pub use pilot::{Parameters, Pilot, PilotError};
 pub use plan::{LeftOut, Overrides, Pace, Plan, PlanError};
+pub use precision::{Estimates, Moments, Precision, Quality};
+pub use procedures::{Alternative, POOLED, alternatives};
 pub use simulate::{Progress, Unit};
 pub use tally::{CellResult, Chunk, Tally, TestResult, enough, merge, run_chunk};
+pub use tracks::{TrackWorld, TracksWorld, Truth};
 
 pub use study_plan::protocol::power::{PowerLink as Link, PowerTest as Test, PowerVaf as Vaf};
 

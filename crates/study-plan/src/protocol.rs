@@ -29,6 +29,7 @@ pub mod parts;
 pub mod phrases;
 pub mod plan;
 pub mod power;
+pub mod procedures;
 pub mod question;
 pub mod questionnaires;
 pub mod relative;

@@ -7,6 +7,8 @@
 
 mod counts;
 mod factors;
+mod forest;
+mod functions;
 mod identification;
 mod means;
 mod outcomes;
@@ -15,6 +17,7 @@ mod parts;
 mod rendering;
 mod strips;
 mod subjects;
+mod thresholds;
 mod traces;
 mod vaf;
 mod weber;

@@ -7,12 +7,16 @@ mod json;
 mod page;
 mod paragraph;
 mod part;
+mod precision;
+mod procedures;
 
 pub use figure::figure;
 pub use json::{document, own_design};
 pub(super) use page::sensitivity_sentences;
 pub use page::{head, results};
 pub use paragraph::paragraph;
+pub use precision::{About, Wanted};
+pub use procedures::{Compared, compared, compared_document};
 
 use super::apa;
 use study_analysis::power::{
@@ -38,6 +42,8 @@ pub struct Report {
     pub results: Vec<CellResult>,
     /// Units (design and chunk) that are missing from a partial merge.
     pub missing_units: usize,
+    /// Precisions of thresholds that are wanted.
+    pub wanted: Vec<Wanted>,
 }
 
 impl Report {

@@ -129,6 +129,7 @@ fn power(
         plan,
         results: results.into_iter().collect(),
         missing_units: 0,
+        wanted: Vec::new(),
     };
     (own_design(&report), power_sentences(&report))
 }

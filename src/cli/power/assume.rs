@@ -6,7 +6,7 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 use study_analysis::analyze::{Rules, analyze};
 use study_analysis::load;
-use study_analysis::power::{Link, Overrides, Pilot, Plan, PlanError, Test, Vaf};
+use study_analysis::power::{Link, Overrides, POOLED, Pilot, Plan, PlanError, Test, Vaf};
 use study_base::text::PartId;
 use study_plan::protocol::Protocol;
 use study_plan::protocol::power::{PowerPlan, PowerScale, PowerTrack, effect as effect_and_size};
@@ -60,6 +60,9 @@ pub(super) struct Assume {
     /// Tracks: threshold=, ratio=, difference=, width=, lapse=, guess=, d=
     #[arg(long, value_name = "WHAT=X", value_delimiter = ',', value_parser = track)]
     track: Vec<(Tracked, f64)>,
+    /// Tracks: studies of each design, the first ones, whose thresholds are also learned together
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(0..=10_000))]
+    pooled: Option<u64>,
     /// Numbers of participants to compare
     #[arg(long, value_name = "N,…", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(2..=10_000))]
     participants: Vec<u32>,
@@ -247,6 +250,16 @@ pub(super) fn plan(
     given: &Assume,
     console: &mut Console,
 ) -> Result<Plan, Failure> {
+    let overrides = overrides(protocol, given, console)?;
+    Plan::of(protocol, &overrides).map_err(|error| failure(&error))
+}
+
+/// What these flags state.
+pub(super) fn overrides(
+    protocol: &Protocol,
+    given: &Assume,
+    console: &mut Console,
+) -> Result<Overrides, Failure> {
     let seed = given.seed.unwrap_or(protocol.study.seed);
     let of_pilot = given.scale.as_ref() == Some(&PowerScale::FromPilot);
     let primary = protocol.primary().filter(|_| of_pilot);
@@ -299,26 +312,32 @@ pub(super) fn plan(
     plan.sd.interaction = sd(Deviation::Interaction);
     plan.sd.residual = sd(Deviation::Residual);
     plan.sd.slope = sd(Deviation::Slope);
-    let overrides = Overrides {
+    Ok(Overrides {
         plan,
         seed: Some(seed),
         pilot,
         part: given.part.clone(),
-    };
-    Plan::of(protocol, &overrides).map_err(|error| {
-        let hint = match error {
-            PlanError::FewRealizations(_) => "add realizations with a VAF to [[models]]",
-            PlanError::NoMargin(_) => "equivalence_margin states which difference is negligible",
-            PlanError::NoPilot => "add --from RESULTS, or thresholds: logit:-2,-1,…",
-            PlanError::NoPower(_) => {
-                "logarithms of estimates, and points from 0 to 100, are like ratings with --scale \
-                 continuous in a protocol with a rating part (docs/power.md)"
-            }
-            PlanError::NoPart(_) | PlanError::NoRatings(_) => "--part names one of [[parts]]",
-            _ => "the assumptions are flags, or keys of [power] in the protocol",
-        };
-        Failure::input(&error).hint(hint)
+        pooled: given.pooled.unwrap_or(POOLED),
     })
+}
+
+/// Why there is no plan, with what helps.
+pub(super) fn failure(error: &PlanError) -> Failure {
+    let hint = match error {
+        PlanError::FewRealizations(_) => "add realizations with a VAF to [[models]]",
+        PlanError::NoMargin(_) => "equivalence_margin states which difference is negligible",
+        PlanError::NoPilot => "add --from RESULTS, or thresholds: logit:-2,-1,…",
+        PlanError::NoPower(_) => {
+            "logarithms of estimates, and points from 0 to 100, are like ratings with --scale \
+             continuous in a protocol with a rating part (docs/power.md)"
+        }
+        PlanError::NoPart(_)
+        | PlanError::NoRatings(_)
+        | PlanError::NoTracks
+        | PlanError::NoThresholds(_) => "--part names one of [[parts]]",
+        _ => "the assumptions are flags, or keys of [power] in the protocol",
+    };
+    Failure::input(error).hint(hint)
 }
 
 /// What the results of a pilot allow.

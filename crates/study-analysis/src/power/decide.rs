@@ -2,10 +2,13 @@
 //! the analysis.
 
 use super::draw::{Drawn, Draws};
+use super::precision::Precision;
 use super::{Cell, Settings, Test, Vaf};
+use crate::analyze::psychophysics::PartFinding;
 use crate::analyze::results::{Number as _, Permuted};
 use crate::analyze::{self, Deciding, Rules};
 use std::collections::{BTreeMap, HashMap};
+use study_base::rng::Stream;
 use study_plan::protocol::Role;
 use study_session::outcome::ratings::{Ratings, Realization, Row, Subject};
 use study_session::outcome::rows::Status;
@@ -30,6 +33,33 @@ pub(super) struct Outcome {
     pub(super) half_width: Option<f64>,
     /// Whether the crossed model has no scatter of the realizations about the line.
     pub(super) boundary: bool,
+    /// Of tracks with levels, how far the thresholds are from the truth.
+    pub(super) precision: Option<Box<Precision>>,
+}
+
+impl Outcome {
+    /// What the tests of a part say: yes, no, or nothing.
+    pub(super) fn of_tests(tests: impl Iterator<Item = Option<bool>>) -> Self {
+        Self {
+            tests: tests.map(|t| t.ok_or(UNDEFINED)).collect(),
+            slope: None,
+            half_width: None,
+            boundary: false,
+            precision: None,
+        }
+    }
+}
+
+/// Whether a participant is lost.
+pub(super) fn is_lost(settings: &Settings, draws: &mut Stream) -> bool {
+    let dropout = settings.assumptions.dropout;
+    dropout > 0.0 && draws.unit() < dropout
+}
+
+/// Yes or no, if the answer is defined.
+pub(super) fn verdict(finding: Option<&PartFinding>) -> Option<bool> {
+    let finding = finding.filter(|f| f.reason().is_none())?;
+    Some(finding.is_yes())
 }
 
 /// Decides the studies of one cell.
@@ -132,6 +162,7 @@ impl<'a> Judge<'a> {
             slope: line.map(|l| l.slope),
             half_width: line.map(|l| critical * l.se),
             boundary: crossed.is_some_and(|c| c.df > q as f64 - 2.0),
+            precision: None,
         }
     }
 
@@ -213,6 +244,7 @@ impl<'a> Judge<'a> {
             slope: slope.map(|b| b * study.unit),
             half_width: slope_se.map(|se| critical * se * study.unit),
             boundary: crossed.var_model.number() == Some(0.0),
+            precision: None,
         }
     }
 

@@ -3,7 +3,7 @@
 //! cut to the scale of the question. Complete studies are decided by the closed form of the analysis, others by the
 //! analysis itself.
 
-use super::decide::{Outcome, UNDEFINED};
+use super::decide::Outcome;
 use super::draw::{Draws, rating, residual};
 use super::{Cell, STREAM, Settings};
 use crate::analyze::{Question, Rules, all_findings};
@@ -101,12 +101,7 @@ impl<'a> FactorsJudge<'a> {
             true => self.complete(&people),
             false => self.analyzed(&people),
         };
-        Outcome {
-            tests: shown.into_iter().map(|yes| yes.ok_or(UNDEFINED)).collect(),
-            slope: None,
-            half_width: None,
-            boundary: false,
-        }
+        Outcome::of_tests(shown.into_iter())
     }
 
     fn draw(&self, draws: &mut Draws) -> Vec<Person> {

@@ -1,8 +1,9 @@
 //! From a part of pairs or tracks to settings: defaults, then `[power]`, then flags.
 
 use super::factors_plan;
-use super::parts::{PairsWorld, PartWorld, TrackWorld, TracksWorld, Truth};
+use super::parts::{PairsWorld, PartWorld};
 use super::plan::{Defaults, LeftOut, numbers, slope, targets, tests};
+use super::tracks::{TrackWorld, TracksWorld, Truth};
 use super::{Assumptions, Cell, Overrides, Pace, Plan, PlanError, Scale, Settings, Test, Vaf};
 use crate::analyze::ALPHA;
 use crate::analyze::psychophysics::{have_ratios, track_settings};
@@ -30,7 +31,10 @@ const STUDIES_WITHOUT_TEST: u64 = 40;
 
 /// The part that is meant: the one of the flag, or the one that asks the primary question;
 /// `None` if that is a part of ratings.
-fn meant<'p>(protocol: &'p Protocol, flag: Option<&PartId>) -> Result<Option<&'p Part>, PlanError> {
+pub(super) fn meant<'p>(
+    protocol: &'p Protocol,
+    flag: Option<&PartId>,
+) -> Result<Option<&'p Part>, PlanError> {
     let primary = &protocol.analysis.primary;
     let found = match flag {
         Some(id) => Some(
@@ -128,7 +132,9 @@ fn plan(protocol: &Protocol, flags: &Overrides, part: &Part) -> Result<Plan, Pla
     let participants = protocol.design.participants as usize;
     let (world, spread, slope, own, repetitions) = match &part.task {
         Task::Pairs(pairs) => of_pairs(protocol, &stated, pairs, &mut defaults)?,
-        Task::Discrimination { tracks } => of_tracks(protocol, &stated, tracks, &mut defaults)?,
+        Task::Discrimination { tracks } => {
+            of_tracks(protocol, (&stated, flags.pooled), tracks, &mut defaults)?
+        }
         Task::Rating(_)
         | Task::Magnitude(_)
         | Task::Mushra(_)
@@ -314,7 +320,7 @@ fn neat(x: f64) -> f64 {
 
 fn of_tracks(
     protocol: &Protocol,
-    stated: &PowerPlan,
+    (stated, pooled): (&PowerPlan, u64),
     ids: &[PartId],
     defaults: &mut Defaults,
 ) -> Result<Planned, PlanError> {
@@ -420,6 +426,8 @@ fn of_tracks(
     let world = TracksWorld {
         tracks: truths,
         ratios,
+        // Participants of different groups are no draws from one population.
+        pooled: if protocol.groups.is_some() { 0 } else { pooled },
     };
     Ok((PartWorld::Tracks(world), spread, 0.0, own, vec![1]))
 }

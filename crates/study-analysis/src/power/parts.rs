@@ -1,32 +1,18 @@
-//! Parts of pairs and of tracks: answers are drawn one by one, and decided by the analysis of
-//! such parts.
+//! Parts of pairs, of tracks (`tracks`) and of factors (`factors`): answers are drawn one by one, and
+//! decided by the analysis of such parts.
 //!
 //! **Pairs.** The ability of a realization is slope·x + scatter + what a participant adds, in
 //! logits; P(first preferred) follows from the difference (Bradley and Terry), with ties by
 //! Davidson's model.
-//!
-//! **Tracks.** A participant's threshold on a track is the assumed one times the participant's
-//! factor and that of the track (for levels without ratios, sums); the track is run by its own
-//! rule. Two realizations have a d′ in place of a threshold.
 
-use super::decide::{Outcome, UNDEFINED};
+use super::decide::{Outcome, is_lost, verdict};
 use super::draw::standardized;
 use super::factors::{FactorsJudge, FactorsWorld};
+use super::tracks::{TracksJudge, TracksWorld};
 use super::{Cell, STREAM, Settings, Test};
-use crate::analyze::psychophysics::{
-    Asked, Choice, PartFinding, Preference, TrialCount, TrialSettings, decided,
-};
-use std::f64::consts::SQRT_2;
+use crate::analyze::psychophysics::{Choice, Preference, decided};
 use study_base::rng::Stream;
-use study_plan::procedure::{Answer, Ladder, Track};
-use study_plan::protocol::conditions::by_condition;
-use study_plan::protocol::parts::{Method, TrackRules};
-use study_stats::detection::{
-    rates_of_same_different, share_of_abx_by_differencing, share_of_choice, share_of_oddity,
-};
-use study_stats::distribution::normal_cdf;
 use study_stats::permutation::Decision;
-use study_stats::psychometric::{Curve, Level};
 
 /// A part that is no rating, or ratings of a factorial study, and what is assumed of it.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,44 +38,6 @@ pub struct PairsWorld {
     pub random_order: bool,
 }
 
-/// Tracks of a part.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TracksWorld {
-    /// The tracks.
-    pub tracks: Vec<TrackWorld>,
-    /// Whether levels have ratios, as all but those of a blend.
-    pub ratios: bool,
-}
-
-/// A track and its participants.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TrackWorld {
-    /// Rules of the track.
-    pub rules: TrackRules,
-    /// Its levels.
-    pub ladder: Ladder,
-    /// How its answers are fitted.
-    pub settings: TrialSettings,
-    /// What is true of participants.
-    pub truth: Truth,
-}
-
-/// What is true of participants on a track.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Truth {
-    /// The function of the typical participant.
-    Function(Curve),
-    /// The mean d′ of two realizations.
-    Sensitivity(f64),
-}
-
-impl TrackWorld {
-    fn asked(&self) -> Option<Asked> {
-        let name = self.rules.method.as_str();
-        Asked::NAMES.iter().find(|n| n.1 == name).map(|n| n.0)
-    }
-}
-
 /// Decides simulated studies of a part.
 pub(super) struct PartJudge<'a> {
     settings: &'a Settings,
@@ -109,11 +57,7 @@ enum Prepared<'a> {
         permutation: Option<Decision>,
         names: Vec<String>,
     },
-    Tracks {
-        world: &'a TracksWorld,
-        /// The tracks before their first trial; `None` of two realizations.
-        fresh: Vec<Option<Track>>,
-    },
+    Tracks(TracksJudge<'a>),
 }
 
 impl<'a> PartJudge<'a> {
@@ -136,20 +80,7 @@ impl<'a> PartJudge<'a> {
                     names: (0..world.vaf.len()).map(|i| format!("{i:06}")).collect(),
                 }
             }
-            PartWorld::Tracks(world) => {
-                let fresh = |track: &TrackWorld| match track.truth {
-                    // The order of constant stimuli changes no estimate.
-                    Truth::Function(_) => {
-                        let mut stream = Stream::new(settings.seed, &[STREAM, "track"]);
-                        Track::new(&track.rules.rule, &track.ladder, &mut stream).ok()
-                    }
-                    Truth::Sensitivity(_) => None,
-                };
-                Prepared::Tracks {
-                    world,
-                    fresh: world.tracks.iter().map(fresh).collect(),
-                }
-            }
+            PartWorld::Tracks(world) => Prepared::Tracks(TracksJudge::new(settings, world, cell)),
         };
         Self {
             settings,
@@ -174,16 +105,8 @@ impl<'a> PartJudge<'a> {
                 let chosen = self.choices(world, x, names, &mut stream("pairs"));
                 self.of_choices(world, &chosen, permutation.as_ref(), stream("permutations"))
             }
-            Prepared::Tracks { world, fresh } => {
-                self.of_tracks(world, fresh, &mut stream("tracks"), &number)
-            }
+            Prepared::Tracks(judge) => judge.decide(k),
         }
-    }
-
-    /// Whether a participant is lost.
-    fn is_lost(&self, draws: &mut Stream) -> bool {
-        let dropout = self.settings.assumptions.dropout;
-        dropout > 0.0 && draws.unit() < dropout
     }
 
     fn choices(
@@ -205,7 +128,7 @@ impl<'a> PartJudge<'a> {
             let own: Vec<f64> = (means.iter())
                 .map(|m| m + a.spread.interaction * draws.normal())
                 .collect();
-            let lost = self.is_lost(draws);
+            let lost = is_lost(self.settings, draws);
             for (p, pair) in world.pairs.iter().enumerate() {
                 for r in 0..self.cell.repetitions {
                     let turned = match world.random_order {
@@ -260,196 +183,8 @@ impl<'a> PartJudge<'a> {
             Test::PreferenceVaf => of_vaf(),
             _ => None,
         };
-        self.outcome(self.settings.tests.iter().map(one).collect(), None)
+        Outcome::of_tests(self.settings.tests.iter().map(one))
     }
-
-    fn of_tracks(
-        &self,
-        world: &TracksWorld,
-        fresh: &[Option<Track>],
-        draws: &mut Stream,
-        number: &str,
-    ) -> Outcome {
-        let settings = self.settings;
-        let spread = &settings.assumptions.spread;
-        let rules: Vec<&TrackRules> = world.tracks.iter().map(|t| &t.rules).collect();
-        let conditions = by_condition(&rules);
-        let place = |track: &TrackWorld| {
-            let own = |all: &Vec<&TrackRules>| all[0].condition() == track.rules.condition();
-            conditions.iter().position(own).unwrap_or(0)
-        };
-        let places: Vec<usize> = world.tracks.iter().map(place).collect();
-        let mut found: Vec<(String, String, f64)> = Vec::new();
-        let mut first: Vec<f64> = Vec::new();
-        let mut counts: Vec<Vec<TrialCount>> = vec![Vec::new(); world.tracks.len()];
-        let mut whole = true;
-        for i in 0..self.cell.participants {
-            let name = format!("{i:06}");
-            let level = spread.subject * draws.normal();
-            let own: Vec<f64> = (conditions.iter())
-                .map(|_| level + spread.interaction * draws.normal())
-                .collect();
-            if self.is_lost(draws) {
-                continue;
-            }
-            let mut answered: Vec<Vec<Level>> = vec![Vec::new(); conditions.len()];
-            for (t, track) in world.tracks.iter().enumerate() {
-                let at = places[t];
-                // A stream of its own: the number of trials depends on the answers.
-                let path = [STREAM, &self.text, number, "track", &name, &t.to_string()];
-                let mut answers = Stream::new(settings.seed, &path);
-                match (track.truth, &fresh[t]) {
-                    (Truth::Sensitivity(d), _) => {
-                        let d = (d + own[at]).max(0.0);
-                        counts[t].extend(trials(track, &name, d, &mut answers));
-                    }
-                    (Truth::Function(typical), Some(fresh)) => {
-                        let curve = of_participant(typical, own[at], world.ratios);
-                        answered[at].extend(run(track, fresh.clone(), &curve, &mut answers));
-                    }
-                    (Truth::Function(_), None) => whole = false,
-                }
-            }
-            // The tracks of a condition are fitted together.
-            for (at, levels) in answered.iter().enumerate().filter(|a| !a.1.is_empty()) {
-                let track = places.iter().position(|p| *p == at);
-                let track = track.map(|t| &world.tracks[t]);
-                let Some((track, asked)) = track.and_then(|t| Some((t, t.asked()?))) else {
-                    continue;
-                };
-                match decided::threshold(asked, levels, &track.settings) {
-                    Some(value) => {
-                        if at == 0 {
-                            first.push(value);
-                        }
-                        let id = track.rules.condition().as_str().to_owned();
-                        found.push((name.clone(), id, value));
-                    }
-                    None => whole = false,
-                }
-            }
-        }
-        let one = |test: &Test| match test {
-            Test::Thresholds => {
-                let found = decided::thresholds(&found, world.ratios, settings.alpha);
-                verdict(found.as_ref()).filter(|_| whole)
-            }
-            Test::ToldApart => told_apart(world, &counts, settings.alpha),
-            _ => None,
-        };
-        let half_width = decided::threshold_half_width(&first, world.ratios);
-        self.outcome(settings.tests.iter().map(one).collect(), half_width)
-    }
-
-    fn outcome(&self, tests: Vec<Option<bool>>, half_width: Option<f64>) -> Outcome {
-        Outcome {
-            tests: tests.into_iter().map(|t| t.ok_or(UNDEFINED)).collect(),
-            slope: None,
-            half_width,
-            boundary: false,
-        }
-    }
-}
-
-fn verdict(finding: Option<&PartFinding>) -> Option<bool> {
-    let finding = finding.filter(|f| f.reason().is_none())?;
-    Some(finding.is_yes())
-}
-
-/// Whether the realizations of every track are told apart.
-fn told_apart(world: &TracksWorld, counts: &[Vec<TrialCount>], alpha: f64) -> Option<bool> {
-    let tracks: Vec<_> = (world.tracks.iter().zip(counts))
-        .filter(|(track, _)| matches!(track.truth, Truth::Sensitivity(_)))
-        .filter_map(|(track, counts)| {
-            let asked = track.asked()?;
-            Some((&track.rules, asked, counts.clone(), &track.settings))
-        })
-        .collect();
-    let found: Option<Vec<bool>> = (decided::told_apart(&tracks, alpha)?.iter())
-        .map(|finding| verdict(Some(finding)))
-        .collect();
-    found.map(|all| !all.is_empty() && all.into_iter().all(|yes| yes))
-}
-
-/// The function of a participant who differs by `own` from the typical one: in the natural
-/// logarithm where levels have ratios.
-fn of_participant(typical: Curve, own: f64, ratios: bool) -> Curve {
-    let (factor, shift) = match ratios {
-        true => (libm::exp(own), 0.0),
-        false => (1.0, own),
-    };
-    Curve {
-        threshold: typical.threshold * factor + shift,
-        width: typical.width * factor,
-        ..typical
-    }
-}
-
-/// Runs a track by its rule; the answers by trial.
-fn run(track: &TrackWorld, mut state: Track, curve: &Curve, draws: &mut Stream) -> Vec<Level> {
-    let levels = track.ladder.levels();
-    let mut answered = Vec::new();
-    while let Some(proposal) = state.next() {
-        // The shares of catch and easy trials are of all trials; catch trials say nothing of
-        // the threshold.
-        let share = track.rules.easy / (1.0 - track.rules.catch);
-        let easy = share > 0.0 && draws.unit() < share;
-        let step = if easy {
-            levels.len() - 1
-        } else {
-            proposal.step
-        };
-        let level = levels[step];
-        let positive = draws.unit() < curve.value(level);
-        state.answer(&Answer {
-            presented: level,
-            positive,
-            easy,
-        });
-        answered.push(Level {
-            level,
-            positive: f64::from(u8::from(positive)),
-            trials: 1.0,
-        });
-    }
-    answered
-}
-
-/// The answers of a participant with this d′ to the trials of two realizations.
-fn trials(track: &TrackWorld, name: &str, d: f64, draws: &mut Stream) -> Vec<TrialCount> {
-    let rules = &track.rules;
-    let correct = |p: f64| (p, p);
-    // Hits, and correct rejections.
-    let (hit, rejection) = match rules.method {
-        Method::TwoIntervals => correct(normal_cdf(d / SQRT_2)),
-        Method::ThreeIntervals => correct(share_of_choice(3).map_or(0.0, |share| share(d))),
-        Method::OddOneOut => correct(share_of_oddity()(d)),
-        Method::Abx => correct(share_of_abx_by_differencing(d)),
-        Method::YesNo => correct(normal_cdf(d / 2.0)),
-        Method::SameDifferent => {
-            let (hits, false_alarms) = rates_of_same_different(d);
-            (hits, 1.0 - false_alarms)
-        }
-    };
-    let ruled = f64::from(rules.rule.most_trials());
-    let catches = (ruled / (1.0 - rules.catch - rules.easy) * rules.catch).round() as usize;
-    // Of two intervals each is correct in turn; without a signal "no" and "same" are.
-    let has_catch = !rules.method.catch_sequences().is_empty();
-    let kinds = (0..ruled as usize).map(|k| (if has_catch { 0 } else { k % 2 }, hit));
-    let kinds = kinds.chain((0..catches).map(|_| (1, rejection)));
-    let mut found = [0usize, 1].map(|target| TrialCount {
-        participant: name.to_owned(),
-        condition: rules.id.as_str().to_owned(),
-        level: None,
-        target: Some(target),
-        positive: 0.0,
-        trials: 0.0,
-    });
-    for (target, share) in kinds {
-        found[target].trials += 1.0;
-        found[target].positive += f64::from(u8::from(draws.unit() < share));
-    }
-    found.into_iter().filter(|c| c.trials > 0.0).collect()
 }
 
 #[cfg(test)]

@@ -3,8 +3,10 @@
 use super::{Assumptions, Cell, Pilot, Scale, Settings, Test, Vaf};
 use crate::analyze::ALPHA;
 use study_base::text::{PartId, QuestionId, Untrusted};
+use study_plan::procedure::ProcedureError;
 use study_plan::protocol::parts::Task;
 use study_plan::protocol::power::{PowerPlan, PowerScale};
+use study_plan::protocol::procedures::Procedure;
 use study_plan::protocol::{Protocol, Role, check};
 use study_stats::power::covariate::Spread;
 use thiserror::Error;
@@ -75,6 +77,17 @@ pub enum PlanError {
         false => "the levels have no ratios: state track.difference, not track.ratio",
     })]
     RatioOrDifference(bool),
+    /// A procedure for a part without tracks with levels.
+    #[error("part `{0}` has no tracks with levels, whose procedures could be compared")]
+    NoThresholds(PartId),
+    /// Procedures where ratings are primary.
+    #[error(
+        "the primary question is not that of tracks with levels: name the part whose procedures are compared"
+    )]
+    NoTracks,
+    /// A procedure that a ladder does not allow.
+    #[error("procedure `{name}`: {1}", name = .0.as_str())]
+    Procedure(Procedure, ProcedureError),
     /// A kind of trial without a psychometric function.
     #[error("track `{0}`: same-different with levels has no threshold")]
     NoFunction(PartId),
@@ -127,6 +140,8 @@ pub struct Overrides {
     pub pilot: Option<Pilot>,
     /// The part that is meant; without it the one with the primary question.
     pub part: Option<PartId>,
+    /// Studies of each design of tracks, the first ones, whose thresholds are also learned together.
+    pub pooled: u64,
 }
 
 /// What to simulate.

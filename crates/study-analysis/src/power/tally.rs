@@ -3,6 +3,7 @@
 use super::decide::{Judge, Outcome};
 use super::draw::{Drawn, Draws};
 use super::parts::PartJudge;
+use super::precision::Precision;
 use super::{Cell, STREAM, Settings, Test};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -36,6 +37,9 @@ pub struct Chunk {
     pub intervals: u64,
     /// Sum of their half-widths.
     pub half_width: f64,
+    /// Of tracks with levels, how far the thresholds are from the truth.
+    #[serde(default)]
+    pub precision: Precision,
 }
 
 /// Simulates a chunk of a cell: studies `index` · [`Settings::chunk`] to the next, or to the last one.
@@ -92,6 +96,9 @@ impl Chunk {
         if let Some(half_width) = outcome.half_width {
             self.intervals += 1;
             self.half_width += half_width;
+        }
+        if let Some(precision) = &outcome.precision {
+            self.precision.merge(precision);
         }
         for (tally, test) in self.tests.iter_mut().zip(outcome.tests) {
             match test {
@@ -171,8 +178,11 @@ pub struct CellResult {
     pub tests: Vec<TestResult>,
     /// Share of the studies in which the crossed model has no scatter of the realizations.
     pub boundary_share: f64,
-    /// Mean half-width of the interval of the slope over realizations.
+    /// Mean half-width of the interval of the slope over realizations; of tracks, of the mean threshold in
+    /// the first condition.
     pub half_width: Option<f64>,
+    /// Of tracks with levels, how far the thresholds are from the truth.
+    pub precision: Option<Precision>,
 }
 
 /// The results of a cell from its chunks, in their order. `None` without studies.
@@ -190,6 +200,7 @@ pub fn merge<'c>(
         all.boundary += chunk.boundary;
         all.intervals += chunk.intervals;
         all.half_width += chunk.half_width;
+        all.precision.merge(&chunk.precision);
         for (sum, own) in all.tests.iter_mut().zip(&chunk.tests) {
             sum.rejected += own.rejected;
             sum.wrong_sign += own.wrong_sign;
@@ -230,6 +241,7 @@ pub fn merge<'c>(
             .collect::<Option<_>>()?,
         boundary_share: all.boundary as f64 / n as f64,
         half_width: (all.intervals > 0).then(|| all.half_width / all.intervals as f64),
+        precision: Some(all.precision).filter(|p| p.trials.studies > 0),
     })
 }
 
@@ -322,6 +334,7 @@ mod tests {
             }],
             boundary_share: 0.0,
             half_width: None,
+            precision: None,
         };
         let reach = |cells: &[(usize, f64)]| {
             let results: Vec<CellResult> = cells.iter().copied().map(made).collect();

@@ -31,6 +31,7 @@ mod spaces;
 mod track_rules;
 mod tracks;
 
+pub(super) use grids::usual_grids;
 pub use orders::parse_orders;
 
 use super::keys::{Key, Kind, Variants, Word, keys};

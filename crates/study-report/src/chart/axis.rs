@@ -77,18 +77,24 @@ impl Axis {
     pub fn of_logarithms(quantity: &str, values: impl IntoIterator<Item = f64>) -> Self {
         let axis = Self::around(quantity, values.into_iter().map(f64::ln));
         let (low, high) = (axis.low.exp(), axis.high.exp());
-        // 1, 2 and 5 of each power of ten; of many powers 1 only.
+        // 1, 2 and 5 of each power of ten; of many powers 1 only, within few more than these.
         let decades = (axis.high - axis.low) / std::f64::consts::LN_10;
-        let digits: &[i32] = if decades > 2.0 { &[1] } else { &[1, 2, 5] };
         let powers = (low.log10().floor() as i32)..=(high.log10().ceil() as i32);
-        let round = |power: i32| {
-            let text = move |digit: &i32| format!("{digit}e{power}").parse().unwrap_or(f64::NAN);
-            digits.iter().map(text).collect::<Vec<f64>>()
+        let at = |tenths: &[i32]| -> Vec<(f64, String)> {
+            let of_power = |power: i32| {
+                let value = move |tenth: &i32| format!("{tenth}e{}", power - 1).parse::<f64>().ok();
+                tenths.iter().filter_map(value)
+            };
+            (powers.clone().flat_map(of_power))
+                .filter(|x| (low..=high).contains(x))
+                .map(|x| (x.ln(), format!("{x}")))
+                .collect()
         };
-        let ticks: Vec<(f64, String)> = (powers.flat_map(round))
-            .filter(|x| (low..=high).contains(x))
-            .map(|x| (x.ln(), format!("{x}")))
-            .collect();
+        let usual: &[i32] = if decades > 2.0 { &[10] } else { &[10, 20, 50] };
+        let mut ticks = at(usual);
+        if ticks.len() < 3 {
+            ticks = at(&[10, 15, 20, 30, 40, 60, 80]);
+        }
         match ticks.len() {
             // Within less than a factor of two: both ends.
             0 | 1 => {
@@ -213,6 +219,7 @@ mod tests {
     fn an_axis_of_logarithms_is_labeled_with_values() {
         let ticks = |values: &[f64]| labels(&Axis::of_logarithms("", values.iter().copied()), 5);
         assert_eq!(ticks(&[0.02, 0.6]), ["0.02", "0.05", "0.1", "0.2", "0.5"]);
+        assert_eq!(ticks(&[0.07, 0.17]), ["0.08", "0.1", "0.15"]);
         assert_eq!(ticks(&[0.02, 60.0]), ["0.01", "0.1", "1", "10", "100"]);
         let narrow = Axis::of_logarithms("", [2.4, 3.0]);
         assert_eq!(labels(&narrow, 5), ["2.3", "3.1"]);

@@ -62,6 +62,9 @@ pub enum Dash {
     Long,
 }
 
+/// The share of the color in a pale one.
+const PALE: f64 = 0.45;
+
 const DASHES: [Dash; 5] = [
     Dash::Solid,
     Dash::Dashed,
@@ -135,6 +138,30 @@ impl Look {
     #[must_use]
     pub fn size(mut self, px: f64) -> Self {
         self.size = px;
+        self
+    }
+
+    /// The same color mixed with white, for marks that stay behind others.
+    #[must_use]
+    pub fn pale(mut self) -> Self {
+        let Color(red, green, blue) = self.color;
+        // At most 255, so the cast is exact.
+        let mix = |x: u8| (f64::from(x) * PALE + 255.0 * (1.0 - PALE)).round() as u8;
+        self.color = Color(mix(red), mix(green), mix(blue));
+        self
+    }
+
+    /// Sets the opacity, from 0 to 1.
+    #[must_use]
+    pub fn opacity(mut self, share: f64) -> Self {
+        self.opacity = share;
+        self
+    }
+
+    /// Sets the shape of points.
+    #[must_use]
+    pub fn shaped(mut self, shape: Shape) -> Self {
+        self.shape = shape;
         self
     }
 

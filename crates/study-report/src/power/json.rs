@@ -33,6 +33,12 @@ pub fn document(report: &Report) -> Value {
     if let Some(part) = &plan.part {
         document["part"] = json!(part.as_str());
     }
+    if let Some(ratios) = super::precision::has_ratios(report).filter(|_| !report.wanted.is_empty())
+    {
+        let candidates = super::precision::candidates(report);
+        let values = super::precision::wanted_values(&report.wanted, ratios, &candidates);
+        document["wanted"] = json!(values);
+    }
     if report.missing_units > 0 {
         document["partial"] = json!({ "missing_units": report.missing_units });
     }
@@ -145,6 +151,7 @@ fn cell(report: &Report, of: &Cell) -> Value {
         "at_smallest": smallest,
         "pilot_range": report.pilot_range(of).map(|(low, high)| [low, high]),
         "half_width": result.and_then(|r| r.half_width),
+        "precision": result.and_then(|r| r.precision.as_ref()).map(super::precision::value),
         "boundary_share": result.map(|r| r.boundary_share),
     })
 }

@@ -1,7 +1,7 @@
 //! The power of a part of pairs or tracks, and of the effects of factors: page, document and paragraph. There is no closed
 //! form, so that the designs are those of the grid.
 
-use super::{Report, bar, name_of, percent};
+use super::{Report, bar, name_of, percent, precision};
 use crate::apa;
 use crate::text::Page;
 use crate::text::layout::{Paint, wrap};
@@ -192,22 +192,7 @@ pub(super) fn results(report: &Report, page: Page) -> String {
             out += &(line.trim_end().to_owned() + "\n");
         }
     }
-    if let Some(PartWorld::Tracks(tracks)) = world(report) {
-        let what = match tracks.ratios {
-            true => "of its natural logarithm",
-            false => "in levels",
-        };
-        for cell in report.shown() {
-            if let Some(half) = report.result(&cell).and_then(|r| r.half_width) {
-                let line = format!(
-                    "{} participants: interval of the mean threshold on the first track ± {} {what}",
-                    cell.participants,
-                    apa::number(half, 3)
-                );
-                out += &wrap(&line, width, "  ", "    ");
-            }
-        }
-    }
+    out += &precision::table(report, paint);
     let studies = format!(
         "* this protocol. {} simulated studies{}.",
         plan.settings.studies,
@@ -216,6 +201,15 @@ pub(super) fn results(report: &Report, page: Page) -> String {
         ))
     );
     out += &paint.dim(&wrap(&studies, width, "", ""));
+    if let Some(legend) = precision::legend(report) {
+        out += &paint.dim(&wrap(&legend, width, "", ""));
+    }
+    if let Some(ratios) = precision::has_ratios(report) {
+        let candidates = precision::candidates(report);
+        for sentence in precision::sentences(&report.wanted, ratios, &candidates) {
+            out += &wrap(&sentence, width, "  ", "    ");
+        }
+    }
     for fewest in smallest(report) {
         let reps = counted(fewest.repetitions, "repetition", "repetitions");
         let line = match fewest.reached {

@@ -3,13 +3,15 @@
 
 use super::discriminations::sensitivity;
 use super::findings::{self, PartFacts, PartFinding, PartQuestion, of_model, of_preferences};
-use super::over_participants::{Threshold, Told, mixed, sensitivities};
+use super::over_participants::{ConditionModel, Threshold, Told, mixed, sensitivities};
+use super::population::{ConditionFit, Pooled, PopulationCell, population};
 use super::preferences::{Preference, in_both_orders, preferences};
 use super::trials::{Asked, TrialCount, TrialSettings, discrimination};
-use crate::analyze::keys::CellName;
-use crate::analyze::record::Number as _;
-use std::collections::BTreeSet;
+use crate::analyze::keys::{CellName, ConditionName};
+use crate::analyze::record::{Number as _, PairName};
+use std::collections::{BTreeMap, BTreeSet};
 use study_plan::protocol::parts::TrackRules;
+use study_stats::psychometric::hierarchy::Effort;
 use study_stats::psychometric::{Level, group, posterior};
 
 /// What is found of paired preferences.
@@ -38,24 +40,48 @@ pub(crate) fn compared(chosen: &[Preference], tie: bool, alpha: f64) -> Compared
     }
 }
 
-/// The threshold of one participant on a track: the posterior median. `None` if the answers
+/// The threshold of one participant in a condition: posterior median and interval. `None` if the answers
 /// have none.
-pub(crate) fn threshold(asked: Asked, levels: &[Level], settings: &TrialSettings) -> Option<f64> {
+pub(crate) fn threshold(
+    asked: Asked,
+    levels: &[Level],
+    settings: &TrialSettings,
+) -> Option<Estimated> {
     let (experiment, _) = asked.experiment()?;
     let levels = settings.spacing.places(levels);
     let found = posterior(settings.core, &levels, experiment, &settings.priors);
-    found
-        .ok()
-        .map(|p| p.threshold_level(settings.spacing).median)
+    let found = found.ok()?.threshold_level(settings.spacing);
+    Some(Estimated {
+        value: found.median,
+        ci95: found.ci95,
+    })
 }
 
-/// The finding of thresholds of participants, by participant, track and value; `None` with
-/// one track.
+/// An estimate with its 95 % interval.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Estimated {
+    /// The estimate.
+    pub(crate) value: f64,
+    /// Its ends.
+    pub(crate) ci95: (f64, f64),
+}
+
+/// What is found of thresholds in several conditions.
+#[derive(Debug, Clone)]
+pub(crate) struct Differing {
+    /// Whether they differ.
+    pub(crate) finding: Option<PartFinding>,
+    /// The last condition against the first: a ratio, or a difference where there are none.
+    pub(crate) contrast: Option<Estimated>,
+}
+
+/// What is found of thresholds of participants, by participant, condition and value; `ends` are the first
+/// and the last condition. `None` with one condition.
 pub(crate) fn thresholds(
     found: &[(String, String, f64)],
-    ratios: bool,
+    (ratios, ends): (bool, [&str; 2]),
     alpha: f64,
-) -> Option<PartFinding> {
+) -> Option<Differing> {
     let of: Vec<Threshold<'_>> = (found.iter())
         .map(|(participant, condition, value)| Threshold {
             participant,
@@ -69,19 +95,135 @@ pub(crate) fn thresholds(
         alpha,
         participants: people.len(),
     };
-    of_model(&facts, PartQuestion::Thresholds, Some(&model)).0
+    Some(Differing {
+        finding: of_model(&facts, PartQuestion::Thresholds, Some(&model)).0,
+        contrast: contrast(&model, ends),
+    })
 }
 
-/// Half the 95 % interval of the mean threshold on a track, of its natural logarithm where
-/// levels have ratios.
-pub(crate) fn threshold_half_width(of_track: &[f64], ratios: bool) -> Option<f64> {
-    if !ratios {
-        let (low, high) = study_stats::paired::one_sample(of_track)?.ci95;
-        return Some((high - low) / 2.0);
-    }
-    let (low, high) = group(of_track)?.ci95?;
-    Some(libm::log(high / low) / 2.0)
+/// The contrast of the last condition with the first.
+fn contrast(model: &ConditionModel, [first, last]: [&str; 2]) -> Option<Estimated> {
+    let pair = PairName::of(first, last);
+    let found = model.pairs.get(&pair)?;
+    let (name, value) = found.estimate();
+    let (value, ci95) = (value?, found.ci95.ends()?);
+    let found = Estimated { value, ci95 };
+    Some(found.of_last(&pair, last, name == "ratio"))
 }
+
+impl Estimated {
+    /// What a pair says of `last` against the other one: pairs have sorted names.
+    fn of_last(self, pair: &PairName, last: &str, is_ratio: bool) -> Self {
+        if pair.names()[0] == last {
+            return self;
+        }
+        let turned = |x: f64| if is_ratio { 1.0 / x } else { -x };
+        let (low, high) = self.ci95;
+        Self {
+            value: turned(self.value),
+            ci95: (turned(high), turned(low)),
+        }
+    }
+}
+
+/// The mean threshold in a condition with its t interval, geometric where levels have ratios.
+pub(crate) fn mean_threshold(of_track: &[f64], ratios: bool) -> Option<Estimated> {
+    if !ratios {
+        let found = study_stats::paired::one_sample(of_track)?;
+        return Some(Estimated {
+            value: found.mean,
+            ci95: found.ci95,
+        });
+    }
+    let found = group(of_track)?;
+    Some(Estimated {
+        value: found.geometric_mean,
+        ci95: found.ci95?,
+    })
+}
+
+/// What the pooled model finds.
+#[derive(Debug, Clone)]
+pub(crate) struct Together {
+    /// The threshold of each cell, in their order.
+    pub(crate) cells: Vec<Estimated>,
+    /// The population in the first condition.
+    pub(crate) mean: Option<Estimated>,
+    /// The last condition against the first.
+    pub(crate) contrast: Option<Estimated>,
+}
+
+/// The answers of a participant in a condition: names, and counts by level.
+pub(crate) type Answered = (CellName, Vec<Level>);
+
+/// The pooled model of these cells as the analysis fits it, with fewer draws. `Err` where there is none for
+/// such data, `Ok(None)` if it has not converged.
+pub(crate) fn together(
+    cells: &[Answered],
+    conditions: &[(&str, Asked, &TrialSettings)],
+    seed: u64,
+) -> Result<Option<Together>, NoModel> {
+    let settings = conditions.iter().map(|(name, asked, settings)| {
+        let fit = ConditionFit {
+            core: settings.core,
+            spacing: settings.spacing,
+            experiment: asked.experiment()?.0,
+            priors: settings.priors,
+        };
+        Some(((*name).to_owned(), fit))
+    });
+    let settings: Option<BTreeMap<String, ConditionFit>> = settings.collect();
+    let cells: Vec<PopulationCell> = (cells.iter())
+        .map(|(name, levels)| PopulationCell {
+            name: name.clone(),
+            levels: levels.clone(),
+        })
+        .collect();
+    let model = population(
+        &cells,
+        &settings.ok_or(NoModel)?,
+        (seed, "power"),
+        Effort::SIMULATION,
+    );
+    let model = model.ok_or(NoModel)?;
+    if !model.has_converged() {
+        return Ok(None);
+    }
+    let of = |found: &Pooled| {
+        Some(Estimated {
+            value: found.median.number()?,
+            ci95: found.ci95.ends()?,
+        })
+    };
+    let of_cell = |cell: &PopulationCell| model.participant.get(&cell.name).and_then(of);
+    let cells: Option<Vec<Estimated>> = cells.iter().map(of_cell).collect();
+    let (first, last) = match conditions {
+        [first, .., last] => (first.0, Some(last.0)),
+        [first] => (first.0, None),
+        [] => return Err(NoModel),
+    };
+    let contrast = last.and_then(|last| {
+        let pair = PairName::of(first, last);
+        let found = model.contrasts.get(&pair)?;
+        let (is_ratio, found) = match (&found.ratio, &found.difference) {
+            (Some(ratio), _) => (true, ratio),
+            (None, difference) => (false, difference.as_ref()?),
+        };
+        Some(of(found)?.of_last(&pair, last, is_ratio))
+    });
+    Ok(cells.map(|cells| Together {
+        cells,
+        mean: model
+            .threshold
+            .get(&ConditionName::from(first))
+            .and_then(of),
+        contrast,
+    }))
+}
+
+/// There is no pooled model of such data.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct NoModel;
 
 /// The findings of each track whether its two realizations are told apart; `None` if one has
 /// no sensitivities.

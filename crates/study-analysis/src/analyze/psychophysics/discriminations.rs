@@ -19,6 +19,7 @@ use study_plan::protocol::conditions::by_condition;
 use study_plan::protocol::parts::{Method, Part, TrackRules, Vary};
 use study_session::outcome::RatingRow;
 use study_stats::describe::mean;
+use study_stats::psychometric::hierarchy::Effort;
 use study_stats::psychometric::{Core, Level, Priors, Spacing, Support, WidthPrior, pooled};
 
 /// Each condition is fitted by itself; the priors refer to the range of its own ladder. A track is a
@@ -169,8 +170,8 @@ pub(super) fn of_tracks(
     }
     // Participants of different groups are no draws from one population.
     if study.pools && protocol.groups.is_none() {
-        let seed = protocol.study.seed;
-        results.over.psy_population = population(&together, &settings_of, seed, part.id.as_str());
+        let of = (protocol.study.seed, part.id.as_str());
+        results.over.psy_population = population(&together, &settings_of, of, Effort::ANALYSIS);
         if let Some(model) = &results.over.psy_population
             && !model.has_converged()
         {
@@ -186,6 +187,7 @@ pub(super) fn of_tracks(
     data.measured = measured;
     if families.windows(2).all(|two| two[0].id == two[1].id) {
         data.dimension = tracks.first().and_then(|track| protocol.dimension(track));
+        data.family = families.first().map(|family| family.dimension());
     }
     Some(Found {
         task,

@@ -82,6 +82,8 @@ impl PartAnalysis {
 pub struct PartData {
     /// What the level is, with its unit; `None` without levels or for several families.
     pub dimension: Option<String>,
+    /// The family of the levels with its unit, as standards are counted; like `dimension` without a standard.
+    pub family: Option<String>,
     /// Share of correct answers by guessing, where it follows from the kind of trial.
     pub guess: Option<f64>,
     /// Positive answers by level.

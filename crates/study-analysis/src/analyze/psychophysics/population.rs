@@ -94,13 +94,14 @@ pub(super) struct ConditionFit {
     pub(super) priors: Priors,
 }
 
-/// The pooled model of these cells; `settings` are those of each condition. Nothing with fewer
-/// than two participants, or where the guess rate is each participant's own (yes–no).
+/// The pooled model of these cells; `settings` are those of each condition. Its draws follow from the seed
+/// and the name of the part. Nothing with fewer than two participants, or where the guess rate is each
+/// participant's own (yes–no).
 pub(super) fn population(
     cells: &[PopulationCell],
     settings: &BTreeMap<String, ConditionFit>,
-    seed: u64,
-    part: &str,
+    (seed, part): (u64, &str),
+    effort: Effort,
 ) -> Option<PopulationModel> {
     let names: Vec<&str> = (settings.keys().map(String::as_str))
         .filter(|c| cells.iter().any(|cell| cell.name.condition.as_str() == *c))
@@ -145,7 +146,7 @@ pub(super) fn population(
     let mut draws = Draws::new(seed, &format!("population/{part}"));
     let spacings: Vec<Spacing> = names.iter().map(|c| settings[*c].spacing).collect();
     let found = match spacings.windows(2).all(|s| s[0] == s[1]) {
-        true => partial_pooling(&conditions, &placed, &priors, Effort::ANALYSIS, &mut draws),
+        true => partial_pooling(&conditions, &placed, &priors, effort, &mut draws),
         false => Err(NoPooling::Scales),
     };
     let n_participants = Stat::count(people.len());

@@ -1,13 +1,15 @@
+use super::super::tracks::{TrackWorld, TracksWorld, Truth, of_participant, run};
 use super::super::{Assumptions, Scale, Vaf, merge, run_chunk};
 use super::*;
 use crate::analyze::psychophysics::results::CellName;
+use crate::analyze::psychophysics::{TrialCount, TrialSettings};
 use crate::analyze::results::Number as _;
 use study_base::text::{ModelId, PartId};
-use study_plan::procedure::{Constant, Rule};
-use study_plan::protocol::parts::{Compared, FitRules};
+use study_plan::procedure::{Constant, Ladder, Rule, Track};
+use study_plan::protocol::parts::{Compared, FitRules, Method, TrackRules};
 use study_stats::distribution::normal_upper;
 use study_stats::power::covariate::Spread;
-use study_stats::psychometric::{Core, Priors, Spacing, Support};
+use study_stats::psychometric::{Core, Curve, Priors, Spacing, Support};
 
 fn settings(part: PartWorld, tests: &[Test], studies: u64) -> Settings {
     Settings {
@@ -219,6 +221,7 @@ fn told_apart_agrees_with_an_independent_simulation() {
         let world = PartWorld::Tracks(TracksWorld {
             tracks: vec![track],
             ratios: false,
+            pooled: 0,
         });
         let mut settings = settings(world, &[Test::ToldApart], 3000);
         settings.assumptions.spread.subject = sd;
@@ -253,7 +256,9 @@ fn thresholds_are_those_of_the_analysis() {
     let levels = run(&track, fresh, &typical, &mut draws);
     assert_eq!(levels.len(), 400);
     let asked = track.asked().unwrap();
-    let found = decided::threshold(asked, &levels, &track.settings).unwrap();
+    let found = decided::threshold(asked, &levels, &track.settings)
+        .unwrap()
+        .value;
     assert!((found - 0.5).abs() < 0.1, "{found}");
     let counts: Vec<TrialCount> = (levels.iter())
         .map(|l| TrialCount {
@@ -300,6 +305,7 @@ fn thresholds_that_differ_are_found() {
         PartWorld::Tracks(TracksWorld {
             tracks: tracks.into(),
             ratios: true,
+            pooled: 0,
         })
     };
     let decided = |ratio: f64| {

@@ -6,6 +6,25 @@ use crate::protocol::Method;
 /// Most thresholds of a grid that is not given: more take time and tell nothing.
 const MOST_THRESHOLDS: usize = 60;
 
+/// Lapse rates of a grid that is not given.
+pub(super) const LAPSES: [f64; 3] = [0.01, 0.03, 0.06];
+
+/// The parameters of a named function whose grids are not given.
+pub(in crate::protocol) fn usual_grids(
+    function: &Function,
+    method: Method,
+    ladder: &Ladder,
+    standard: Option<f64>,
+) -> Vec<Parameter> {
+    let grids = Grids {
+        threshold: None,
+        slope: None,
+        guess: None,
+        lapse: LAPSES.to_vec(),
+    };
+    grids.parameters(function, method, ladder, standard)
+}
+
 /// The grids of a QUEST+ track.
 pub(super) struct Grids {
     pub(super) threshold: Option<Vec<f64>>,

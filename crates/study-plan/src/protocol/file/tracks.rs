@@ -1,5 +1,6 @@
 //! `[[tracks]]` and their procedures.
 
+use super::grids::LAPSES;
 use crate::procedure::{Function, Parameter, QuestPlus, Scale, Staircase, Stop};
 use crate::protocol::keys::{Id, Key, Kind, Shape, Variants, Word, Words, keys};
 use crate::protocol::section::{Section, Variant, shapes};
@@ -453,7 +454,7 @@ fn quest(section: &mut Section<'_, '_>) -> Option<RawRule> {
         threshold,
         slope,
         guess,
-        lapse: lapse.unwrap_or_else(|| vec![0.01, 0.03, 0.06]),
+        lapse: lapse.unwrap_or_else(|| LAPSES.to_vec()),
     })
 }
 

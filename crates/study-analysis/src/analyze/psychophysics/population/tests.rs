@@ -62,7 +62,7 @@ fn settings(width: WidthPrior, names: &[&str]) -> BTreeMap<String, ConditionFit>
 #[test]
 fn thresholds_are_levels_and_contrasts_those_of_their_names() {
     let settings = settings(WidthPrior::OfRatios, &["z", "a"]);
-    let model = population(&three(), &settings, 1, "part").unwrap();
+    let model = population(&three(), &settings, (1, "part"), Effort::ANALYSIS).unwrap();
     assert!(model.has_converged(), "{:?}", model.convergence);
     let values = model.values();
     let number = |id: &str| values.number(id).unwrap();
@@ -86,14 +86,16 @@ fn thresholds_are_levels_and_contrasts_those_of_their_names() {
     assert_eq!(number("converged"), 1.0);
     assert_eq!(values.number("a|z/difference/median"), None);
     // The same seed gives the same numbers.
-    let again = population(&three(), &settings, 1, "part").unwrap();
+    let again = population(&three(), &settings, (1, "part"), Effort::ANALYSIS).unwrap();
     assert_eq!(again, model);
 }
 
 #[test]
 fn levels_without_ratios_have_differences() {
     let settings = settings(WidthPrior::Even, &["a", "z"]);
-    let values = population(&three(), &settings, 1, "part").unwrap().values();
+    let values = population(&three(), &settings, (1, "part"), Effort::ANALYSIS)
+        .unwrap()
+        .values();
     let [a, z] = ["a", "z"].map(|c| values.number(&format!("threshold/{c}/median")).unwrap());
     let difference = values.number("a|z/difference/median").unwrap();
     assert!((difference - (a - z)).abs() < 0.02, "{difference} {a} {z}");
@@ -104,18 +106,27 @@ fn levels_without_ratios_have_differences() {
 fn not_every_study_has_a_population() {
     let mut settings = settings(WidthPrior::OfRatios, &["a", "z"]);
     let one = [cell("A", "a", 0.1), cell("A", "z", 0.2)];
-    assert_eq!(population(&one, &settings, 1, "part"), None);
-    assert_eq!(population(&[], &settings, 1, "part"), None);
+    assert_eq!(
+        population(&one, &settings, (1, "part"), Effort::ANALYSIS),
+        None
+    );
+    assert_eq!(
+        population(&[], &settings, (1, "part"), Effort::ANALYSIS),
+        None
+    );
     // Tracks over different scales are no conditions of one model.
     settings.insert("z".to_owned(), fit(WidthPrior::Even, CHOICE));
-    let model = population(&three(), &settings, 1, "part").unwrap();
+    let model = population(&three(), &settings, (1, "part"), Effort::ANALYSIS).unwrap();
     assert!(!model.has_converged());
     let reason = model.sd_participant.median.reason().unwrap().to_owned();
     assert!(reason.contains("scales"), "{reason}");
     let yes_no = fit(WidthPrior::OfRatios, Experiment::YesNo);
     settings.insert("z".to_owned(), yes_no);
     settings.insert("a".to_owned(), fit(WidthPrior::OfRatios, Experiment::YesNo));
-    assert_eq!(population(&three(), &settings, 1, "part"), None);
+    assert_eq!(
+        population(&three(), &settings, (1, "part"), Effort::ANALYSIS),
+        None
+    );
 }
 
 /// Of draws that cannot be relied upon nothing is said but that.
