@@ -451,7 +451,7 @@ fn labels_of_a_study_are_confused_as_in_their_table() {
         "part_identification.csv",
     ];
     let report = report(folder.path(), "identification", &["confusions"], &tables);
-    assert!(report.contains("Are the labels given more often than by guessing?"));
+    assert!(report.contains("Is the right label given more often than by guessing?"));
     let analysis = results.join("analysis");
     // The matrix of everybody in the figure is that of the table, and the sum of the participants'.
     let drawn = cells(

@@ -260,7 +260,7 @@ fn tracks_and_estimates_are_declared() {
             "identification",
             &[
                 "identification of 4 realizations, 6 trials each, order shuffled, each is given one of 4 labels, after practice until 7 of the last 8 answers are correct (at most 24 trials, each drawn on its own), the right label is told after each practice trial",
-                "Part `which`: Are the labels given more often than by guessing? Decided by: t test over participants",
+                "Part `which`: Is the right label given more often than by guessing? Decided by: t test over participants",
                 "Do the sessions differ? Decided by: linear mixed model",
                 "Power was not computed:",
             ],

@@ -44,7 +44,7 @@ pub(super) fn confusions(name: &str, part: &PartAnalysis) -> Option<Drawn> {
         false => String::new(),
     };
     let caption = format!(
-        "Confusion matrix: how often each label was given (columns, by number) where another one, or it, was \
+        "Confusion matrix: how often each label was given (columns, by number) when each of them was \
          right (rows), over all participants. Darker is a larger share of the row. The file has the matrix of each \
          participant, too.{all}"
     );

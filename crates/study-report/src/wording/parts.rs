@@ -83,9 +83,9 @@ fn texts(question: &PartQuestion) -> Wording {
             ..PART
         },
         PartQuestion::Identified => Wording {
-            ask: "Are the labels given more often than by guessing?",
-            yes: "Labels were given more often than by guessing",
-            not_shown: "It was not shown that labels are given more often than by guessing",
+            ask: "Is the right label given more often than by guessing?",
+            yes: "The right label was given more often than by guessing",
+            not_shown: "It was not shown that the right label is given more often than by guessing",
             shown: "{size} of the answers were correct, {guesses} by guessing, {result} ({corrected}, {people})",
             ..PART
         },
