@@ -487,6 +487,81 @@ fn labels_of_a_study_are_confused_as_in_their_table() {
     assert_eq!(code, 0, "{out}{err}");
 }
 
+/// A rehearsed study of similarity has the statistics of its table, a map, and what it follows.
+#[test]
+fn differences_of_a_study_are_mapped_as_in_their_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let part = rehearsed(folder.path(), "similarity");
+    let results = folder.path().join("out/similarity");
+    let columns = ["participant", "trial", "difference", "practice", "model"];
+    let rows = cells(&results.join("ratings.csv"), &columns);
+    // Two participants; 15 pairs and 6 identical ones, twice, and 6 of practice.
+    assert_eq!(rows.len(), 2 * (2 * (15 + 6) + 6));
+    let columns = ["participant", "trial", "interval", "model"];
+    let felt = cells(&results.join("intervals.csv"), &columns);
+    let mut table = "participant,first,second,rating\n".to_owned();
+    for row in rows.iter().filter(|row| row[3] == "false") {
+        assert_eq!(row[4], "");
+        let model = |interval: &str| {
+            let own = felt.iter().find(|f| f[..2] == row[..2] && f[2] == interval);
+            own.unwrap()[3].clone()
+        };
+        table += &format!("{},{},{},{}\n", row[0], model("1"), model("2"), row[2]);
+    }
+    assert_eq!(
+        (&part["task"], &part["trials"]),
+        (&"similarity".into(), &84.into())
+    );
+    let values = &part["values"];
+    let of_table = of_table(folder.path(), &table, &["similarity"]);
+    // What has random starts, draws or properties of the realizations is not in a table.
+    let drawn = ["map", "structure", "follows", "second", "dimensions", "order/p"];
+    let mut compared = 0;
+    for (id, value) in values.as_object().unwrap() {
+        let own = id.strip_prefix("similarity/").unwrap();
+        if drawn.iter().any(|of| own.starts_with(of)) || own.ends_with("/distance") {
+            continue;
+        }
+        let (a, b) = (value.as_f64(), of_table[id].as_f64());
+        let close = (a.zip(b)).is_none_or(|(a, b)| (a - b).abs() <= 1e-9 * b.abs().max(1.0));
+        assert!(a.is_some() == b.is_some() && close, "{id}: {value} {}", of_table[id]);
+        compared += 1;
+    }
+    assert!(compared > 60, "{compared}");
+    let number = |id: &str| values[format!("similarity/{id}")].as_f64().unwrap();
+    // Raters feel distances that rise along the levels.
+    assert!(number("agreement/mean_correlation") > 0.7);
+    assert!(number("identical/mean") < 0.5 * number("mean"));
+    assert_eq!(number("follows/level/exact"), 1.0);
+    assert!(number("follows/level/r") > 0.9);
+    let tables = [
+        "part_dimensions.csv",
+        "part_map.csv",
+        "part_map_follows.csv",
+        "part_differences.csv",
+        "part_similarity.csv",
+    ];
+    let report = report(folder.path(), "similarity", &["map"], &tables);
+    for asked in [
+        "Is there a structure that a map shows better than chance?",
+        "Does it take more than one dimension?",
+        "Does the map follow the level?",
+    ] {
+        assert!(report.contains(asked), "{asked}");
+    }
+    // The map of the figure is that of the table.
+    let analysis = results.join("analysis");
+    let columns = ["realization", "x", "x_se"];
+    let drawn = cells(&analysis.join("figures/part-1-map.csv"), &columns);
+    assert_eq!(cells(&analysis.join("part_map.csv"), &columns).len(), 6);
+    for row in &drawn {
+        let x: f64 = row[1].parse().unwrap();
+        assert!((x - number(&format!("map/{}/x", row[0]))).abs() < 1e-9);
+    }
+    let (code, out, err) = study(&["verify", "out"], folder.path());
+    assert_eq!(code, 0, "{out}{err}");
+}
+
 /// The other kinds, with few trials, rehearse, pass `verify` and have an analysis.
 #[test]
 fn yes_no_and_abx_are_rehearsed_and_analyzed() {

@@ -478,6 +478,93 @@ fn identification_has_its_table() {
     );
 }
 
+#[test]
+fn similarity_has_its_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = golden("similarity_sim");
+    let table = csv("participant,first,second,rating", &file, joined);
+    let arguments = ["--task", "similarity", "--json"];
+    let found = values(&mut analyze(folder.path(), &table, &arguments));
+    for id in [
+        "agreement/kendall_w",
+        "order/rms",
+        "dimensions/2/ratio_stress",
+        "pair/m2|m4/rescaled",
+        "participant/P5/with_others",
+    ] {
+        close(&found, &file, &format!("similarity/{id}"));
+    }
+    // Six points of a plane, and participants who agree.
+    assert!(found["similarity/structure/p"].as_f64().unwrap() < 0.05);
+    assert_eq!(found["similarity/map_dimensions"], 2.0);
+    let page = text(&mut analyze(folder.path(), &table, &["--task", "similarity"]));
+    assert!(page.contains("Dimensions") && page.contains("m1 | m2"), "{page}");
+    let negative = "participant,first,second,rating\nP1,a,b,-1\n";
+    let done = analyze(folder.path(), negative, &["--task", "similarity"])
+        .assert()
+        .code(1);
+    let said = String::from_utf8(done.get_output().stderr.clone()).unwrap();
+    assert!(said.contains("t.csv:2: rating is `-1`"), "{said}");
+}
+
+/// Fewer than four realizations, one participant, ratings that are all 0, and pairs that do not connect all realizations: each
+/// is said, and nothing panics.
+#[test]
+fn similarity_without_a_map_says_why() {
+    let folder = tempfile::tempdir().unwrap();
+    let head = "participant,first,second,rating\n";
+    let pairs = |names: &[&str], rating: &dyn Fn(usize, usize) -> usize| {
+        let mut rows = String::new();
+        for (i, a) in names.iter().enumerate() {
+            for (j, b) in names.iter().enumerate().skip(i + 1) {
+                rows += &format!("{a},{b},{}\n", rating(i, j));
+            }
+        }
+        rows
+    };
+    let of = |people: &[&str], rows: &str| {
+        let all = people.iter().flat_map(|who| rows.lines().map(move |row| format!("{who},{row}\n")));
+        format!("{head}{}", all.collect::<String>())
+    };
+    let apart = |i: usize, j: usize| 10 * (j - i) + i;
+    let (two, five) = (["P1", "P2"], ["a", "b", "c", "d", "e"]);
+    let halves = pairs(&five[..3], &apart) + &pairs(&["x", "y", "z"], &apart);
+    for (table, id, why) in [
+        (
+            of(&two, &pairs(&five[..3], &apart)),
+            "structure/p",
+            "there are fewer than four realizations",
+        ),
+        (
+            of(&two, &pairs(&five, &|_, _| 0)),
+            "structure/p",
+            "there are no ratings of two different realizations",
+        ),
+        (
+            of(&two, &halves),
+            "map_dimensions",
+            "the rated pairs do not connect all realizations, or no two differ",
+        ),
+        (
+            of(&two[..1], &pairs(&five, &apart)),
+            "agreement/mean_correlation",
+            "there is one participant",
+        ),
+        (
+            of(&two[..1], &pairs(&five, &apart)),
+            "dimensions/1/predicted",
+            "there are no other participants",
+        ),
+    ] {
+        let arguments = ["--task", "similarity", "--json"];
+        let out = text(&mut analyze(folder.path(), &table, &arguments));
+        let document: serde_json::Value = serde_json::from_str(&out).unwrap();
+        let id = format!("similarity/{id}");
+        assert!(document["values"][&id].is_null(), "{id}: {out}");
+        assert_eq!(document["undefined"][&id], why, "{out}");
+    }
+}
+
 /// What cannot be estimated is named with its reason, and the command succeeds.
 #[test]
 fn what_is_undefined_says_why() {

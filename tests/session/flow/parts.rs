@@ -448,6 +448,39 @@ fn practice_ends_once_enough_of_the_last_answers_are_correct() {
     assert!(orders[1..].iter().any(|order| *order != orders[0]));
 }
 
+/// Practice and identical pairs are pages like any other; the row has the rating, and no realization of its own.
+#[test]
+fn differences_are_rated_after_two_intervals() {
+    let protocol = similarity("identical = true\npractice = 2");
+    let mut rig = Rig::new(protocol.clone());
+    while rig.ending.is_none() {
+        match rig.view().screen {
+            Screen::Form { questions, .. } => {
+                rig.wait(1.0);
+                let asked = questions[0].id.clone();
+                rig.send(Input::Answer(vec![(asked, Answer::Number(37.0))]));
+            }
+            _ => {
+                rig.step();
+            }
+        }
+    }
+    let history = rig.session.history();
+    let rows = history.rating_rows(&protocol);
+    assert_eq!(rows.len(), 2 + 2 * (3 + 3));
+    let asked = QuestionId::new("apart").unwrap();
+    for row in &rows {
+        assert_eq!(row.answers[&asked], Answer::Number(37.0));
+        assert_eq!((row.model.as_ref(), row.correct), (None, None));
+    }
+    assert_eq!(rows.iter().filter(|row| row.practice).count(), 2);
+    let intervals = study_session::outcome::fold::interval_rows(history, &protocol);
+    assert_eq!(intervals.len(), 2 * rows.len());
+    let felt = |at: usize| intervals[at].model.as_ref();
+    let identical = (0..rows.len()).filter(|n| felt(2 * n) == felt(2 * n + 1));
+    assert_eq!(identical.count(), 2 * 3);
+}
+
 #[test]
 fn the_pages_of_a_trial_are_the_same_whatever_it_presents() {
     for protocol in [
@@ -455,6 +488,7 @@ fn the_pages_of_a_trial_are_the_same_whatever_it_presents() {
         beside_a_reference(),
         magnitudes(),
         identification("feedback = \"never\""),
+        similarity("identical = true"),
         track("2ifc", STAIRCASE, "easy = 0.3"),
         track("3ifc", STAIRCASE, "easy = 0.3"),
         track("abx", QUEST, ""),

@@ -134,6 +134,10 @@ impl Protocol {
                         let stays = |m: &ModelId| models.contains(m) || self.level_of(m).is_some();
                         task.presentations.models.retain(stays);
                     }
+                    Task::Similarity(task) => {
+                        let stays = |m: &ModelId| models.contains(m) || self.level_of(m).is_some();
+                        task.models.retain(stays);
+                    }
                     Task::Discrimination { .. } | Task::Search(_) => {}
                 }
             }

@@ -2,6 +2,7 @@
 //! with their reversals, preferences, thresholds and sensitivities of the participants.
 
 use super::identification::confusions;
+use super::similarity::map;
 use super::weber::webers_law;
 use super::{Canvas, Drawn, MAX_DRAWN, cell, drawn, head, rows_height};
 use crate::apa::digits;
@@ -37,6 +38,7 @@ pub fn of_part(number: usize, part: &PartAnalysis) -> Vec<Drawn> {
         against_vaf(&name("preference-against-vaf"), part),
         magnitudes(&name("magnitudes"), part),
         confusions(&name("confusions"), part),
+        map(&name("map"), part),
     ];
     let note = match (part.simulated, part.pilot) {
         (true, _) => Some("includes simulated data"),

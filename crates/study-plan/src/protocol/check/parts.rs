@@ -13,6 +13,9 @@ use study_base::text::{ModelId, PartId, counted};
 const MAGNITUDE_LEVELS: usize = 5;
 /// Fewest trials for each cell of a confusion matrix that need no warning.
 const TRIALS_OF_A_CELL: usize = 5;
+/// Fewest realizations of a map of one dimension, and of two.
+const REALIZATIONS_OF_A_MAP: usize = 4;
+const REALIZATIONS_OF_A_PLANE: usize = 6;
 /// Fewest trials of an adaptive track that need no warning: the threshold is then known
 /// to about half the standard deviation of the noise.
 const TRACK_TRIALS: u32 = 30;
@@ -58,6 +61,9 @@ pub(super) fn trials(protocol: &Protocol, part: &Part) -> u32 {
         Task::Pairs(own) => all(own.pairs.len(), own.repetitions),
         Task::Discrimination { tracks: ids } => tracks(protocol, ids).map(track_trials).sum(),
         Task::Search(own) => own.rule.trials,
+        Task::Similarity(own) => {
+            all(own.pairs().pairs.len(), own.repetitions).saturating_add(own.practice)
+        }
     }
 }
 
@@ -67,7 +73,7 @@ pub(super) fn seconds(protocol: &Protocol, part: &Part, reference_s: f64) -> f64
     let intervals = match &part.task {
         Task::Rating(_) | Task::Magnitude(_) | Task::Identification(_) => 1,
         Task::Mushra(own) => 1 + usize::from(own.reference.is_some()),
-        Task::Pairs(_) | Task::Search(_) => 2,
+        Task::Pairs(_) | Task::Search(_) | Task::Similarity(_) => 2,
         Task::Discrimination { tracks: ids } => tracks(protocol, ids)
             .map(|track| track.method.sequences()[0].len())
             .max()
@@ -80,7 +86,8 @@ pub(super) fn seconds(protocol: &Protocol, part: &Part, reference_s: f64) -> f64
         | Task::Identification(_)
         | Task::Pairs(_)
         | Task::Discrimination { .. }
-        | Task::Search(_) => pace::COMPARE_S,
+        | Task::Search(_)
+        | Task::Similarity(_) => pace::COMPARE_S,
     };
     let felt_s = part.exposure.max_s.map_or(free_s, |max| max.min(free_s));
     let load_s = match protocol.device.kind {
@@ -111,6 +118,8 @@ pub(super) fn warnings(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Faul
             few_names(protocol, part),
             one_order(part),
             few_pairs(protocol, part),
+            small_map(part),
+            one_sided(part),
         ];
         let doubts = doubts.into_iter().flatten();
         faults.extend(doubts.map(|fault| fault.at(place.clone())));
@@ -136,6 +145,7 @@ fn presented(protocol: &Protocol, model: &ModelId) -> bool {
     });
     let by_part = protocol.parts.iter().any(|part| match &part.task {
         Task::Pairs(own) => own.pairs.iter().any(|pair| pair.contains(model)),
+        Task::Similarity(own) => own.models.contains(model),
         task => {
             let own = task.presentations();
             own.is_some_and(|own| own.models.contains(model) || own.practice.contains(model))
@@ -150,6 +160,8 @@ fn presented(protocol: &Protocol, model: &ModelId) -> bool {
 pub fn is_about_realizations(protocol: &Protocol) -> bool {
     let about = |part: &Part| match &part.task {
         Task::Discrimination { .. } | Task::Identification(_) | Task::Search(_) => false,
+        // A map has what distinguishes the realizations as its axes, whatever that is.
+        Task::Similarity(_) => false,
         Task::Magnitude(own) => own.models.iter().all(|m| protocol.level_of(m).is_none()),
         Task::Rating(_) | Task::Mushra(_) | Task::Pairs(_) => true,
     };
@@ -225,6 +237,44 @@ fn few_pairs(protocol: &Protocol, part: &Part) -> Option<Fault> {
             counted(space.axes.len(), "axis", "axes")
         ))
         .hint("docs/search.md shows how near the best point a search comes")
+    })
+}
+
+/// Too few realizations for a map that more than chance decides.
+fn small_map(part: &Part) -> Option<Fault> {
+    let Task::Similarity(own) = &part.task else {
+        return None;
+    };
+    let n = own.models.len();
+    let what = match n {
+        0..REALIZATIONS_OF_A_MAP => {
+            format!("there is no map of fewer than {REALIZATIONS_OF_A_MAP}")
+        }
+        REALIZATIONS_OF_A_MAP..REALIZATIONS_OF_A_PLANE => {
+            format!("a map of fewer than {REALIZATIONS_OF_A_PLANE} has one dimension")
+        }
+        _ => return None,
+    };
+    Some(
+        Fault::warning(format!(
+            "the part `{}` has {n} realizations: {what}",
+            part.id
+        ))
+        .hint("add realizations, or levels of a family"),
+    )
+}
+
+/// Pairs that nobody rates in both orders equally often.
+fn one_sided(part: &Part) -> Option<Fault> {
+    let Task::Similarity(own) = &part.task else {
+        return None;
+    };
+    (own.repetitions % 2 == 1).then(|| {
+        let what = format!(
+            "`repetitions = {}`: nobody has both orders of a pair of `{}` equally often",
+            own.repetitions, part.id
+        );
+        Fault::warning(what).hint("take an even number; the orders are balanced over two rows")
     })
 }
 

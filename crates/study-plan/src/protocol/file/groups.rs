@@ -173,6 +173,14 @@ pub(super) fn agree(
                     let own = all.iter().filter(|m| models.contains(m) || is_level(m));
                     (all.clone(), own.count())
                 }
+                // One realization has no pair.
+                Task::Similarity(task) => {
+                    let own = task
+                        .models
+                        .iter()
+                        .filter(|m| models.contains(m) || is_level(m));
+                    (task.models.clone(), own.count().saturating_sub(1))
+                }
                 Task::Discrimination { .. } | Task::Search(_) => continue,
             };
             if left == 0 {

@@ -2,9 +2,10 @@
 
 use super::agree::{Sections, at, unknown};
 use super::parts::{RawLabel, RawPairs};
+use super::similarity::RawSimilarity;
 use super::spaces::PartialSpace;
 use crate::protocol::pairs::neighbors;
-use crate::protocol::{Criterion, DeviceKind, FamilyRules, Label, Presentations, Role};
+use crate::protocol::{Criterion, DeviceKind, FamilyRules, Label, Presentations, Role, Similarity};
 use study_base::diagnostic::Fault;
 use study_base::diagnostic::table::Document;
 use study_base::text::{ModelId, PartId, QuestionId};
@@ -252,6 +253,39 @@ impl Looked<'_> {
         Some(Presentations {
             models,
             ..raw.clone()
+        })
+    }
+
+    /// What a part of similarity compares; fewer than two are reported.
+    pub(super) fn similarity(
+        &self,
+        raw: &RawSimilarity,
+        families: Option<&[FamilyRules]>,
+        path: &str,
+    ) -> Option<Similarity> {
+        let models = match (&raw.family, &raw.models) {
+            (Some((family, levels)), _) => {
+                let family = self.family(family, families?, path)?;
+                self.levels(family, levels.as_deref(), path)?
+            }
+            (None, Some(models)) => {
+                self.models(models, &format!("{path}.models"));
+                models.clone()
+            }
+            (None, None) => self.default_models(false),
+        };
+        if models.len() < 2 {
+            let fault = Fault::error("a pair needs two realizations");
+            let hint = "add [[models]] with an id and a file";
+            self.fault(path, "models", fault.hint(hint));
+            return None;
+        }
+        Some(Similarity {
+            models,
+            order: raw.order.clone(),
+            repetitions: raw.repetitions,
+            identical: raw.identical,
+            practice: raw.practice,
         })
     }
 

@@ -1,5 +1,6 @@
 //! `[[parts]]`: trials of one kind each.
 
+use super::similarity::{RawSimilarity, SIMILARITY};
 use super::spaces::RULES;
 use crate::procedure::SearchRule;
 use crate::protocol::keys::{Id, Key, Kind, Shape, Variants, Words as _, keys};
@@ -91,7 +92,7 @@ const SEARCH: &[Key] = keys! {
 };
 
 /// The kinds of trial. A new one is declared here and in [`crate::protocol::Task`].
-pub(super) const KINDS: [Variant<RawTask>; 7] = [
+pub(super) const KINDS: [Variant<RawTask>; 8] = [
     Variant::new(
         "rating",
         "One realization is felt and rated.",
@@ -208,6 +209,12 @@ pub(super) const KINDS: [Variant<RawTask>; 7] = [
         SEARCH,
         search,
     ),
+    Variant::new(
+        "similarity",
+        "Two realizations are felt one after the other, and how different they are is rated from 0 to 100. Needs the format `study-protocol/3`.",
+        SIMILARITY,
+        similarity,
+    ),
 ];
 
 /// A part as it was read; its ids are not looked up yet.
@@ -274,6 +281,7 @@ pub(super) enum RawTask {
         rule: SearchRule,
         gap_s: f64,
     },
+    Similarity(RawSimilarity),
 }
 
 /// A label, and of what it is the right answer.
@@ -553,4 +561,8 @@ fn search(section: &mut Section<'_, '_>) -> Option<RawTask> {
         rule: rule?,
         gap_s: gap_s?,
     })
+}
+
+fn similarity(section: &mut Section<'_, '_>) -> Option<RawTask> {
+    super::similarity::similarity(section).map(RawTask::Similarity)
 }

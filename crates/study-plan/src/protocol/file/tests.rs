@@ -572,6 +572,7 @@ mod keys;
 mod outcomes;
 mod parts;
 mod questionnaires;
+mod similarity;
 mod relative;
 
 mod random {
