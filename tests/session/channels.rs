@@ -4,7 +4,7 @@
 use crate::plain::{Lines, events, last_answers};
 use crate::screen::Session;
 use crate::support::player::{F7, correct_newest, play_to_end, play_until};
-use crate::support::{PATIENT, Terminal, changed_protocol, repository, study};
+use crate::support::{PATIENCE, PATIENT, Terminal, changed_protocol, repository, study};
 use serde_json::{Value, json};
 use std::path::Path;
 use std::sync::OnceLock;
@@ -92,7 +92,8 @@ impl Channel {
         }
     }
 
-    /// Feels the first realization and is closed at its rating.
+    /// Feels the first realization and is closed at its rating, as soon as the journal has that the playback has ended: the
+    /// page of the rating can be there before.
     fn leave_a_rating(self, folder: &Path, protocol: &Path) {
         let path = protocol.to_str().unwrap();
         match self {
@@ -100,11 +101,13 @@ impl Channel {
                 let run = ["run", path, "--operator", "lw"];
                 let mut terminal = Terminal::start(&run, folder, 24, 80);
                 play_until(&mut terminal, "P01", "Tab: comment");
+                has_felt(folder);
                 terminal.signal("KILL");
             }
             Self::Plain => {
                 let mut lines = Lines::start(folder, &["run", path, "--plain"], None);
                 lines.play(Some("Type a number from 1 to 7"));
+                has_felt(folder);
                 lines.child.kill().unwrap();
                 lines.child.wait().unwrap();
             }
@@ -112,6 +115,7 @@ impl Channel {
                 let mut session = Session::opened(folder, protocol, &[]);
                 let asks = |page: &Value| page["questions"][0]["id"] == "realism";
                 session.browser.play("a rating", asks);
+                has_felt(folder);
                 session.child.kill().unwrap();
                 session.child.wait().unwrap();
             }
@@ -135,6 +139,15 @@ impl Channel {
             }
             Self::Page => Session::opened(folder, protocol, more).finish(),
         }
+    }
+}
+
+/// Waits until the journal has the end of a playback.
+fn has_felt(folder: &Path) {
+    let begun = std::time::Instant::now();
+    while !(events(folder).iter()).any(|e| e["event"] == "playback_ended") {
+        assert!(begun.elapsed() < PATIENCE, "no playback has ended");
+        std::thread::sleep(std::time::Duration::from_millis(20));
     }
 }
 

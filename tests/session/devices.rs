@@ -38,14 +38,14 @@ fn session(folder: &Path, protocol: &Path, more: &[&str]) -> (Vec<String>, Vec<R
     )
 }
 
-type Row = std::collections::BTreeMap<String, String>;
+pub(crate) type Row = std::collections::BTreeMap<String, String>;
 
 /// How a trial ended, on which device, and whether it is a pilot's.
 fn felt(row: &Row) -> [&str; 4] {
     ["status", "device_kind", "device_id", "pilot"].map(|column| row[column].as_str())
 }
 
-fn ratings(path: &Path) -> Vec<Row> {
+pub(crate) fn ratings(path: &Path) -> Vec<Row> {
     let mut file = csv::Reader::from_path(path).unwrap();
     file.deserialize().map(Result::unwrap).collect()
 }

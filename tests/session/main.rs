@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod another_build;
 mod blinding;
 mod by_keys;
 mod channels;

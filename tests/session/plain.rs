@@ -24,7 +24,7 @@ pub(crate) struct Lines {
     keys: Box<dyn Write + Send>,
     output: Receiver<Vec<u8>>,
     /// All that was printed.
-    seen: String,
+    pub(crate) seen: String,
     /// How much of it was already acted on.
     read: usize,
     /// The trial that was named last.
@@ -72,7 +72,7 @@ impl Lines {
         Self::of(program(), folder, arguments, variable)
     }
 
-    fn of(
+    pub(crate) fn of(
         program: std::ffi::OsString,
         folder: &Path,
         arguments: &[&str],
@@ -531,43 +531,4 @@ fn typed_lines_have_an_author_and_a_way_back() {
         said.contains('3') && said.contains("Enter alone keeps"),
         "{said}"
     );
-}
-
-/// The build that `STUDY_TEST_PROGRAM` runs and the one that was built with the tests, by the
-/// same answers.
-#[test]
-#[ignore = "compares with another build: .ci/wine runs it"]
-fn another_build_writes_the_same_journal() {
-    let own = std::ffi::OsString::from(env!("CARGO_BIN_EXE_study"));
-    assert_ne!(program(), own, "STUDY_TEST_PROGRAM names the other build");
-    let short = [
-        PATIENT,
-        ("max_attempts = 3", "max_attempts = 50"),
-        ("repetitions = 3", "repetitions = 1"),
-        ("at_least_s = 60", "at_least_s = 1"),
-    ];
-    for name in ["turn-signal", "knob", "keyboard"] {
-        let text = fs::read_to_string(repository(&format!("protocols/{name}/protocol.toml")));
-        let text = text.unwrap();
-        let applied: Vec<_> = short
-            .into_iter()
-            .filter(|(old, _)| text.contains(old))
-            .filter(|&change| change != PATIENT || !text.contains("max_attempts"))
-            .collect();
-        let home = tempfile::tempdir().unwrap();
-        let protocol = home.path().join("protocol");
-        changed_protocol(name, &protocol, &applied);
-        let protocol = protocol.to_str().unwrap();
-        let [here, there] = [own.clone(), program()].map(|build| {
-            let folder = tempfile::tempdir().unwrap();
-            let run = ["run", protocol, "--plain"];
-            let mut lines = Lines::of(build, folder.path(), &run, Some(HURRY));
-            let end = lines.play(None);
-            assert!(end.starts_with("The session is finished"), "{}", lines.seen);
-            lines.child.wait().unwrap();
-            events_of(folder.path(), name)
-        });
-        assert!(here.len() > 20, "{name}");
-        assert_eq!(here, there, "{name}");
-    }
 }
