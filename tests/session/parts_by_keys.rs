@@ -402,8 +402,10 @@ max_gap_h = 72
     let pairs = |of: Vec<Json>| of.iter().filter(|a| a["level"].is_null()).count();
     assert_eq!(pairs(completed(folder)), if parts == 2 { 3 } else { 0 });
     let mut terminal = start_with(folder, &more);
-    typed(&mut terminal, "P01", "next: session two, one of 2");
+    typed(&mut terminal, "P01", "┃ P01");
+    terminal.wait_for("next: session two, one of 2");
     terminal.keys("\u{15}");
+    terminal.wait_until("the empty field", |s| !s.contains("┃ P01"));
     play_until(&mut terminal, folder, hears_or_prefers, |s| {
         s.contains("SECOND") && done(folder) == 1
     });
