@@ -4,8 +4,9 @@
 
 use super::report_support::{FIVE, analysis_of, ratings};
 use std::collections::BTreeSet;
-use study_analysis::analyze::Analysis;
+use study_analysis::analyze::{Analysis, Exclusion, Rules, analyze};
 use study_report::figures::{self, Drawn};
+use study_session::outcome::ratings::Ratings;
 
 fn figure(a: &Analysis, name: &str) -> Option<Drawn> {
     figures::all(a, &[]).into_iter().find(|f| f.name == name)
@@ -90,7 +91,8 @@ fn the_bars_of_means_are_within_participants_or_of_adjusted_means() {
 #[test]
 fn every_name_is_whole_in_every_figure() {
     let a = thirty();
-    for drawn in figures::all(&a, &[]) {
+    let all = figures::all(&a, &[]).into_iter();
+    for drawn in all.filter(|drawn| drawn.name != "participants") {
         for figure in [&drawn.wide, &drawn.narrow] {
             let svg = figure.to_svg();
             assert!(!svg.contains('…'), "{}: a name is cut", drawn.name);
@@ -176,4 +178,40 @@ fn files_of_figures_say_what_the_data_are() {
     assert_eq!(said(&a), "simulated data, no participants");
     (a.counts.pilots, a.counts.simulated) = (a.counts.participants, 0);
     assert_eq!(said(&a), "pilot data, no participants");
+}
+
+/// Counted by hand; the sum of what is left out, without a rating and analyzed is what is on record.
+#[test]
+fn the_flow_of_participants_says_who_is_left_out() {
+    let csv = "subject,model,repetition,rating,vaf\n\
+               S1,a,1,2,0.5\nS1,b,1,4,0.6\nS1,c,1,6,0.7\n\
+               S2,a,1,1,0.5\nS2,b,1,,0.6\nS2,c,1,7,0.7\n\
+               S3,a,1,4,0.5\nS3,b,1,4,0.6\nS3,c,1,4,0.7\n";
+    let ratings = Ratings::read_csv("data.csv", csv.as_bytes(), None).unwrap();
+    let rules = Rules {
+        exclude: vec![Exclusion::ConstantRater],
+        ..Rules::default()
+    };
+    let flow = figure(&analyze(&ratings, &rules), "participants").unwrap();
+    let rule = Exclusion::ConstantRater.to_string();
+    let expected = format!(
+        "group,step,reason,participants,trials\n,recorded,,3,9\n,participants left out,rule {rule},1,3\n\
+         ,without a rating,,1,1\n,analyzed,,2,5\n"
+    );
+    assert_eq!(flow.data.replace("\r\n", "\n"), expected);
+    for picture in [flow.wide.to_svg(), flow.narrow.to_svg()] {
+        let words: Vec<&str> = picture.split(['<', '>']).collect();
+        for line in ["On record", "Analyzed"] {
+            assert!(words.contains(&line), "{picture}");
+        }
+    }
+    // Long reasons and group names are broken, not cut.
+    let mut grouped = ratings.clone();
+    for (i, subject) in grouped.subjects.iter_mut().enumerate() {
+        subject.group = Some(format!("{}{}", "x".repeat(90), i % 2));
+    }
+    let flow = figure(&analyze(&grouped, &Rules::default()), "participants").unwrap();
+    let svg = flow.narrow.to_svg();
+    let letters = svg.matches('x').count();
+    assert!(letters >= 2 * 2 * 90, "{svg}");
 }

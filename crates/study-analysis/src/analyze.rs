@@ -25,6 +25,7 @@ mod effects;
 mod exclude;
 mod factorial;
 pub mod findings;
+mod flow;
 mod headline;
 mod identifiers;
 mod influence;
@@ -63,6 +64,7 @@ pub use deviation::{Deviation, PreregisteredRule, deviations};
 pub use effects::MAX_PAIRED;
 pub use exclude::Applied;
 pub use findings::{Finding, Pair, Question, Test, TestKind, Verdict};
+pub use flow::{Flow, Share};
 pub use identifiers::{group_id, pair_id};
 pub use outcomes::OutcomeAnswer;
 pub use select::{Counts, Include, Reason};
@@ -260,6 +262,8 @@ pub struct Analysis {
     pub realizations: Vec<RealizationSummary>,
     /// Numbers of rows and participants included, excluded, corrected.
     pub counts: Counts,
+    /// Who is left out and what is analyzed: of all participants, then of each group.
+    pub flows: Vec<Flow>,
     /// Every row and whether it is included.
     pub rows: Vec<RowDecision>,
     /// Practice rows, which are never included.
@@ -389,6 +393,7 @@ pub fn analyze_with_progress(ratings: &Ratings, rules: &Rules, progress: &Progre
                 vaf: *vaf,
             })
             .collect(),
+        flows: flow::flows(ratings, &decisions),
         rows: rows_decided,
         practice: Arc::clone(&ratings.practice),
         subjects: ratings.subjects.iter().map(|s| s.id.clone()).collect(),

@@ -7,6 +7,7 @@
 
 mod counts;
 mod factors;
+mod flow;
 mod forest;
 mod functions;
 mod identification;
@@ -37,7 +38,7 @@ use study_stats::describe::mean;
 pub const MAX_DRAWN: usize = 60;
 
 /// File names of all figures, without extension.
-pub const NAMES: [&str; 13] = [
+pub const NAMES: [&str; 14] = [
     "factors",
     "fig10-means",
     // Of earlier versions: now below fig10-means.
@@ -52,6 +53,7 @@ pub const NAMES: [&str; 13] = [
     "outcomes",
     "rendering",
     "telemetry",
+    "participants",
 ];
 
 /// A figure, ready to be written.
@@ -132,6 +134,7 @@ pub fn all(a: &Analysis, traces: &[Trace]) -> Vec<Drawn> {
         outcomes::outcomes(&scene),
         rendering::rendering(&scene),
         traces::traces(&scene, traces),
+        flow::participants(a),
     ]
     .into_iter()
     .flatten();
