@@ -205,10 +205,16 @@ impl Comparing {
         }
     }
 
-    /// A number for a level, with two digits; a level of 0 or less feels like a hundredth.
-    fn estimate(&mut self, level: f64) -> Answer {
+    /// A number for a level, with two digits; a level of 0 or less feels like a hundredth. `standard`: a level and its number,
+    /// in place of the rater's own.
+    fn estimate(&mut self, level: f64, standard: Option<(f64, f64)>) -> Answer {
         let noise = ESTIMATE_NOISE * self.noise * self.stream.normal();
-        let logarithm = self.modulus + self.exponent * libm::log(level.max(0.01)) + noise;
+        let felt = |level: f64| self.exponent * libm::log(level.max(0.01));
+        let of_1 = match standard {
+            Some((standard, modulus)) => libm::log(modulus) - felt(standard),
+            None => self.modulus,
+        };
+        let logarithm = of_1 + felt(level) + noise;
         let estimate = libm::exp(logarithm);
         let digit = libm::pow(10.0, libm::floor(libm::log10(estimate)) - 1.0);
         Answer::Number((estimate / digit).round() * digit)
@@ -266,13 +272,17 @@ impl Rater {
         }
         let known = self.effect == Effect::BuiltIn;
         match (protocol.part(part).map(|part| &part.task), trial.model()) {
-            (Some(Task::Magnitude(_)), Some(model)) => {
+            (Some(Task::Magnitude(own)), Some(model)) => {
                 // The opinion of a realization stands for its level; 1 is the middle of the scale.
-                let opinion = || Some(percepts.impression(model)?.opinion(part.as_str()));
-                let level = protocol.level_of(model);
-                let level = level.or_else(|| Some(opinion()?.max(0.5) / MIDPOINT));
-                let level = level.filter(|_| known);
-                return Some(self.comparing.estimate(level.unwrap_or(1.0)));
+                let level = |model: &ModelId| {
+                    let opinion = || Some(percepts.impression(model)?.opinion(part.as_str()));
+                    let level = protocol.level_of(model);
+                    let level = level.or_else(|| Some(opinion()?.max(0.5) / MIDPOINT));
+                    level.filter(|_| known).unwrap_or(1.0)
+                };
+                let standard = own.standard.as_ref();
+                let standard = standard.map(|own| (level(&own.model), own.modulus));
+                return Some(self.comparing.estimate(level(model), standard));
             }
             (Some(Task::Mushra(_)), Some(model)) => {
                 let key = (part.clone(), model.clone());

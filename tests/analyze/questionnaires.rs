@@ -114,6 +114,65 @@ fn magnitudes_of_realizations_are_estimated_and_compared() {
     );
 }
 
+/// Estimates after a standard refer to its number: the geometric mean of the standard itself is near it, whatever scale
+/// the participants would choose.
+#[test]
+fn estimates_after_a_standard_refer_to_its_number() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        let (code, out, err) = study(arguments, folder.path());
+        assert_eq!(code, 0, "{out}{err}");
+        (out, err)
+    };
+    run(&["new", "--seed", "20261128", "m", "--kind", "magnitude"]);
+    let path = folder.path().join("m/protocol.toml");
+    let text = fs::read_to_string(&path).unwrap();
+    let with = text
+        .replace(
+            "range = [0.25, 1.7] ",
+            "levels = [0.25, 0.5, 0.75, 1.0, 1.7] ",
+        )
+        .replace("steps = 7\n", "")
+        .replace(
+            "family = \"detent\" ",
+            "standard = 0.5\nmodulus = 120\nfamily = \"detent\" ",
+        );
+    fs::write(&path, &with).unwrap();
+    let (out, _) = run(&["check", "m"]);
+    assert!(
+        out.contains("says 120, the number of the standard"),
+        "{out}"
+    );
+    let said = with.replace(
+        "How strong did it feel?",
+        "The first one is 120. How strong was the second one?",
+    );
+    fs::write(&path, said).unwrap();
+    let (out, _) = run(&["check", "m"]);
+    assert!(!out.contains("the number of the standard"), "{out}");
+    run(&["rehearse", "m", "--participants", "12", "--out", "out"]);
+    run(&["verify", "out"]);
+    let document = analyzed(folder.path());
+    let values = &document["parts"][0]["values"];
+    let mean = |level: &str| {
+        let id = format!("magnitude/level/{level}/geometric_mean");
+        values[&id]
+            .as_f64()
+            .unwrap_or_else(|| panic!("no {id} in {values:#}"))
+    };
+    assert!((mean("0.5") / 120.0).ln().abs() < 0.15, "{}", mean("0.5"));
+    assert!(mean("0.25") < 100.0 && mean("1.7") > 180.0);
+    let (out, _) = run(&["analyze", "out"]);
+    assert!(!out.is_empty());
+    let page = fs::read_to_string(folder.path().join("out/my-study/analysis/report.html"));
+    let page =
+        page.or_else(|_| fs::read_to_string(folder.path().join("out/m/analysis/report.html")));
+    assert!(
+        page.unwrap()
+            .contains("after the standard 0.5, whose number was 120")
+    );
+}
+
 /// A question of yes and no as the primary one: means are shares of the stated answer.
 #[test]
 fn the_share_of_an_answer_is_analyzed() {

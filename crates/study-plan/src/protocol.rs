@@ -29,6 +29,7 @@ pub mod parts;
 pub mod phrases;
 pub mod plan;
 pub mod power;
+pub mod presentations;
 pub mod procedures;
 pub mod question;
 pub mod questionnaires;
@@ -50,10 +51,10 @@ pub use kinds::QuestionKind;
 pub use outcomes::{Answers, BetterEnd, Clock, Measure, OutcomeRules, Telemetry, Transform};
 pub use pairs::{IntervalOrder, Pairs};
 pub use parts::{
-    Compared, Exposure, FamilyRules, FitRules, Interval, Method, Mushra, Part, Presentations, Task,
-    TrackRules, Vary,
+    Compared, Exposure, FamilyRules, FitRules, Interval, Method, Part, Task, TrackRules, Vary,
 };
 pub use plan::{Seat, Stimuli, Trial};
+pub use presentations::{Magnitude, Mushra, Presentations, Standard};
 pub use question::Question;
 pub use questionnaires::{Inventory, Questionnaire};
 pub use relative::Relative;

@@ -31,7 +31,7 @@ pub use crate::protocol::{Seat, Trial};
 pub use requeue::{Felt, Requeued, breaks_constraint, requeue};
 
 use crate::protocol::{
-    Drawn, FileOrders, Identification, Mushra, PartsOrder, Protocol, Stimuli, Task,
+    Drawn, FileOrders, Identification, Magnitude, Mushra, PartsOrder, Protocol, Stimuli, Task,
 };
 use constraints::Violation;
 use pairs::PairOrders;
@@ -294,7 +294,9 @@ impl Planner {
             let design = protocol.design_of(id);
             let kind = match &part.task {
                 Task::Rating(own)
-                | Task::Magnitude(own)
+                | Task::Magnitude(Magnitude {
+                    presentations: own, ..
+                })
                 | Task::Mushra(Mushra {
                     presentations: own, ..
                 })

@@ -15,7 +15,8 @@ use study_analysis::preregister::{
 use study_analysis::study::{describe_realizations, is_rated};
 use study_base::text::{Untrusted, capital, counted, escaped_json};
 use study_plan::protocol::pairs::IntervalOrder;
-use study_plan::protocol::parts::{Part, Presentations, Task, TrackRules};
+use study_plan::protocol::parts::{Part, Task, TrackRules};
+use study_plan::protocol::presentations::{Presentations, Standard};
 use study_plan::protocol::{
     Assign, Drawn, Feedback, Identification, Order, Protocol, Question, Role, Scale, SessionPlan,
     Unfinished,
@@ -401,7 +402,18 @@ fn trials(p: &Protocol, part: &Part) -> String {
     };
     match &part.task {
         Task::Rating(own) => each(own, "rating"),
-        Task::Magnitude(own) => each(own, "magnitude estimation"),
+        Task::Magnitude(own) => {
+            let of = each(&own.presentations, "magnitude estimation");
+            match &own.standard {
+                None => of,
+                Some(standard) => {
+                    let Standard { model, modulus } = standard;
+                    format!(
+                        "{of}; {model} is felt first in each trial and has the number {modulus}"
+                    )
+                }
+            }
+        }
         Task::Mushra(own) => each(&own.presentations, "rating beside a reference"),
         Task::Identification(own) => format!(
             "{}, each is given one of {}{}, {}",

@@ -7,8 +7,8 @@ use std::fmt::Write as _;
 use study_base::text::{ModelId, PartId, Untrusted, counted};
 use study_plan::procedure::{Rule, Staircase};
 use study_plan::protocol::{
-    Identification, Interval, IntervalOrder, Mushra, Pairs, Part, PartsOrder, Protocol, SearchTask,
-    Stimuli, Task, TrackRules, Trial,
+    Identification, Interval, IntervalOrder, Magnitude, Mushra, Pairs, Part, PartsOrder, Protocol,
+    SearchTask, Stimuli, Task, TrackRules, Trial,
 };
 use study_report::study::search_rule;
 
@@ -46,7 +46,10 @@ pub(super) fn render(protocol: &Protocol, plans: &Plans, width: usize) -> String
         let _ = writeln!(out, "\nPart {}", part.id);
         match &part.task {
             Task::Rating(task)
-            | Task::Magnitude(task)
+            | Task::Magnitude(Magnitude {
+                presentations: task,
+                ..
+            })
             | Task::Mushra(Mushra {
                 presentations: task,
                 ..

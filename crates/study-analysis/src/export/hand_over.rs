@@ -307,7 +307,11 @@ fn settings(
                 put(&format!("ties {}", part.id), ties);
             }
             Task::Magnitude(own) => {
-                let levels = own.models.iter().any(|m| protocol.level_of(m).is_some());
+                let levels = own
+                    .presentations
+                    .models
+                    .iter()
+                    .any(|m| protocol.level_of(m).is_some());
                 let of = if levels { "levels" } else { "realizations" };
                 put(&format!("estimates {}", part.id), of);
             }

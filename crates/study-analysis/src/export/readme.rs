@@ -54,14 +54,21 @@ pub(super) fn methods(job: &Job<'_>) -> String {
                 counted(p.models.len(), "realization was", "realizations were"),
                 counted(p.repetitions as usize, "time", "times")
             ),
-            Task::Magnitude(p) => format!(
-                "{} felt {} and given a number above 0",
-                match p.models.iter().any(|m| protocol.level_of(m).is_some()) {
+            Task::Magnitude(own) => {
+                let p = &own.presentations;
+                let felt = match p.models.iter().any(|m| protocol.level_of(m).is_some()) {
                     true => counted(p.models.len(), "level was", "levels were"),
                     false => counted(p.models.len(), "realization was", "realizations were"),
-                },
-                counted(p.repetitions as usize, "time", "times")
-            ),
+                };
+                let times = counted(p.repetitions as usize, "time", "times");
+                match &own.standard {
+                    None => format!("{felt} felt {times} and given a number above 0"),
+                    Some(standard) => format!(
+                        "{felt} felt {times} and given a number above 0, each after {}, whose number was {}",
+                        standard.model, standard.modulus
+                    ),
+                }
+            }
             Task::Mushra(p) => format!(
                 "{} rated from 0 to 100 beside a reference {}",
                 counted(

@@ -6,7 +6,8 @@ use crate::analyze::{Include, Rules};
 use study_base::rng::Stream;
 use study_base::text::{ModelId, PartId, ParticipantId, QuestionId};
 use study_plan::protocol::pairs::Pairs;
-use study_plan::protocol::parts::{Part, Presentations, Task, TrackRules};
+use study_plan::protocol::parts::{Part, Task, TrackRules};
+use study_plan::protocol::presentations::Presentations;
 use study_plan::protocol::{Answer, GroupRules, ModelEntry, Protocol, Role, Scale};
 use study_session::outcome::ratings::{Ratings, Realization, Row, Subject};
 use study_session::outcome::{IntervalRow, RatingRow};
@@ -168,7 +169,8 @@ struct Made<'a> {
 impl Made<'_> {
     fn part(&mut self, part: &Part, who: Who<'_>) {
         match &part.task {
-            Task::Rating(own) | Task::Magnitude(own) => self.presentations(part, own, who),
+            Task::Rating(own) => self.presentations(part, own, who),
+            Task::Magnitude(own) => self.presentations(part, &own.presentations, who),
             Task::Mushra(own) => self.presentations(part, &own.presentations, who),
             Task::Identification(own) => self.presentations(part, &own.presentations, who),
             Task::Pairs(pairs) => self.pairs(part, pairs, who),

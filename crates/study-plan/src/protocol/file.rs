@@ -28,6 +28,7 @@ mod questionnaires;
 mod questions;
 mod resolve;
 mod spaces;
+mod standard;
 mod track_rules;
 mod tracks;
 

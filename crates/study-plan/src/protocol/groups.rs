@@ -117,7 +117,7 @@ impl Protocol {
                     // The levels of a family belong to all groups.
                     Task::Magnitude(task) => {
                         let stays = |m: &ModelId| models.contains(m) || self.level_of(m).is_some();
-                        task.models.retain(stays);
+                        task.presentations.models.retain(stays);
                     }
                     Task::Pairs(task) => task.keep(models),
                     // The hidden reference stays, whatever the group rates.

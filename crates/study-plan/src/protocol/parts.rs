@@ -6,7 +6,8 @@
 //! [`crate::procedure`].
 
 use super::keys::words;
-use super::{Answer, Design, Identification, Order, Pairs, Protocol, Relative, SearchTask, Seat};
+use super::presentations::{Magnitude, Mushra, Presentations};
+use super::{Answer, Design, Identification, Pairs, Protocol, Relative, SearchTask, Seat};
 use crate::procedure::{Ladder, ProcedureError, Rule, Track};
 use serde::{Deserialize, Serialize};
 use study_base::rng::Stream;
@@ -37,7 +38,7 @@ pub enum Task {
     /// One realization is felt and rated.
     Rating(Presentations),
     /// One level of a family, or one realization, is felt and given a positive number.
-    Magnitude(Presentations),
+    Magnitude(Magnitude),
     /// One realization is rated from 0 to 100 beside a reference.
     Mushra(Mushra),
     /// One realization is felt, and one of several labels is chosen for it.
@@ -53,50 +54,24 @@ pub enum Task {
     Search(SearchTask),
 }
 
-/// Which realizations a part with one rating a trial presents, and in which order.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Presentations {
-    /// The realizations.
-    pub models: Vec<ModelId>,
-    /// How the order is made; never from a file.
-    pub order: Order,
-    /// Trials of each.
-    pub repetitions: u32,
-    /// Largest number of consecutive trials with the same realization.
-    pub max_run: Option<u32>,
-    /// Least distance between two positions of the same realization.
-    pub min_distance: Option<u32>,
-    /// Realizations of the practice trials.
-    pub practice: Vec<ModelId>,
-}
-
-/// Which realizations are rated beside which reference.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Mushra {
-    /// Felt before the realization in each trial.
-    pub reference: Option<ModelId>,
-    /// The realizations, a hidden reference among them.
-    #[serde(flatten)]
-    pub presentations: Presentations,
-}
-
 impl Task {
     /// The realizations of a part whose trials each present one.
     pub fn presentations(&self) -> Option<&Presentations> {
         match self {
-            Self::Rating(own) | Self::Magnitude(own) => Some(own),
+            Self::Rating(own) => Some(own),
+            Self::Magnitude(own) => Some(&own.presentations),
             Self::Mushra(own) => Some(&own.presentations),
             Self::Identification(own) => Some(&own.presentations),
             Self::Pairs(_) | Self::Discrimination { .. } | Self::Search(_) => None,
         }
     }
 
-    /// The reference that is felt before each realization.
+    /// The reference or standard that is felt before each realization.
     pub fn reference(&self) -> Option<&ModelId> {
         match self {
             Self::Mushra(own) => own.reference.as_ref(),
+            Self::Magnitude(own) => own.standard.as_ref().map(|standard| &standard.model),
             Self::Rating(_)
-            | Self::Magnitude(_)
             | Self::Identification(_)
             | Self::Pairs(_)
             | Self::Discrimination { .. }

@@ -28,15 +28,24 @@ fn trials(protocol: &Protocol, part: &Part) -> String {
     match &part.task {
         Task::Rating(_) => {}
         Task::Magnitude(own) => {
-            let levels = own.models.iter().any(|m| protocol.level_of(m).is_some());
-            let (one, many) = match levels {
+            let presented = &own.presentations;
+            let is_level = |model| protocol.level_of(model).is_some();
+            let (one, many) = match presented.models.iter().any(is_level) {
                 true => ("level", "levels"),
                 false => ("realization", "realizations"),
             };
+            let beside = match &own.standard {
+                None => String::new(),
+                Some(standard) => {
+                    let level = protocol.level_of(&standard.model);
+                    let felt = level.map_or(standard.model.to_string(), |level| level.to_string());
+                    format!(" after the standard {felt}, whose number was {}", standard.modulus)
+                }
+            };
             text.push(format!(
-                "In each trial one of {} was felt and given a number above 0, each {one} in {}.",
-                counted(own.models.len(), one, many),
-                counted(own.repetitions as usize, "trial", "trials")
+                "In each trial one of {} was felt{beside} and given a number above 0, each {one} in {}.",
+                counted(presented.models.len(), one, many),
+                counted(presented.repetitions as usize, "trial", "trials")
             ));
         }
         Task::Mushra(own) => {

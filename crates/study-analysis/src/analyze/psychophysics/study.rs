@@ -27,7 +27,8 @@ use crate::analyze::warning::Warning;
 use std::collections::{BTreeMap, BTreeSet};
 use study_base::text::{ModelId, PartId, ParticipantId, counted};
 use study_plan::protocol::pairs::Pairs;
-use study_plan::protocol::parts::{Part, Presentations, Task, TrackRules};
+use study_plan::protocol::parts::{Part, Task, TrackRules};
+use study_plan::protocol::presentations::Presentations;
 use study_plan::protocol::{Answer, Protocol, Role};
 use study_session::outcome::RatingRow;
 use study_stats::describe::{is_constant, mean};
@@ -145,7 +146,12 @@ fn of_part_task(
 ) -> Option<Found> {
     match &part.task {
         Task::Rating(own) => of_ratings(study, part, own, rows),
-        Task::Magnitude(own) => Some(of_magnitudes(study.protocol, part, own, (rows, rules))),
+        Task::Magnitude(own) => Some(of_magnitudes(
+            study.protocol,
+            part,
+            &own.presentations,
+            (rows, rules),
+        )),
         Task::Mushra(own) => Some(of_mushra(study.protocol, part, &own.presentations, rows)),
         Task::Identification(own) => Some(of_identification(study, part, own, rows)),
         Task::Pairs(pairs) => Some(of_pairs(study, part, pairs, rows, intervals, rules)),

@@ -3,8 +3,8 @@
 use super::{Spans, answers_s, counted_out, pace};
 use crate::procedure::{Rule, Staircase};
 use crate::protocol::{
-    DeviceKind, Identification, IntervalOrder, Method, Mushra, Part, Protocol, Question, Role,
-    Task, TrackRules,
+    DeviceKind, Identification, IntervalOrder, Magnitude, Method, Mushra, Part, Protocol, Question,
+    Role, Task, TrackRules,
 };
 use study_base::diagnostic::Fault;
 use study_base::text::{ModelId, PartId, counted};
@@ -41,7 +41,9 @@ pub(super) fn trials(protocol: &Protocol, part: &Part) -> u32 {
     };
     match &part.task {
         Task::Rating(own)
-        | Task::Magnitude(own)
+        | Task::Magnitude(Magnitude {
+            presentations: own, ..
+        })
         | Task::Mushra(Mushra {
             presentations: own, ..
         }) => all(own.models.len(), own.repetitions) + all(own.practice.len(), 1),
@@ -63,8 +65,8 @@ pub(super) fn trials(protocol: &Protocol, part: &Part) -> u32 {
 /// before each trial.
 pub(super) fn seconds(protocol: &Protocol, part: &Part, reference_s: f64) -> f64 {
     let intervals = match &part.task {
-        Task::Rating(_) | Task::Magnitude(_) | Task::Identification(_) => 1,
-        Task::Mushra(own) => 1 + usize::from(own.reference.is_some()),
+        Task::Rating(_) | Task::Identification(_) => 1,
+        Task::Magnitude(_) | Task::Mushra(_) => 1 + usize::from(part.task.reference().is_some()),
         Task::Pairs(_) | Task::Search(_) => 2,
         Task::Discrimination { tracks: ids } => tracks(protocol, ids)
             .map(|track| track.method.sequences()[0].len())
@@ -106,6 +108,7 @@ pub(super) fn warnings(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Faul
         let place = spans.get(&format!("parts[{i}].id")).cloned();
         let doubts = [
             magnitudes(protocol, part),
+            unsaid_modulus(protocol, part),
             few_names(protocol, part),
             counted_out::trials(part),
             counted_out::practice(part),
@@ -150,7 +153,10 @@ fn presented(protocol: &Protocol, model: &ModelId) -> bool {
 pub fn is_about_realizations(protocol: &Protocol) -> bool {
     let about = |part: &Part| match &part.task {
         Task::Discrimination { .. } | Task::Identification(_) | Task::Search(_) => false,
-        Task::Magnitude(own) => own.models.iter().all(|m| protocol.level_of(m).is_none()),
+        Task::Magnitude(own) => {
+            let models = &own.presentations.models;
+            models.iter().all(|m| protocol.level_of(m).is_none())
+        }
         Task::Rating(_) | Task::Mushra(_) | Task::Pairs(_) => true,
     };
     let tested = protocol.models.iter().any(|m| m.role == Role::Test);
@@ -163,8 +169,10 @@ fn magnitudes(protocol: &Protocol, part: &Part) -> Option<Fault> {
     let Task::Magnitude(own) = &part.task else {
         return None;
     };
-    let levels = own.models.iter().filter_map(|id| protocol.level_of(id));
-    let levels: Vec<f64> = levels.collect();
+    let levels = &own.presentations.models;
+    let levels: Vec<f64> = (levels.iter())
+        .filter_map(|id| protocol.level_of(id))
+        .collect();
     if levels.is_empty() {
         return None;
     }
@@ -178,6 +186,28 @@ fn magnitudes(protocol: &Protocol, part: &Part) -> Option<Fault> {
             "the part `{id}` has {} levels: an exponent of fewer than {MAGNITUDE_LEVELS} is uncertain",
             levels.len()
         ))
+    })
+}
+
+/// A prompt that does not say the number of the standard.
+fn unsaid_modulus(protocol: &Protocol, part: &Part) -> Option<Fault> {
+    let Task::Magnitude(own) = &part.task else {
+        return None;
+    };
+    let modulus = own.standard.as_ref()?.modulus.to_string();
+    let asked = (protocol.questions.iter()).find(|q| Some(&q.id) == part.asks.first())?;
+    let said = [Some(&asked.prompt), part.text.as_ref()];
+    let numbers = |text: &String| {
+        let digit = |c: char| !(c.is_ascii_digit() || c == '.' || c == ',');
+        let mut words = text.split(digit);
+        words.any(|word| word.trim_matches(['.', ',']).replace(',', ".") == modulus)
+    };
+    (!said.into_iter().flatten().any(numbers)).then(|| {
+        let what = format!(
+            "neither `prompt` nor `text` of the part `{}` says {modulus}, the number of the standard",
+            part.id
+        );
+        Fault::warning(what).hint("participants have to know it")
     })
 }
 

@@ -4,7 +4,7 @@ use super::agree::at;
 use crate::protocol::groups::{Assign, GroupRules, Groups, SessionPlan};
 use crate::protocol::keys::{Id, Key, Kind, Words as _, keys};
 use crate::protocol::section::Section;
-use crate::protocol::{FamilyRules, Identification, Mushra, Part, Task};
+use crate::protocol::{FamilyRules, Identification, Magnitude, Mushra, Part, Task};
 use study_base::diagnostic::table::Document;
 use study_base::diagnostic::{Fault, did_you_mean};
 use study_base::text::{ModelId, PartId};
@@ -157,8 +157,12 @@ pub(super) fn agree(
         for part in parts.iter().filter(own) {
             let (all, left) = match &part.task {
                 // The levels of a family belong to all groups.
-                Task::Magnitude(task) if task.models.iter().any(is_level) => continue,
-                Task::Rating(task) | Task::Magnitude(task) => {
+                Task::Magnitude(task) if task.presentations.models.iter().any(is_level) => continue,
+                Task::Rating(task)
+                | Task::Magnitude(Magnitude {
+                    presentations: task,
+                    ..
+                }) => {
                     let own = task.models.iter().filter(|m| models.contains(m));
                     (task.models.clone(), own.count())
                 }

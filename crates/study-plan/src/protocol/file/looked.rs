@@ -105,27 +105,34 @@ impl Looked<'_> {
         };
         let mut models = Vec::new();
         for level in levels {
-            let found = family.realizations().find(|(_, own)| own == level);
-            let what = match found {
-                Some((id, _)) if !models.contains(&id) => {
-                    models.push(id);
-                    continue;
-                }
-                Some(_) => {
-                    let what = format!("the level {level} is there twice");
-                    self.fault(path, "levels", Fault::error(what));
-                    return None;
-                }
-                None => format!("{level} is no level of the family `{}`", family.id),
-            };
+            let id = self.level(family, *level, (path, "levels"))?;
+            if models.contains(&id) {
+                let what = format!("the level {level} is there twice");
+                self.fault(path, "levels", Fault::error(what));
+                return None;
+            }
+            models.push(id);
+        }
+        Some(models)
+    }
+
+    /// The realization of a level of a family, which a key names.
+    pub(super) fn level(
+        &self,
+        family: &FamilyRules,
+        level: f64,
+        (path, key): (&str, &str),
+    ) -> Option<ModelId> {
+        let found = family.realizations().find(|(_, own)| *own == level);
+        if found.is_none() {
+            let what = format!("{level} is no level of the family `{}`", family.id);
             let far = |own: &f64| (own - level).abs();
             let all = family.ladder.levels().iter().copied();
             let near = all.min_by(|a, b| far(a).total_cmp(&far(b)));
             let near = near.map_or_else(String::new, |near| format!("the nearest level is {near}"));
-            self.fault(path, "levels", Fault::error(what).hint(near));
-            return None;
+            self.fault(path, key, Fault::error(what).hint(near));
         }
-        Some(models)
+        found.map(|(id, _)| id)
     }
 
     /// Reports a part of MUSHRA without one hidden reference, which its screening needs.

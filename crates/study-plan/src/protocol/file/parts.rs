@@ -1,6 +1,7 @@
 //! `[[parts]]`: trials of one kind each.
 
 use super::spaces::RULES;
+use super::standard::{RawStandard, standard};
 use crate::procedure::SearchRule;
 use crate::protocol::keys::{Id, Key, Kind, Shape, Variants, Words as _, keys};
 use crate::protocol::section::{Section, Variant, shapes};
@@ -115,6 +116,16 @@ pub(super) const KINDS: [Variant<RawTask>; 7] = [
             "family": Kind::Id(Id::Part), r#""detent""#;
             /// Levels of the ladder.
             "levels": Kind::NumberList, "[0.5, 1.0, 2.0]", derived("all levels of the ladder");
+            /// The level of the ladder that is felt first in each trial, and whose number is `modulus`. Without a standard
+            /// participants choose their own scale.
+            "standard": Kind::ANY_NUMBER, "1.0";
+            /// The same of realizations, in a part without a family.
+            "reference": Kind::Id(Id::Model), r#""passive""#;
+            /// The number of the standard or reference. The prompt says it.
+            "modulus": Kind::positive(""), "100";
+            /// From the end of the standard to the start of the level. Both are loaded anew in this time, whether they
+            /// differ or not.
+            "gap_s": Kind::positive("s"), "1.5", default("1");
             /// The realizations, by id, in a part without a family.
             "models": Kind::ModelIds, r#"["lambda-0.9991", "lambda-0.9995"]"#, derived("all whose role is not `practice`");
             /// The realizations of the practice trials of the part, in this order.
@@ -237,8 +248,10 @@ pub(super) enum RawTask {
         prompt: String,
         /// With its levels, if they are named.
         family: Option<(PartId, Option<Vec<f64>>)>,
+        standard: Option<RawStandard>,
         /// Its models are empty if none are named.
         presentations: Presentations,
+        gap_s: f64,
     },
     Mushra {
         prompt: String,
@@ -365,11 +378,15 @@ fn magnitude(section: &mut Section<'_, '_>) -> Option<RawTask> {
         let what = format!("`{path}` has `levels` without a family");
         section.fault_at("levels", Fault::error(what).hint("add family = \"…\""));
     }
+    let standard = standard(section, family.is_some());
     let presentations = presentations(section, models, practice);
+    let gap_s = section.number("gap_s");
     Some(RawTask::Magnitude {
         prompt: prompt?,
         family: family.map(|family| (family, levels)),
+        standard: standard?,
         presentations: presentations?,
+        gap_s: gap_s?,
     })
 }
 

@@ -7,11 +7,12 @@ use super::looked::Looked;
 use super::parts::{RawPairs, RawPart, RawTask};
 use super::questions::PartialQuestion;
 use super::spaces::PartialSpace;
+use super::standard::RawStandard;
 use super::tracks::RawTrack;
 use super::{Content, Named};
 use crate::protocol::{
-    Compared, FamilyRules, Identification, Method, Mushra, OrderVersion, Pairs, Part,
-    Presentations, QuestionKind, SearchTask, SpaceRules, Task, TrackRules, kinds,
+    Compared, FamilyRules, Identification, Magnitude, Method, Mushra, OrderVersion, Pairs, Part,
+    Presentations, QuestionKind, SearchTask, SpaceRules, Standard, Task, TrackRules, kinds,
 };
 use study_base::diagnostic::Fault;
 use study_base::diagnostic::table::Document;
@@ -310,11 +311,28 @@ impl Raw {
             }
             RawTask::Magnitude {
                 family,
+                standard,
                 presentations,
+                gap_s,
                 ..
             } => {
                 asks.push(QuestionId::new(id.as_str()).ok()?);
-                let own = match family {
+                let standard = match (standard, family) {
+                    (None, _) => None,
+                    (Some(RawStandard::Level(level, modulus)), Some((family, _))) => {
+                        let family = looked.family(family, families?, path)?;
+                        let model = looked.level(family, *level, (path, "standard"))?;
+                        let modulus = *modulus;
+                        Some(Standard { model, modulus })
+                    }
+                    (Some(RawStandard::Model(model, modulus)), _) => {
+                        looked.model(model, &format!("{path}.reference"));
+                        let (model, modulus) = (model.clone(), *modulus);
+                        Some(Standard { model, modulus })
+                    }
+                    (Some(RawStandard::Level(..)), None) => return None,
+                };
+                let presentations = match family {
                     None => looked.presentations(presentations, path)?,
                     Some((family, levels)) => {
                         let family = looked.family(family, families?, path)?;
@@ -325,7 +343,12 @@ impl Raw {
                         }
                     }
                 };
-                (Task::Magnitude(own), 0.0)
+                let gap_s = if standard.is_some() { *gap_s } else { 0.0 };
+                let task = Magnitude {
+                    standard,
+                    presentations,
+                };
+                (Task::Magnitude(task), gap_s)
             }
             RawTask::Mushra {
                 reference,

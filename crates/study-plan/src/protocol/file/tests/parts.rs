@@ -300,7 +300,7 @@ fn a_manual_device_has_no_levels() {
 }
 
 /// A study with a part of magnitude estimation and one of MUSHRA.
-const SCALES: &str = r#"
+pub(super) const SCALES: &str = r#"
 format = "study-protocol/2"
 study = { id = "s", title = "t", seed = 1 }
 design = { participants = 4 }
@@ -348,9 +348,11 @@ fn magnitudes_are_asked_of_levels_and_mushra_of_realizations_beside_a_reference(
     let Task::Magnitude(own) = &protocol.parts[0].task else {
         panic!()
     };
-    let names: Vec<&str> = own.models.iter().map(|id| id.as_str()).collect();
+    let models = &own.presentations.models;
+    let names: Vec<&str> = models.iter().map(|id| id.as_str()).collect();
     assert_eq!(names, ["detent.4", "detent.2"]);
-    assert_eq!(protocol.level_of(&own.models[0]), Some(4.0));
+    assert_eq!(protocol.level_of(&models[0]), Some(4.0));
+    assert_eq!((&own.standard, protocol.parts[0].gap_s), (&None, 0.0));
     let ask = |id: &str| {
         protocol
             .questions
@@ -535,8 +537,9 @@ fn magnitudes_are_asked_of_realizations_without_a_family() {
         panic!()
     };
     let tests: Vec<_> = protocol.models.iter().map(|m| &m.id).collect();
-    assert!(!own.models.is_empty() && own.models.iter().all(|id| tests.contains(&id)));
-    assert!(own.models.iter().all(|id| protocol.level_of(id).is_none()));
+    let models = &own.presentations.models;
+    assert!(!models.is_empty() && models.iter().all(|id| tests.contains(&id)));
+    assert!(models.iter().all(|id| protocol.level_of(id).is_none()));
     for (to, expected) in [
         (
             "family = \"detent\"\nmodels = [\"c\"]\n",
