@@ -19,9 +19,10 @@ pub use feel::{Feel, at_rest};
 pub use tar::{MAX_BYTES, TarError};
 
 use crate::identify::vaf::score;
+use crate::model::coverage::{Determined, Origin};
 use crate::model::file;
 use crate::model::{Realization, Units};
-use crate::recording::{self, Recording, RecordingError};
+use crate::recording::{self, Recording, RecordingError, mean_and_variance};
 use study_base::diagnostic::{Findings, Severity, table};
 use study_base::hex::sha256;
 use study_base::text::{Untrusted, is_unsafe};
@@ -32,6 +33,9 @@ pub const FORMAT: &str = "study-stimulus/1";
 pub const MANIFEST: &str = "stimulus.toml";
 /// File name of the realization.
 pub const MODEL: &str = "model.toml";
+/// How far the range for which a model says that it was identified may go beyond that of its recordings, as a share of it:
+/// filters change ends and speeds.
+const TRAINED_ROOM: f64 = 0.25;
 /// Most characters of what a person states.
 const MAX_TEXT: usize = 500;
 
@@ -213,10 +217,19 @@ pub enum BundleError {
         own: String,
     },
     #[error(
-        "the model says that it was identified from the recording `{}`, but predicts its force worse than a constant (VAF {vaf:.1}): is it of another target, in other units, or of the opposite sign?",
+        "the model says that it was identified from the recording `{}`, but predicts its force worse than a constant (VAF {vaf:.1}, {bias_n:+.2} N on the average): is it of another target, in other units, or of the opposite sign?",
         Untrusted(.recording)
     )]
-    Misfit { recording: String, vaf: f64 },
+    Misfit {
+        recording: String,
+        vaf: f64,
+        bias_n: f64,
+    },
+    #[error(
+        "the model says that it was identified from {} to {} mm and up to {} mm/s, and its recordings go from {} to {} mm and up to {} mm/s",
+        .stated[0], .stated[1], .stated[2], .found[0], .found[1], .found[2]
+    )]
+    Trained { stated: [f64; 3], found: [f64; 3] },
     #[error("{0} was changed: its SHA-256 is not the one in {MANIFEST}")]
     Changed(String),
     #[error("{MODEL}: {}", Untrusted(.0))]
@@ -541,14 +554,45 @@ fn related(
     kept.sort_by_key(key);
     // That of a turning handle needs a lever arm, which is not known.
     let judged = kept.iter().filter(|_| realization.units == Units::Linear);
-    for Kept { recording, .. } in judged.filter(|kept| kept.purpose == Purpose::Training) {
-        let vaf = score(realization, recording).vaf;
-        if vaf < 0.0 {
-            let recording = recording.name.clone();
-            return Err(BundleError::Misfit { recording, vaf });
+    let training = judged.filter(|kept| kept.purpose == Purpose::Training);
+    let training: Vec<&Recording> = training.map(|kept| &kept.recording).collect();
+    for recording in &training {
+        let score = score(realization, recording);
+        // A constant error is one, although VAF does not see it.
+        let (_, variance) = mean_and_variance(&recording.f_n);
+        if score.vaf < 0.0 || score.residual_n.powi(2) + score.bias_n.powi(2) > variance {
+            return Err(BundleError::Misfit {
+                recording: recording.name.clone(),
+                vaf: score.vaf,
+                bias_n: score.bias_n,
+            });
         }
     }
+    trained(realization, &training)?;
     Ok(kept)
+}
+
+/// Whether the range for which a model says that it was identified is that of its recordings. The speed of one with a term
+/// from a dynamic recording, which is no source of its table, is not known here.
+fn trained(realization: &Realization, recordings: &[&Recording]) -> Result<(), BundleError> {
+    let ranges = recordings.iter().map(|recording| recording.range_mm());
+    let Some([low, high]) = ranges.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]) else {
+        return Ok(());
+    };
+    let top = (recordings.iter()).fold(0.0, |top: f64, r| r.top_speed_mm_s().max(top));
+    let dynamic = |term: &Determined| term.origin == Origin::Dynamic;
+    let elsewhere = realization.provenance.terms.values().any(dynamic);
+    let stated = realization.trained;
+    let room_mm = TRAINED_ROOM * (high - low);
+    let wide = stated.x_mm[0] < low - room_mm || stated.x_mm[1] > high + room_mm;
+    let fast = !elsewhere && stated.v_mm_s > (1.0 + TRAINED_ROOM) * top;
+    if wide || fast {
+        return Err(BundleError::Trained {
+            stated: [stated.x_mm[0], stated.x_mm[1], stated.v_mm_s],
+            found: [low, high, top],
+        });
+    }
+    Ok(())
 }
 
 #[cfg(test)]

@@ -359,6 +359,42 @@ fn a_model_that_has_nothing_to_do_with_its_recording_is_refused() {
     );
 }
 
+/// Such a model would pass every check of its own: 5 N more everywhere, and coverage that no recording has.
+#[test]
+fn a_model_that_says_more_than_its_recording_is_refused() {
+    let changed = |change: &dyn Fn(&mut Realization)| {
+        let mut other = realization(MODEL_FILE.as_bytes()).unwrap();
+        change(&mut other);
+        let recordings = vec![("akko-blue".to_owned(), recording())];
+        let packed = Bundle::pack(file::write(&other).as_bytes(), recordings, stated());
+        packed.map(|_| ()).map_err(|e| e.to_string())
+    };
+    assert_eq!(changed(&|_| {}), Ok(()));
+    let stronger = changed(&|other| {
+        for branch in [&mut other.positive, &mut other.negative] {
+            branch.f0_n.iter_mut().for_each(|force_n| *force_n += 5.0);
+        }
+    });
+    let said = stronger.unwrap_err();
+    assert!(
+        said.contains("worse than a constant") && said.contains("+5.0"),
+        "{said}"
+    );
+    for (what, change) in [
+        (
+            "wider",
+            (|other| other.trained.x_mm = [-10.0, 30.0]) as fn(&mut Realization),
+        ),
+        ("faster", |other| other.trained.v_mm_s = 200.0),
+    ] {
+        let said = changed(&change).unwrap_err();
+        assert!(
+            said.contains("and its recordings go from"),
+            "{what}: {said}"
+        );
+    }
+}
+
 #[test]
 fn days_are_those_of_the_calendar() {
     for day in ["2024-02-29", "2000-02-29", "2024-04-30", "2023-12-31"] {

@@ -8,6 +8,12 @@ use super::{Recording, Warning, range, saturation};
 /// A position that moves by more than this share of its range from sample to sample says
 /// nothing of cycles.
 const COARSE: f64 = 0.2;
+/// A cycle whose path is less than this share of the range of the position is jitter of the sensor.
+const SHORT: f64 = 0.5;
+/// Another cycle is far longer if this share of its path is more than the first one's.
+const FAR: f64 = 0.5;
+/// Through so many equal parts of the range of the position, less one, cycles are looked for.
+const LEVELS: u32 = 10;
 /// Less energy per path than this share of the range of the force may be noise.
 const ENERGY_SHARE: f64 = 0.005;
 
@@ -61,44 +67,115 @@ pub struct Energy {
     pub negative: bool,
 }
 
+/// A part of a recording whose ends are at one position.
+#[derive(Debug, Clone, Copy)]
+struct Cycle {
+    first: usize,
+    last: usize,
+    path_mm: f64,
+    /// Whether both ends have the same direction.
+    directed: bool,
+}
+
 impl Recording {
-    /// The energy from the first sample to the last one at the same position and direction, or, if
-    /// the probe only went there and back, to the last one at the same position; `None` if there is
-    /// none, or too few samples before it. Around a cycle a constant
+    /// The energy over a cycle from a position to the last sample at the same position and in the same direction, or, if
+    /// the probe only went there and back, at the same position; `None` if there is none that is long enough, or too few
+    /// samples in it. The position is that of the first sample, or one that far longer cycles pass: a recording can begin
+    /// where no stroke comes back to. Around a cycle a constant
     /// force does no work; its middle is left out, because no cycle of samples closes exactly. What a
     /// mass took up because the speed is another one is no work of the target.
     pub fn energy(&self) -> Option<Energy> {
+        let x = &self.x_mm;
+        let [left, right] = range(x);
+        let cycle = self.cycle()?;
+        if cycle.path_mm < SHORT * (right - left) {
+            return None;
+        }
+        let [low, high] = range(&self.f_n);
+        let middle = 0.5 * low + 0.5 * high;
+        let mut energy = 0.0;
+        for i in cycle.first + 1..=cycle.last {
+            let mean = 0.5 * (self.f_n[i] - middle) + 0.5 * (self.f_n[i - 1] - middle);
+            energy += mean * (x[i] - x[i - 1]);
+        }
+        let path_mm = cycle.path_mm;
+        if path_mm > COARSE * (right - left) * (cycle.last - cycle.first) as f64 {
+            return None;
+        }
+        let supplied = energy - self.kinetic_n_mm(cycle.first, cycle.last);
+        Some(Energy {
+            supplied_j: 1e-3 * energy,
+            path_mm,
+            negative: supplied < -ENERGY_SHARE * (high - low) * path_mm,
+        })
+    }
+
+    /// The cycle that begins with the first sample, unless one through another position is far longer. Cycles in one
+    /// direction come before there and back.
+    fn cycle(&self) -> Option<Cycle> {
+        let [left, right] = range(&self.x_mm);
+        let levels = (1..LEVELS).map(|k| left + (right - left) * f64::from(k) / f64::from(LEVELS));
+        let others: Vec<Cycle> = levels.flat_map(|at| self.cycles_at(at)).collect();
+        let longest = |directed: bool| {
+            let some = others.iter().filter(|cycle| cycle.directed || !directed);
+            some.max_by(|a, b| a.path_mm.total_cmp(&b.path_mm)).copied()
+        };
+        let any = longest(false);
+        let far = |than: &Cycle| any.is_some_and(|any| than.path_mm < FAR * any.path_mm);
+        let [own, other] = [self.first_cycle(), longest(true)];
+        let fine = |cycle: Option<Cycle>| cycle.filter(|cycle| !far(cycle));
+        fine(own).or_else(|| fine(other)).or(any).or(own)
+    }
+
+    /// From the first sample to the last one at the same position, in the same direction if there is one.
+    fn first_cycle(&self) -> Option<Cycle> {
         let x = &self.x_mm;
         let start = x[0];
         let crossing = |i: &usize| (x[i - 1] - start) * (x[*i] - start) <= 0.0 && x[*i] != x[i - 1];
         let first = (1..x.len()).find(|i| x[*i] != start)?;
         let upwards = x[first] > start;
         let crossings = || (first + 1..x.len()).rev().filter(crossing);
-        let last = crossings()
-            .find(|i| (x[*i] > x[i - 1]) == upwards)
-            .or_else(|| crossings().next())?;
-        let [low, high] = range(&self.f_n);
-        let middle = 0.5 * low + 0.5 * high;
-        let (mut energy, mut path_mm) = (0.0, 0.0);
-        for i in 1..=last {
-            let dx = x[i] - x[i - 1];
-            energy += (0.5 * (self.f_n[i] - middle) + 0.5 * (self.f_n[i - 1] - middle)) * dx;
-            path_mm += dx.abs();
-        }
-        let [left, right] = range(x);
-        if path_mm > COARSE * (right - left) * last as f64 {
-            return None;
-        }
-        Some(Energy {
-            supplied_j: 1e-3 * energy,
-            path_mm,
-            negative: energy - self.kinetic_n_mm(last) < -ENERGY_SHARE * (high - low) * path_mm,
-        })
+        let same = crossings().find(|i| (x[*i] > x[i - 1]) == upwards);
+        let last = same.or_else(|| crossings().next())?;
+        Some(self.cycle_of(0, last, same.is_some()))
     }
 
-    /// The kinetic energy that a mass has more at a sample than at the first one, N·mm, with the
+    /// The longest cycles through a position: upwards, downwards, and there and back.
+    fn cycles_at(&self, at_mm: f64) -> Vec<Cycle> {
+        let x = &self.x_mm;
+        // the first and the last crossing in each direction
+        let mut ends: [Option<(usize, usize)>; 2] = [None; 2];
+        for i in 1..x.len() {
+            let upwards = x[i - 1] < at_mm && x[i] >= at_mm;
+            if upwards || (x[i - 1] > at_mm && x[i] <= at_mm) {
+                let end = &mut ends[usize::from(upwards)];
+                *end = Some((end.map_or(i, |(first, _)| first), i));
+            }
+        }
+        let mut cycles: Vec<Cycle> = (ends.iter().flatten())
+            .filter(|(first, last)| first < last)
+            .map(|&(first, last)| self.cycle_of(first, last, true))
+            .collect();
+        if let [Some(down), Some(up)] = ends {
+            let (first, last) = (down.0.min(up.0), down.1.max(up.1));
+            cycles.push(self.cycle_of(first, last, false));
+        }
+        cycles
+    }
+
+    fn cycle_of(&self, first: usize, last: usize, directed: bool) -> Cycle {
+        let steps = self.x_mm[first..=last].windows(2);
+        Cycle {
+            first,
+            last,
+            path_mm: steps.map(|pair| (pair[1] - pair[0]).abs()).sum(),
+            directed,
+        }
+    }
+
+    /// The kinetic energy that a mass has more at one sample than at another, N·mm, with the
     /// mass that least squares find beside a constant, a spring and a damping.
-    fn kinetic_n_mm(&self, at: usize) -> f64 {
+    fn kinetic_n_mm(&self, from: usize, at: usize) -> f64 {
         let others = [&self.x_mm, &self.v_mm_s].map(|column| centered(column));
         let mut own = centered(&self.a_m_s2);
         let whole = dot(&own, &own);
@@ -113,7 +190,7 @@ impl Recording {
         }
         let mass_kg = (dot(&own, &self.f_n) / left).max(0.0);
         let square = |i: usize| self.v_mm_s[i].powi(2);
-        0.5e-3 * mass_kg * (square(at) - square(0))
+        0.5e-3 * mass_kg * (square(at) - square(from))
     }
 
     /// Whether its energy is negative because of spikes: without them it is not.
@@ -215,6 +292,43 @@ mod tests {
         let flipped = recording(-1.0).energy().unwrap();
         assert!(flipped.negative);
         assert!((flipped.supplied_j + right.supplied_j).abs() < 1e-12);
+    }
+
+    /// A recording that begins at rest where no stroke comes back to, with one step of the encoder: that is no cycle.
+    #[test]
+    fn the_beginning_is_not_taken_for_the_cycle() {
+        for sign in [1.0, -1.0] {
+            let strokes = recording(sign);
+            let mut text = String::from("t_s,x_mm,f_n\n");
+            let mut add = |i: usize, x: f64, f: f64| {
+                text += &format!("{},{x},{f}\n", 1e-3 * i as f64);
+            };
+            for i in 0..1000 {
+                // The force at rest lies on the other side of what one step would give.
+                let step = if i == 500 { 0.05 } else { 0.0 };
+                add(i, -14.0 + step, sign * (-5.6 - 30.0 * step));
+            }
+            // to the first sample of the strokes, which are between −10 and 10 mm
+            for i in 0..200 {
+                let x = -14.0 + 0.07 * i as f64;
+                add(1000 + i, x, sign * (0.4 * x + 1.0));
+            }
+            for (i, (x, f)) in strokes.x_mm.iter().zip(&strokes.f_n).enumerate() {
+                add(1200 + i, *x, *f);
+            }
+            let whole = super::super::read("r", text.as_bytes()).unwrap();
+            let energy = whole.energy().unwrap();
+            assert_eq!(energy.negative, sign < 0.0, "{energy:?}");
+            assert!(energy.path_mm > 60.0, "{energy:?}");
+        }
+        // Rest alone, with jitter, closes nothing.
+        let mut text = String::from("t_s,x_mm,f_n\n");
+        for i in 0..2000 {
+            let x = f64::from(i) * 0.01 + if i % 7 == 0 { 0.015 } else { 0.0 };
+            text += &format!("{},{x},{}\n", 1e-3 * f64::from(i), 0.2 * x);
+        }
+        let pressed = super::super::read("r", text.as_bytes()).unwrap();
+        assert_eq!(pressed.energy(), None);
     }
 
     /// A press and a release close no cycle in the same direction.

@@ -248,12 +248,13 @@ fn best_in_detail(results: &Identification) -> String {
         ),
     };
     format!(
-        "\nthe {} cell in detail{noticeable}\nsignals: {filter}\n{accuracy}{ceilings}{mechanism}{springs}certificate {}\n    {}\n    m < 0 at {:.0} % of the nodes, b < 0 at {:.0} %\n{}",
+        "\nthe {} cell in detail{noticeable}\nsignals: {}\n{accuracy}{ceilings}{mechanism}{springs}certificate {}\n    {}\n    m < 0 at {:.0} % of the nodes, b < 0 at {:.0} %\n{}",
         if results.cells.len() == 1 {
             "only"
         } else {
             "best"
         },
+        Untrusted(filter),
         cell.certificate,
         required_damping(&cell.certificate),
         100.0 * cell.certificate.negative_mass,
