@@ -289,7 +289,7 @@ impl OutlineBuilder for Outline<'_> {
 /// Embeds the used letters of the font.
 fn embed(pdf: &mut Pdf, glyphs: &GlyphRemapper, used: &BTreeMap<u16, Letter>) {
     #[expect(clippy::unwrap_used, reason = "the font is part of the program")]
-    let subset = subsetter::subset(DATA, 0, glyphs).unwrap();
+    let subset = subsetter::subset(&DATA, 0, glyphs).unwrap();
     // A different name for a different set of letters, so that documents with several
     // figures do not confuse them.
     let mut tag = glyphs
