@@ -62,10 +62,11 @@ model: wire
 archive: identify model recording
 family: model wire
 safe_play: model wire
+swing:
 trajectory: wire
 plant: trajectory wire
 identify: model recording wire
-device: outcome model plant wire
+device: outcome model plant swing wire
 rater: protocol model plant wire
 doctor: device store
 rehearsal: analyze device load protocol rater runner store

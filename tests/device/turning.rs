@@ -42,6 +42,7 @@ fn rehearsed(home: &Path, wrong: Wrong, loads: [u32; 2]) -> (PathBuf, Derived) {
         device: Box::new(VirtualDevice::new(options)),
         deliveries: Default::default(),
         device_check: None,
+        self_weighed: None,
         clock: Box::new(clock.clone()),
         threaded: false,
     };

@@ -43,9 +43,12 @@ const BEGUN_MM: f64 = 0.2;
 /// A smaller travel is no swing, mm.
 const LEAST_MM: f64 = 1.0;
 /// Below this speed, as a share of the fastest, a handle that stays so for [`STUCK_S`] has stopped.
-const SLOW: f64 = 0.01;
+const SLOW: f64 = 0.02;
 /// See [`SLOW`], s.
-const STUCK_S: f64 = 0.06;
+const STUCK_S: f64 = 0.015;
+/// A little of each column is added as a row of its own, so that a friction is zero where a swing
+/// that never turns does not tell it from a constant force.
+const RIDGE: f64 = 1e-5;
 /// Fewer samples tell nothing.
 const LEAST_SAMPLES: usize = 100;
 /// Longest time without a sample, s.
@@ -192,11 +195,19 @@ fn moving(all: &[Point]) -> Result<Moving, NoSwing> {
     if end < LEAST_SAMPLES || travel_mm < LEAST_MM {
         return Err(NoSwing::Rests);
     }
+    // where an encoder does not move, the direction is that of before
+    let mut side: Vec<f64> = Vec::with_capacity(end);
+    for v in &speeds[..end] {
+        side.push(match (*v == 0.0, side.last()) {
+            (true, last) => last.copied().unwrap_or(0.0),
+            (false, _) => v.signum(),
+        });
+    }
     let from_s = own[0].t_s;
     Ok(Moving {
         t_s: own.iter().map(|p| p.t_s - from_s).collect(),
         x_mm: own.iter().map(|p| p.x_mm).collect(),
-        side: speeds[..end].iter().map(|v| v.signum()).collect(),
+        side,
         from_s,
         travel_mm,
     })
@@ -268,6 +279,13 @@ fn fit(swings: &[&[Point]], moving: &[Moving], lag_s: f64) -> Option<Fit> {
         }
         right.extend(way_mm);
         from += own.t_s.len();
+    }
+    for at in 0..columns.len() {
+        let size = columns[at].iter().map(|x| x * x).sum::<f64>().sqrt();
+        for (n, column) in columns.iter_mut().enumerate() {
+            column.push(if n == at { RIDGE * size } else { 0.0 });
+        }
+        right.push(0.0);
     }
     let (solution, sum) = least_squares(columns, right)?;
     Some(Fit {

@@ -15,7 +15,8 @@ pub mod ratings;
 pub mod rows;
 
 pub use event::{
-    Author, Channel, Choice, Entry, Event, Failure, FormId, Moment, Playback, STEP_BACK, Start,
+    Author, Channel, Choice, Entry, Event, Failure, FormId, Moment, Playback, STEP_BACK,
+    SelfWeighed, Start,
     State, TelemetryFile, TrackLevel,
 };
 pub use fidelity::{Defect, Fidelity, Verdict};

@@ -510,6 +510,7 @@ pub(crate) fn claim(protocol: &Protocol, participant: ParticipantId, entries: Ve
         device_kind: protocol.device.kind,
         device_id: "simulated-1".to_owned(),
         device_check: None,
+        self_weighed: None,
         device_telemetry: true,
         assigned: Assigned::default(),
         notices: Vec::new(),
