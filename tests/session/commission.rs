@@ -4,6 +4,7 @@
 //! Each question and each wrong device is tested in virtual time, beside the dialog.
 
 use crate::support::simulator::Simulator;
+use crate::support::{Terminal, changed_protocol};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -122,6 +123,36 @@ fn step<'r>(record: &'r serde_json::Value, what: &str) -> &'r serde_json::Value 
     parts.iter().find(|part| part["what"] == what).unwrap()
 }
 
+/// The motor weighs itself on the free handle before a session, which records it.
+fn weighs_itself(folder: &Path, port: &str) {
+    let changes = [
+        ("study-protocol/1", "study-protocol/3"),
+        ("\"simulated\"", "\"serial\""),
+        ("[device]\n", "[device]\nself_weigh = true\n"),
+    ];
+    changed_protocol("turn-signal", &folder.join("protocol"), &changes);
+    let arguments = ["run", "protocol", "--port", port, "--operator", "lw"];
+    let mut terminal = Terminal::start(&arguments, folder, 24, 80);
+    terminal.wait_for("Type `go` to begin");
+    terminal.keys("go\r");
+    terminal.wait_for("Who takes part?");
+    terminal.keys("\u{15}P01\r");
+    let journal = folder.join("results/turn-signal/sessions/P01/1/journal.jsonl");
+    let text = || std::fs::read_to_string(&journal).unwrap_or_default();
+    terminal.wait_until("the journal", |_| text().contains("self_weighed"));
+    let all = text();
+    let mut events = all
+        .lines()
+        .map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
+    let weighed = events.find(|event| event["event"] == "self_weighed");
+    let weighed = weighed.unwrap_or_else(|| panic!("{all}"));
+    assert_eq!(weighed["ok"], true, "{weighed}");
+    let gain = weighed["gain"].as_f64().unwrap();
+    assert!((gain - 1.0).abs() < 0.03, "{weighed}");
+    let commissioning = weighed["commissioning"].as_str().unwrap();
+    assert!(commissioning.ends_with("-commission"), "{weighed}");
+}
+
 /// Also: a pipe full of answers that were typed before the first question changes nothing, and the
 /// free handle has been at no stop.
 #[test]
@@ -157,6 +188,7 @@ fn the_right_device_passes_and_is_marked_as_simulated() {
         place.contains(" 0 stops") && place.ends_with("0.000 N"),
         "{place}"
     );
+    weighs_itself(folder.path(), &port);
 }
 
 /// A motor that is weak in one direction, and a ruler that shows another scale.
