@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod blinding;
+mod bridges;
 mod by_keys;
 mod channels;
 mod checked;

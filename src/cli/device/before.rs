@@ -2,9 +2,9 @@
 //! itself.
 
 use super::commission::self_weighed;
-use super::record::{RecordKind, Within, commission_doubt, commissionings, doubt, last};
+use super::record::{Record, RecordKind, Within, commission_doubt, commissionings, doubt, last};
 use crate::cli::device_selection::{Tested, commissioned};
-use crate::cli::{Console, Failure};
+use crate::cli::{Console, Failure, Kind};
 use crate::runner::clock::Clock;
 use std::path::Path;
 use study_base::text::Untrusted;
@@ -59,11 +59,11 @@ impl Asked {
 }
 
 /// What the session records of its device, after the motor has weighed itself if the protocol asks
-/// for it.
+/// for it. That is saved among the records of the device, whether the session begins or not.
 ///
 /// # Errors
 /// [`Failure`] if check, commissioning or the motor do not satisfy what is asked, and the user did
-/// not give `--unchecked`.
+/// not give `--unchecked`, or if the record cannot be saved.
 pub(in crate::cli) fn examined(
     device: &mut dyn Device,
     results: &Path,
@@ -87,18 +87,24 @@ pub(in crate::cli) fn examined(
         || (String::new(), Numbers::default()),
         |record| (record.id.clone(), record.numbers().unwrap_or_default()),
     );
-    let (weighed, doubt) =
-        self_weighed(device, (&id, &numbers), &asked.rendering, (console, clock))?;
-    let serial = Untrusted(&tested.serial);
-    match doubt {
-        Some(doubt) if !asked.unchecked => {
-            return Err(Failure::device(format!("{serial}: {doubt}")).hint(
+    let found = self_weighed(device, (&id, &numbers), &asked.rendering, (console, clock))?;
+    let weighed = SelfWeighed {
+        why: found.why.map(|why| why.chars().take(MOST_SAID).collect()),
+        ..found
+    };
+    let serial = tested.serial.clone();
+    let parts = serde_json::to_value(&weighed).map_err(|e| Failure::new(Kind::Bug, e))?;
+    let (kind, said) = (RecordKind::SelfWeighing, weighed.in_words());
+    Record::new(kind, tested, weighed.ok, said, parts).save(results)?;
+    if let Some(why) = &weighed.why {
+        let said = format!("{}: {}", Untrusted(&serial), Untrusted(why));
+        if !asked.unchecked {
+            return Err(Failure::device(said).hint(
                 "`study device commission --port PORT` finds out more; with --unchecked the session goes on, and \
                  its records say so",
             ));
         }
-        Some(doubt) => console.say(format!("warning: {serial}: {}", Untrusted(&doubt))),
-        None => {}
+        console.say(format!("warning: {said}"));
     }
     Ok(Examined {
         check,

@@ -26,6 +26,9 @@ pub(in crate::cli) enum RecordKind {
     Check,
     /// `study device commission`.
     Commission,
+    /// The motor weighed itself before a session.
+    #[serde(rename = "self-weighing")]
+    SelfWeighing,
 }
 
 impl RecordKind {
@@ -33,6 +36,7 @@ impl RecordKind {
         match self {
             Self::Check => "check",
             Self::Commission => "commission",
+            Self::SelfWeighing => "self-weighing",
         }
     }
 }

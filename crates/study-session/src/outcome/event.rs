@@ -246,7 +246,7 @@ pub const STEP_BACK: &str = "step back";
 /// How a motor that weighed itself before a session compares with its commissioning.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SelfWeighed {
-    /// Id of the record of the commissioning.
+    /// Id of the record of the commissioning; empty if there is none.
     pub commissioning: String,
     /// Whether it is as it was; `false` also if that is not known.
     pub ok: bool,
@@ -271,7 +271,9 @@ impl SelfWeighed {
             self.apparent_kg
                 .map(|kg| format!("apparent mass {kg:.3} kg")),
         );
-        parts.push(format!("against {}", self.commissioning));
+        if !self.commissioning.is_empty() {
+            parts.push(format!("against {}", self.commissioning));
+        }
         parts.extend(self.why.clone());
         parts.join(", ")
     }

@@ -1,29 +1,23 @@
 //! Before a session the motor weighs itself, and is compared with its commissioning.
 
-use super::LAST;
 use super::desk::Terminal;
 use super::rig::{Rig, Stop, safe};
 use super::swing::{Swung, swing};
+use super::{LAST, is_late};
 use crate::cli::device_selection::Tested;
 use crate::cli::{Console, Failure};
 use crate::runner::clock::Clock;
 use study_device::Device;
-use study_device::commission::{NoSelfWeighing, Numbers};
+use study_device::commission::{NoSelfWeighing, Numbers, SelfWeighing};
+use study_haptics::swing::NoSwing;
 use study_plan::protocol::RenderingRules;
 use study_session::outcome::SelfWeighed;
 
-/// How often a swing that somebody touched is repeated.
+/// How often the swings are begun, if somebody touches the handle or this computer is late.
 const TRIES: usize = 3;
 
-/// What came of it.
-pub(super) struct Found {
-    /// For the record of the session.
-    pub(super) weighed: SelfWeighed,
-    /// Why the session should not begin; `None` if the motor is as it was.
-    pub(super) doubt: Option<String>,
-}
-
-/// Asks for the free handle and lets the motor weigh itself.
+/// Asks for the free handle and lets the motor weigh itself. If it is not as it was at its
+/// commissioning, whose id and numbers are given, or if that is not known, `why` says so.
 ///
 /// # Errors
 /// [`Failure`] if nobody answers any more or the dialog is left.
@@ -32,7 +26,11 @@ pub(in crate::cli) fn self_weighed(
     (id, numbers): (&str, &Numbers),
     rules: &RenderingRules,
     (console, clock): (&mut Console, &dyn Clock),
-) -> Result<(SelfWeighed, Option<String>), Failure> {
+) -> Result<SelfWeighed, Failure> {
+    if !device.identity().telemetry {
+        let why = "it reports no samples, so that its motor cannot weigh itself";
+        return Ok(unknown(id, why));
+    }
     let serial = Tested::of(device).serial;
     let desk = Terminal::open(console, clock)?;
     let mut rig = Rig::new(device, Box::new(desk));
@@ -43,7 +41,19 @@ pub(in crate::cli) fn self_weighed(
     let found = weigh(&mut rig, id, numbers, rules).map_err(Stop::failure)?;
     // the session begins with a device that is limp and has said so
     rig.settle(LAST);
-    Ok((found.weighed, found.doubt))
+    Ok(found)
+}
+
+/// What is recorded of a motor that could not be compared.
+fn unknown(id: &str, why: impl Into<String>) -> SelfWeighed {
+    SelfWeighed {
+        commissioning: id.to_owned(),
+        ok: false,
+        gain: None,
+        lag_ms: None,
+        apparent_kg: None,
+        why: Some(why.into()),
+    }
 }
 
 /// The dialog.
@@ -52,80 +62,87 @@ pub(super) fn weigh(
     id: &str,
     numbers: &Numbers,
     rules: &RenderingRules,
-) -> Result<Found, Stop> {
-    let of = |doubt: String| Found {
-        weighed: SelfWeighed {
-            commissioning: id.to_owned(),
-            ok: false,
-            gain: None,
-            lag_ms: None,
-            apparent_kg: None,
-            why: Some(doubt.clone()),
-        },
-        doubt: Some(doubt),
-    };
+) -> Result<SelfWeighed, Stop> {
     let (Some(before), Some(stroke_mm)) = (numbers.swing, numbers.stroke_mm) else {
-        return Ok(of(
-            "its commissioning has no swing, so that the motor cannot be compared".to_owned(),
+        return Ok(unknown(
+            id,
+            match id {
+                "" => "it was never commissioned, so that its motor cannot be compared",
+                _ => "its commissioning has no swing, so that its motor cannot be compared",
+            },
         ));
     };
     let mut why = String::new();
-    for _ in 0..TRIES {
+    for left in (0..TRIES).rev() {
         if !rig.may_go(
             "The handle will move by itself, four times, by about 10 mm to each side. Take your hand off it, \
              and let nothing touch it.",
         )? {
-            return Ok(of("the self-weighing was left out".to_owned()));
+            return Ok(unknown(id, "the self-weighing was left out"));
         }
         let swung = swing(rig, before.plan, stroke_mm);
         rig.ended()?;
-        let found = match swung {
-            Swung::Weighed(found) => found,
-            Swung::Not(touched) => {
-                why = match touched {
-                    NoSelfWeighing::Touched(..) => {
-                        "a hand or something else was at the handle".to_owned()
-                    }
-                    NoSelfWeighing::NoSwing(_) => {
-                        "the handle did not swing: a hand was at it, or it sticks, or the motor gives no force"
-                            .to_owned()
-                    }
-                    other => other.to_string(),
-                };
-                rig.say(&format!("{why}. Once more:"))?;
-                continue;
+        why = match swung {
+            Swung::Weighed(found) => {
+                let weighed = compared(id, &before.found, &found, rules);
+                rig.say(match weighed.ok {
+                    true => "The motor is as it was.",
+                    false => "The motor is not as it was.",
+                })?;
+                return Ok(weighed);
             }
-            Swung::Trouble(trouble) => return Ok(of(format!("the device gave up: {trouble}"))),
+            Swung::Trouble(trouble) if is_late(&trouble) => {
+                "This computer was late, and the device gives no force then, as it has to".to_owned()
+            }
+            Swung::Trouble(trouble) => {
+                return Ok(unknown(id, format!("the device gave up: {trouble}")));
+            }
+            Swung::Not(NoSelfWeighing::Touched(..)) => {
+                "a hand or something else was at the handle".to_owned()
+            }
+            Swung::Not(NoSelfWeighing::NoSwing(NoSwing::Rests | NoSwing::NotDetermined)) => {
+                "the handle did not swing: a hand was at it, or it sticks, or the motor gives no force"
+                    .to_owned()
+            }
+            Swung::Not(other) => other.to_string(),
         };
-        let [gain, lag_ms] = found.since(&before.found);
-        let [least, most] = rules.gain;
-        let doubt = if !(least..=most).contains(&gain) {
-            Some(format!(
-                "its motor gives {:.0} % of the force of its commissioning",
-                100.0 * gain
-            ))
-        } else if lag_ms.abs() > rules.max_delay_ms {
-            Some(format!(
-                "its force comes {lag_ms:.0} ms later than at its commissioning"
-            ))
-        } else {
-            None
-        };
-        rig.say(match doubt {
-            Some(_) => "The motor is not as it was.",
-            None => "The motor is as it was.",
-        })?;
-        return Ok(Found {
-            weighed: SelfWeighed {
-                commissioning: id.to_owned(),
-                ok: doubt.is_none(),
-                gain: Some(gain),
-                lag_ms: Some(lag_ms),
-                apparent_kg: Some(found.apparent_kg),
-                why: doubt.clone(),
-            },
-            doubt,
-        });
+        rig.limp();
+        if left > 0 {
+            rig.say(&format!("{why}. Once more:"))?;
+        }
     }
-    Ok(of(why))
+    Ok(unknown(id, why))
+}
+
+/// The motor now against that of the commissioning.
+fn compared(
+    id: &str,
+    before: &SelfWeighing,
+    found: &SelfWeighing,
+    rules: &RenderingRules,
+) -> SelfWeighed {
+    let [gain, lag_ms] = found.since(before);
+    let [least, most] = rules.gain;
+    let why = if !(least..=most).contains(&gain) {
+        Some(format!(
+            "its motor gives {:.0} % of the force of its commissioning",
+            100.0 * gain
+        ))
+    } else if lag_ms.abs() > rules.max_delay_ms {
+        let when = if lag_ms > 0.0 { "later" } else { "earlier" };
+        Some(format!(
+            "its force comes {:.0} ms {when} than at its commissioning",
+            lag_ms.abs()
+        ))
+    } else {
+        None
+    };
+    SelfWeighed {
+        commissioning: id.to_owned(),
+        ok: why.is_none(),
+        gain: Some(gain),
+        lag_ms: Some(lag_ms),
+        apparent_kg: Some(found.apparent_kg),
+        why,
+    }
 }

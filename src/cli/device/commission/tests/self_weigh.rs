@@ -7,6 +7,7 @@ use study_base::rng::Stream;
 use study_device::commission::{NoSelfWeighing, SelfWeighing, SwingNumbers, SwingPlan};
 use study_device::firmware::Motor;
 use study_plan::protocol::RenderingRules;
+use study_session::outcome::SelfWeighed;
 
 /// A handle and its motor.
 #[derive(Debug, Clone, Copy)]
@@ -84,7 +85,7 @@ fn commissioned_swing(built: Built, seed: u64) -> Result<SwingNumbers, String> {
 }
 
 /// What a session finds; also where the handle has been.
-fn before_session(built: Built, seed: u64, swing: SwingNumbers) -> (Seen, Place) {
+fn before_session(built: Built, seed: u64, swing: SwingNumbers) -> (SelfWeighed, Place) {
     let device = built.device(seed);
     let (script, said) = Script::new(&device, Box::new(says_go));
     let mut own = device.clone();
@@ -98,19 +99,7 @@ fn before_session(built: Built, seed: u64, swing: SwingNumbers) -> (Seen, Place)
     let found = weigh(&mut rig, "c1", &numbers, &rules);
     drop(rig);
     let found = found.unwrap_or_else(|_| panic!("{}", said.borrow()));
-    let seen = Seen {
-        gain: found.weighed.gain,
-        lag_ms: found.weighed.lag_ms,
-        doubt: found.doubt,
-    };
-    (seen, device.place())
-}
-
-#[derive(Debug)]
-struct Seen {
-    gain: Option<f64>,
-    lag_ms: Option<f64>,
-    doubt: Option<String>,
+    (found, device.place())
 }
 
 /// The sorted sizes, and what is the median, the 95th percentile and the largest.
@@ -142,7 +131,7 @@ fn weak_and_late_motors_are_found_and_no_right_one_is_accused() {
         let right = built.later(&mut stream, Motor::default());
         let (found, place) = before_session(right, n as u64 + 1000, swing);
         assert_eq!(place.stops, 0, "{n} {right:?}");
-        if found.doubt.is_some() {
+        if found.why.is_some() {
             accused.push(format!("{n} {right:?}: {found:?} {swing:?}"));
         }
         let motor = Motor {
@@ -165,7 +154,7 @@ fn weak_and_late_motors_are_found_and_no_right_one_is_accused() {
             _ => unseen.push(format!("{n} {wrong:?}: {found:?}")),
         }
         let is_wrong = !(0.9..=1.1).contains(&motor.gain) || motor.lag_s > 0.008;
-        if is_wrong && found.doubt.is_none() {
+        if is_wrong && found.why.is_none() {
             unseen.push(format!("{n} {wrong:?}: {found:?}"));
         }
     }
@@ -185,45 +174,68 @@ fn weak_and_late_motors_are_found_and_no_right_one_is_accused() {
     assert!(spread(lags)[2] < 3.0);
 }
 
+/// What is found before a session with somebody; also what was said.
+fn asked(device: &Shared, numbers: &Numbers, person: Person<'_>) -> (SelfWeighed, String) {
+    let (script, said) = Script::new(device, person);
+    let mut own = device.clone();
+    let mut rig = Rig::new(&mut own, Box::new(script));
+    let found = weigh(&mut rig, "c1", numbers, &RenderingRules::default()).unwrap();
+    drop(rig);
+    let said = said.borrow().clone();
+    (found, said)
+}
+
+/// A device and the numbers of its commissioning.
+fn commissioned_before() -> (Shared, Numbers) {
+    let built = Built::draw(&mut Stream::new(5, &["one"]));
+    let numbers = Numbers {
+        stroke_mm: Some(STROKE_MM),
+        swing: Some(commissioned_swing(built, 5).unwrap()),
+        ..Numbers::default()
+    };
+    (built.device(6), numbers)
+}
+
 #[test]
 fn a_hand_on_the_handle_is_said_and_nothing_is_compared() {
-    let built = Built::draw(&mut Stream::new(5, &["one"]));
-    let swing = commissioned_swing(built, 5).unwrap();
-    let device = built.device(6);
+    let (device, numbers) = commissioned_before();
     let person = |said: &str, device: &Shared| {
         device.lock().firmware().hold_at(17.5);
         says_go(said, device)
     };
-    let (script, said) = Script::new(&device, Box::new(person));
-    let mut own = device.clone();
-    let mut rig = Rig::new(&mut own, Box::new(script));
-    let numbers = Numbers {
-        stroke_mm: Some(STROKE_MM),
-        swing: Some(swing),
-        ..Numbers::default()
-    };
-    let found = weigh(&mut rig, "c1", &numbers, &RenderingRules::default()).unwrap();
-    assert!(!found.weighed.ok && found.weighed.gain.is_none());
-    assert!(found.doubt.unwrap().contains("a hand was at it"));
-    assert_eq!(said.borrow().matches("Once more").count(), 3);
+    let (found, said) = asked(&device, &numbers, Box::new(person));
+    assert!(!found.ok && found.gain.is_none());
+    assert!(found.why.unwrap().contains("a hand was at it"));
+    assert_eq!(said.matches("Type `go` to begin").count(), 3);
     // Left out, or without a commissioning, nothing is known.
     let person = |said: &str, _: &Shared| match said.contains("`go` to begin") {
         true => typed(0.5, "skip"),
         false => Typed::new(),
     };
-    let (script, _) = Script::new(&device, Box::new(person));
-    let mut own = device.clone();
-    let mut rig = Rig::new(&mut own, Box::new(script));
-    let found = weigh(&mut rig, "c1", &numbers, &RenderingRules::default()).unwrap();
-    assert!(found.doubt.unwrap().contains("left out"));
-    let found = weigh(
-        &mut rig,
-        "",
-        &Numbers::default(),
-        &RenderingRules::default(),
-    )
-    .unwrap();
-    assert!(found.doubt.unwrap().contains("has no swing"));
+    let (found, _) = asked(&device, &numbers, Box::new(person));
+    assert!(found.why.unwrap().contains("left out"));
+    let loads = device.loads();
+    let (found, said) = asked(&device, &Numbers::default(), Box::new(says_go));
+    assert!(!found.ok && found.why.unwrap().contains("has no swing"));
+    assert_eq!((said.as_str(), device.loads()), ("", loads));
+}
+
+/// A computer that was late says nothing about the motor; another fault is told.
+#[test]
+fn the_swings_are_repeated_if_this_computer_was_late() {
+    let (device, numbers) = commissioned_before();
+    // each swing is the second of two playbacks
+    device.trips_at(4, Fault::Watchdog);
+    let (found, said) = asked(&device, &numbers, Box::new(says_go));
+    assert!(found.ok, "{found:?}");
+    assert_eq!(said.matches("This computer was late").count(), 1, "{said}");
+    assert!(said.ends_with("The motor is as it was.\n"), "{said}");
+    device.trips_at(device.loads() + 4, Fault::Encoder);
+    let (found, _) = asked(&device, &numbers, Box::new(says_go));
+    let why = found.why.unwrap();
+    assert!(why.starts_with("the device gave up: "), "{why}");
+    assert!(why.contains(Fault::Encoder.as_str()), "{why}");
+    assert_eq!(device.lock().held_n(), 0.0);
 }
 
 #[test]
@@ -285,7 +297,7 @@ fn the_page_says_what_finds_each_device_that_no_telemetry_shows() {
             ..Numbers::default()
         };
         let weighed = weigh(&mut rig, "c1", &numbers, &RenderingRules::default()).unwrap();
-        let said = weighed.doubt.unwrap_or_else(|| "as it was".to_owned());
+        let said = weighed.why.unwrap_or_else(|| "as it was".to_owned());
         table.push_str(&format!("| `{name}` | {} | {said} |\n", failed.join("; ")));
         assert_eq!(device.place().stops, 0, "{name}");
     }
