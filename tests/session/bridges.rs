@@ -66,7 +66,9 @@ fn a_session_over(bridge: &str, mock: &[&str], options: &str) {
         // on a computer that is late, too little may be known of the force
         assert_ne!(row["rendering"], "fault", "{row:?}");
     }
-    let telemetry = folder.path().join("results/turn-signal/sessions/P01/1/telemetry");
+    let telemetry = folder
+        .path()
+        .join("results/turn-signal/sessions/P01/1/telemetry");
     assert_eq!(std::fs::read_dir(telemetry).unwrap().count(), 5);
     let told = pages.iter().find(|page| page.contains("lambda"));
     assert_eq!(told, None);

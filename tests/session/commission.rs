@@ -148,7 +148,9 @@ fn told(folder: &Path, terminal: &mut Terminal, participant: &str) -> serde_json
     let of = format!("results/turn-signal/sessions/{participant}/1/journal.jsonl");
     let text = || std::fs::read_to_string(folder.join(&of)).unwrap_or_default();
     let whole = |text: &str| {
-        let mut lines = text.split_inclusive('\n').filter(|line| line.ends_with('\n'));
+        let mut lines = text
+            .split_inclusive('\n')
+            .filter(|line| line.ends_with('\n'));
         lines.find_map(|line| {
             let event: serde_json::Value = serde_json::from_str(line).unwrap();
             (event["event"] == "self_weighed").then_some(event)

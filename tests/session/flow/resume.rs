@@ -4,9 +4,7 @@ use super::rig::{Rig, name};
 use super::studies::{plain, qid, rich};
 use std::collections::BTreeSet;
 use study_plan::protocol::{Answer, Protocol};
-use study_session::outcome::{
-    Author, Choice, Entry, Event, Failure, FormId, SelfWeighed, State,
-};
+use study_session::outcome::{Author, Choice, Entry, Event, Failure, FormId, SelfWeighed, State};
 use study_session::session::{Ending, Input, Screen};
 
 fn screen(rig: &Rig) -> &'static str {
