@@ -153,6 +153,15 @@ fn weak_and_late_motors_are_found_and_no_right_one_is_accused() {
             }
             _ => unseen.push(format!("{n} {wrong:?}: {found:?}")),
         }
+        if (n + 1) % 20 == 0 {
+            println!(
+                "{} of {number}: gain off by {:.4?}, lag by {:.2?} ms; {} accused",
+                n + 1,
+                spread(gains.clone()),
+                spread(lags.clone()),
+                accused.len()
+            );
+        }
         let is_wrong = !(0.9..=1.1).contains(&motor.gain) || motor.lag_s > 0.008;
         if is_wrong && found.why.is_none() {
             unseen.push(format!("{n} {wrong:?}: {found:?}"));
