@@ -25,7 +25,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 use study_base::limits::Limits;
 use study_base::text::{ModelId, ParticipantId};
-use study_device::{Device, Report, Stimulus, manual};
+use study_device::{Report, Stimulus, manual};
 use study_haptics::model::Realization;
 use study_haptics::safe_play;
 use study_plan::protocol::{DeviceKind, ModelEntry, Protocol, Trial};
