@@ -14,7 +14,7 @@ use super::spring::table_of;
 use serde::{Deserialize, Serialize};
 use study_base::limits::{BadLimit, Limits};
 use study_haptics::model::Realization;
-use study_haptics::swing::{NoSwing, Point, estimate};
+use study_haptics::swing::{NoSwing, Point, apparent_kg, estimate};
 use study_session::outcome::Sample;
 use study_wire::servo::ServoSettings;
 
@@ -101,7 +101,29 @@ pub struct SwingPlan {
 /// The number of swings: twice on the softer and on the stiffer spring.
 pub const SWINGS: usize = 4;
 
+/// Above this mass no handle is searched for, kg.
+const MOST_KG: f64 = 1.5;
+
+fn travel_mm([low, high]: [f64; 2]) -> f64 {
+    TRAVEL_MM.min(TRAVEL * (high - low))
+}
+
 impl SwingPlan {
+    /// With what the mass of a handle is searched for, from a guess: springs that pull hard enough
+    /// against its friction, if a handle that is not too heavy would swing on them.
+    pub fn first(guess_kg: f64, friction_n: f64, stroke_mm: [f64; 2]) -> Self {
+        let [_, most] = OMEGA_RAD_S;
+        let least_kg =
+            1.01 * OVER_FRICTION * friction_n / (1e-3 * travel_mm(stroke_mm) * most * most);
+        Self {
+            mass_kg: match least_kg <= MOST_KG {
+                true => guess_kg.max(least_kg),
+                false => guess_kg,
+            },
+            friction_n,
+        }
+    }
+
     /// The spring of the nth swing, for a handle that rests at `at_mm` between the stops.
     ///
     /// # Errors
@@ -118,7 +140,7 @@ impl SwingPlan {
             friction_n,
         } = *self;
         let [low, high] = stroke_mm;
-        let travel_mm = TRAVEL_MM.min(TRAVEL * (high - low));
+        let travel_mm = travel_mm(stroke_mm);
         // the table ends within the stroke
         let clear_mm = CLEAR_MM.min(CLEAR * (high - low)) + (REACH - 1.0) * travel_mm;
         let [from_mm, to_mm] = [low + clear_mm, high - clear_mm];
@@ -251,7 +273,7 @@ pub struct SelfWeighing {
     pub lag_s: f64,
     /// What is left of the motion, root mean square, mm.
     pub residual_mm: f64,
-    /// The masses that each spring alone tells, kg.
+    /// The masses that each spring alone tells with that lag, kg.
     pub alone_kg: [f64; 2],
 }
 
@@ -276,13 +298,13 @@ impl SelfWeighing {
         let points: Vec<Vec<Point>> = (swings.iter())
             .map(|(spring, samples)| spring.points(samples, servo.unwrap_or_default()))
             .collect();
-        let of = |first: usize, step: usize| {
-            let own = points.iter().skip(first).step_by(step);
-            let own: Vec<&[Point]> = own.map(Vec::as_slice).collect();
-            estimate(&own)
+        let points: Vec<&[Point]> = points.iter().map(Vec::as_slice).collect();
+        let all = estimate(&points)?;
+        let alone = |first: usize| {
+            let own: Vec<&[Point]> = points.iter().skip(first).step_by(2).copied().collect();
+            apparent_kg(&own, all.lag_s)
         };
-        let all = of(0, 1)?;
-        let alone_kg = [of(0, 2)?.apparent_kg, of(1, 2)?.apparent_kg];
+        let alone_kg = [alone(0)?, alone(1)?];
         let differ = (alone_kg[0] / alone_kg[1] - 1.0).abs() > APART;
         if differ || all.residual_mm > RESIDUAL * all.travel_mm {
             return Err(NoSelfWeighing::Touched(
@@ -346,6 +368,25 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// A guess that is too light for its friction is no reason not to search.
+    #[test]
+    fn a_search_begins_with_springs_that_are_stiff_enough() {
+        let device = Limits::new(15.0, 1000.0).unwrap();
+        let stroke_mm = [-20.0, 60.0];
+        let guess = SwingPlan {
+            mass_kg: 0.3,
+            friction_n: 0.4,
+        };
+        assert!(guess.spring(1, 17.5, stroke_mm, device).is_err());
+        let first = SwingPlan::first(0.3, 0.4, stroke_mm);
+        assert!(
+            first.spring(1, 17.5, stroke_mm, device).is_ok(),
+            "{first:?}"
+        );
+        assert_eq!(SwingPlan::first(0.3, 0.1, stroke_mm).mass_kg, 0.3);
+        assert_eq!(SwingPlan::first(0.3, 3.0, stroke_mm).mass_kg, 0.3);
     }
 
     #[test]

@@ -75,11 +75,10 @@ pub(super) fn step(rig: &mut Rig<'_>, bench: &mut Bench) -> Result<Made, Stop> {
         return Ok(left_out(what, required).seen(format!("not done, because {why}")));
     }
     let friction_n = bench.numbers.friction_n.unwrap_or(0.0);
-    let mut plan = SwingPlan {
-        mass_kg: rig.told_mass_kg().unwrap_or(FIRST_KG),
-        friction_n,
-    };
+    let guess_kg = rig.told_mass_kg().unwrap_or(FIRST_KG);
+    let mut plan = SwingPlan::first(guess_kg, friction_n, stroke_mm);
     rig.say("\nSelf-weighing. The free handle swings on weak springs, by itself, and its apparent mass is found.")?;
+    let mut last = "it was heavier or lighter each time".to_owned();
     for _ in 0..PLANS {
         if !rig.may_go(&format!(
             "The handle will move by itself, {SWINGS} times, by about 10 mm to each side. Let it go, and take \
@@ -93,7 +92,8 @@ pub(super) fn step(rig: &mut Rig<'_>, bench: &mut Bench) -> Result<Made, Stop> {
                 return Ok(judged(what, required, true, format!("not possible: {why}")));
             }
             Swung::Not(why) => {
-                rig.say(&format!("{why}. Once more:"))?;
+                last = why.to_string();
+                rig.say(&format!("{last}. Once more:"))?;
                 continue;
             }
             Swung::Trouble(why) => return Ok(failed(what, required, why)),
@@ -122,5 +122,6 @@ pub(super) fn step(rig: &mut Rig<'_>, bench: &mut Bench) -> Result<Made, Stop> {
             ),
         ));
     }
-    Ok(failed(what, required, "no swing told a mass"))
+    let why = format!("no swing told a mass: {last}");
+    Ok(failed(what, required, why))
 }

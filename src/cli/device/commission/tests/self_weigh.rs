@@ -66,10 +66,7 @@ fn commissioned_swing(built: Built, seed: u64) -> Result<SwingNumbers, String> {
     let mut device = built.device(seed);
     let (script, _) = Script::new(&device.clone(), Box::new(says_go));
     let mut rig = Rig::new(&mut device, Box::new(script));
-    let mut plan = SwingPlan {
-        mass_kg: 0.3,
-        friction_n: built.friction_n,
-    };
+    let mut plan = SwingPlan::first(0.3, built.friction_n, STROKE_MM);
     for _ in 0..4 {
         let found = match swing(&mut rig, plan, STROKE_MM) {
             Swung::Weighed(found) => found,
@@ -239,7 +236,8 @@ fn the_swings_are_repeated_if_this_computer_was_late() {
     assert!(found.ok, "{found:?}");
     assert_eq!(said.matches("This computer was late").count(), 1, "{said}");
     assert!(said.ends_with("The motor is as it was.\n"), "{said}");
-    device.trips_at(device.loads() + 4, Fault::Encoder);
+    let (device, numbers) = commissioned_before();
+    device.trips_at(4, Fault::Encoder);
     let (found, _) = asked(&device, &numbers, Box::new(says_go));
     let why = found.why.unwrap();
     assert!(why.starts_with("the device gave up: "), "{why}");
