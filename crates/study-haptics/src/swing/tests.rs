@@ -86,7 +86,8 @@ fn both(plant: Plant) -> Result<Swing, NoSwing> {
 /// Against the parameters of the plant.
 #[test]
 fn mass_damping_friction_and_lag_are_those_of_the_plant() {
-    for (mass_kg, friction_n, offset_n) in [(0.5, 0.05, 0.03), (0.3, 0.02, -0.015), (0.9, 0.1, 0.0)] {
+    for (mass_kg, friction_n, offset_n) in [(0.5, 0.05, 0.03), (0.3, 0.02, -0.015), (0.9, 0.1, 0.0)]
+    {
         let plant = Plant {
             mass_kg,
             friction_n,
