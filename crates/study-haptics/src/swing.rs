@@ -36,9 +36,12 @@
 
 /// Lags that are tried, s: from the first to the last in these steps.
 const LAGS_S: [f64; 3] = [-0.01, 0.045, 0.001];
-/// Samples on each side of one from which its direction is taken: over fewer a coarse encoder tells none
-/// while the handle turns.
-const APART: usize = 12;
+/// Samples on each side of one from which its direction is taken, least and most: one for each
+/// [`STEP_MM`] of the encoder's steps. Over fewer a coarse encoder tells none while the handle turns;
+/// over more it turns at another time, since friction brakes it before and after.
+const APART: [usize; 2] = [4, 12];
+/// See [`APART`], mm.
+const STEP_MM: f64 = 0.004;
 /// A handle that has moved less than this has not begun to swing, mm.
 const BEGUN_MM: f64 = 0.2;
 /// A smaller travel is no swing, mm.
@@ -179,10 +182,11 @@ fn moving(all: &[Point]) -> Result<Moving, NoSwing> {
         return Err(NoSwing::Samples);
     }
     let begun = (all.iter()).position(|p| (p.x_mm - first.x_mm).abs() > BEGUN_MM);
-    let begun = begun.ok_or(NoSwing::Rests)?.max(APART);
-    let last = all.len().saturating_sub(APART + 1);
+    let apart = apart(all);
+    let begun = begun.ok_or(NoSwing::Rests)?.max(apart);
+    let last = all.len().saturating_sub(apart + 1);
     let speed = |i: usize| {
-        let (before, after) = (all[i - APART], all[i + APART]);
+        let (before, after) = (all[i - apart], all[i + apart]);
         (after.x_mm - before.x_mm) / (after.t_s - before.t_s)
     };
     let speeds: Vec<f64> = (begun..last).map(speed).collect();
@@ -227,6 +231,16 @@ fn moving(all: &[Point]) -> Result<Moving, NoSwing> {
         from_s,
         travel_mm,
     })
+}
+
+/// See [`APART`].
+fn apart(all: &[Point]) -> usize {
+    let steps_mm = all
+        .windows(2)
+        .map(|pair| (pair[1].x_mm - pair[0].x_mm).abs());
+    let step_mm = steps_mm.filter(|mm| *mm > 1e-9).fold(f64::MAX, f64::min);
+    let [least, most] = APART;
+    ((step_mm / STEP_MM).ceil() as usize).clamp(least, most)
 }
 
 /// A least-squares problem with its lag.
