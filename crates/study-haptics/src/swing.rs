@@ -52,7 +52,7 @@ const SLOW: f64 = 0.03;
 const STUCK_S: f64 = 0.01;
 /// The end of a swing below this speed, as a share of the fastest, is left out: where a handle creeps,
 /// an encoder does not tell when it stopped, and friction does not act afterwards.
-const CREEPS: f64 = 0.15;
+const CREEPS: f64 = 0.25;
 /// A little of each column is added as a row of its own, so that a friction is zero where a swing
 /// that never turns does not tell it from a constant force.
 const RIDGE: f64 = 1e-5;
