@@ -72,12 +72,12 @@ pub(super) fn weigh(
             },
         ));
     };
-    let mut why = String::new();
-    for left in (0..TRIES).rev() {
-        if !rig.may_go(
-            "The handle will move by itself, four times, by about 10 mm to each side. Take your hand off it, \
-             and let nothing touch it.",
-        )? {
+    let (mut why, mut again) = (String::new(), String::new());
+    for _ in 0..TRIES {
+        if !rig.may_go(&format!(
+            "{again}The handle will move by itself, four times, by about 10 mm to each side. Take your hand off it, \
+             and let nothing touch it."
+        ))? {
             return Ok(unknown(id, "the self-weighing was left out"));
         }
         let swung = swing(rig, before.plan, stroke_mm);
@@ -107,9 +107,7 @@ pub(super) fn weigh(
             Swung::Not(other) => other.to_string(),
         };
         rig.limp();
-        if left > 0 {
-            rig.say(&format!("{why}. Once more:"))?;
-        }
+        again = format!("{why}. Once more: ");
     }
     Ok(unknown(id, why))
 }

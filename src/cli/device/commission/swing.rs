@@ -12,8 +12,8 @@ use study_session::outcome::Sample;
 const FIRST_KG: f64 = 0.3;
 /// The mass of the plan is right if the one that is found is within this factor.
 const NEAR: f64 = 1.25;
-/// How often a plan is made anew.
-const PLANS: usize = 4;
+/// How often the swings are begun, with a plan that is made anew or for another reason.
+const PLANS: usize = 6;
 /// Largest lag of a motor, s.
 const LAG_S: f64 = 0.01;
 
@@ -79,9 +79,10 @@ pub(super) fn step(rig: &mut Rig<'_>, bench: &mut Bench) -> Result<Made, Stop> {
     let mut plan = SwingPlan::first(guess_kg, friction_n, stroke_mm);
     rig.say("\nSelf-weighing. The free handle swings on weak springs, by itself, and its apparent mass is found.")?;
     let mut last = "it was heavier or lighter each time".to_owned();
+    let mut again = String::new();
     for _ in 0..PLANS {
         if !rig.may_go(&format!(
-            "The handle will move by itself, {SWINGS} times, by about 10 mm to each side. Let it go, and take \
+            "{again}The handle will move by itself, {SWINGS} times, by about 10 mm to each side. Let it go, and take \
              away everything that hangs at it."
         ))? {
             return Ok(left_out(what, required));
@@ -93,7 +94,7 @@ pub(super) fn step(rig: &mut Rig<'_>, bench: &mut Bench) -> Result<Made, Stop> {
             }
             Swung::Not(why) => {
                 last = why.to_string();
-                rig.say(&format!("{last}. Once more:"))?;
+                again = format!("{last}. Once more: ");
                 continue;
             }
             Swung::Trouble(why) => return Ok(failed(what, required, why)),
@@ -102,10 +103,10 @@ pub(super) fn step(rig: &mut Rig<'_>, bench: &mut Bench) -> Result<Made, Stop> {
         let ratio = found.apparent_kg / plan.mass_kg;
         if !(1.0 / NEAR..=NEAR).contains(&ratio) {
             plan.mass_kg = found.apparent_kg;
-            rig.say(&format!(
-                "About {:.2} kg; the springs are chosen for it. Once more:",
+            again = format!(
+                "About {:.2} kg; the springs are chosen for it. Once more: ",
                 found.apparent_kg
-            ))?;
+            );
             continue;
         }
         bench.numbers.swing = Some(SwingNumbers { plan, found });
