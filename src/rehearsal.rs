@@ -181,6 +181,7 @@ pub fn rehearse(
                     _ => with_manual_samples(simulated(device_seed, options), &protocol),
                 },
                 device_check: None,
+                self_weighed: None,
                 clock: Box::new(clock.clone()),
                 threaded: false,
             };

@@ -14,26 +14,24 @@ mod judging;
 mod loading;
 pub mod rehearsal;
 pub mod saver;
+mod setup;
 mod standstill;
 
-use clock::Clock;
+pub use setup::Setup;
+
 use loading::Slot;
 use saver::{Job, SaveEvent, Saver};
 use std::collections::{BTreeMap, VecDeque};
-use std::ops::RangeInclusive;
-use std::sync::Arc;
 use std::time::Duration;
 use study_base::limits::Limits;
-use study_base::text::{ModelId, PartId, ParticipantId};
-use study_device::{Device, Report, Stimulus, manual};
-use study_haptics::identify::delivery::Delivery;
+use study_base::text::{ModelId, ParticipantId};
+use study_device::{Report, Stimulus, manual};
 use study_haptics::model::Realization;
 use study_haptics::safe_play;
-use study_plan::protocol::fingerprint::Fingerprints;
-use study_plan::protocol::{DeviceKind, FileOrders, ModelEntry, Protocol, Trial};
+use study_plan::protocol::{DeviceKind, ModelEntry, Protocol, Trial};
 use study_session::outcome::{Channel, Event, Sample};
 use study_session::session::{Effect, Ending, Input, Screen, Session, Unsaved, View, input::Claim};
-use study_session::store::{ClaimRequest, Copies, Plan, Receipt, SeatKind, StudyFolder};
+use study_session::store::{ClaimRequest, Copies, Plan, Receipt, StudyFolder};
 
 /// Longest wait for an input while nothing else is expected: clocks on the screen move.
 const IDLE: Duration = Duration::from_millis(100);
@@ -76,40 +74,6 @@ fn exposure_left(view: &View) -> Duration {
         }
         _ => Duration::MAX,
     }
-}
-
-/// Everything that a session needs.
-pub struct Setup {
-    /// The protocol.
-    pub protocol: Arc<Protocol>,
-    /// Presentation orders, if they come from a file.
-    pub orders: Option<Arc<FileOrders>>,
-    /// Realizations by their id in the protocol, with the levels of families.
-    pub models: BTreeMap<ModelId, Realization>,
-    /// What is needed for the VAF of what is delivered, where there is a validation
-    /// recording.
-    pub deliveries: BTreeMap<ModelId, Delivery>,
-    /// Fingerprints of the protocol.
-    pub fingerprints: Fingerprints,
-    /// The folder of the study.
-    pub study: StudyFolder,
-    /// Whether data are real, pilot or simulated.
-    pub kind: SeatKind,
-    /// The rows that may be assigned; `None`: all.
-    pub rows: Option<RangeInclusive<u32>>,
-    /// The group that the experimenter gives to a new participant.
-    pub group: Option<PartId>,
-    /// The kind of `device`.
-    pub device_kind: DeviceKind,
-    /// The playback device.
-    pub device: Box<dyn Device>,
-    /// Result of its last commissioning, recorded in the session's first event.
-    pub device_check: Option<String>,
-    /// The clock.
-    pub clock: Box<dyn Clock>,
-    /// Whether a thread saves. Without it every event is on disk before the next input,
-    /// as a rehearsal on a virtual clock requires.
-    pub threaded: bool,
 }
 
 /// How a session ended.
@@ -351,6 +315,7 @@ impl Runner {
                     device_kind: self.setup.device_kind,
                     device_id: identity.id,
                     device_check: self.setup.device_check.clone(),
+                    self_weighed: self.setup.self_weighed.clone(),
                     device_telemetry: identity.telemetry,
                     assigned: claimed.assigned,
                     notices: claimed.notices,

@@ -62,10 +62,11 @@ model: wire
 archive: identify model recording
 family: model wire
 safe_play: model wire
+swing:
 trajectory: wire
 plant: trajectory wire
 identify: model recording wire
-device: outcome model plant wire
+device: outcome model plant swing wire
 rater: protocol model plant wire
 doctor: device store
 rehearsal: analyze device load protocol rater runner store
@@ -75,7 +76,7 @@ tui: runner page session outcome protocol
 plain: runner page session outcome protocol tui
 screen: runner page session protocol
 front: runner page session protocol
-cli: analyze archive check device doctor export front identify import load model outcome plain plant power procedure protocol rater recording rehearsal rendering report runner schedule screen session stats store study trajectory tui wire
+cli: analyze archive check device doctor export front identify import load model outcome plain plant power procedure protocol rater recording rehearsal rendering report runner schedule screen session stats store study swing trajectory tui wire
 main: cli
 certificate: predict
 predict: real

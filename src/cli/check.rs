@@ -94,6 +94,17 @@ fn asked_of_devices(protocol: &Protocol) -> String {
             ),
         };
     }
+    if device.self_weigh {
+        out += &match has_force {
+            true => {
+                "note: the motor weighs itself before each session, on the free handle\n".to_owned()
+            }
+            false => format!(
+                "note: `self_weigh` asks nothing of a {} device\n",
+                device.kind.as_str()
+            ),
+        };
+    }
     if let Some(hours) = device.check_within_h.filter(|_| has_force) {
         out += &format!(
             "note: a session needs a device that passed `study device check --save` within {hours} h\n"

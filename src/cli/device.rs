@@ -1,11 +1,12 @@
 //! `study device`: ports, device tests and the simulated device.
 
+pub(super) mod before;
 mod check;
 mod commission;
 mod hold;
 pub(super) mod port;
 mod program;
-pub(super) mod record;
+mod record;
 mod rendered;
 mod rendering;
 mod safety;

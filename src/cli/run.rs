@@ -7,7 +7,7 @@ mod unrendered;
 mod unsaved;
 
 use super::console::shell_command;
-use super::device::record;
+use super::device::before;
 use super::device_selection::{self, DeviceArgs, WaitDisplay};
 use super::{Console, Failure, Kind, study_folder};
 use crate::plain::Plain;
@@ -166,7 +166,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     };
     let opened = device_selection::open(address, kind, &loaded.protocol, &mut waiting);
     drop(waiting);
-    let Some(device) = opened? else {
+    let Some(mut device) = opened? else {
         return console.out("Nothing was recorded.\n");
     };
     unrendered::refuse_unrendered(&device.identity(), kind, &loaded)?;
@@ -174,10 +174,10 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     for notice in said {
         console.say(format!("warning: {}", Untrusted(&notice)));
     }
-    let asked = record::Asked::of(&loaded.protocol.device, kind, args.unchecked);
-    let device_check = record::examined(&*device, &args.results, asked, at.wall, console)?;
+    let asked = before::Asked::of(&loaded.protocol.device, kind, args.unchecked);
+    let examined = before::examined(&mut *device, &args.results, asked, console, &*clock)?;
     let device_check = match times {
-        1 => device_check,
+        1 => examined.check,
         _ => Some(hurry::mark(times)),
     };
     // A person feels nothing on the simulated device: such data are never real.
@@ -223,6 +223,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         group: args.group.clone(),
         device_kind: kind,
         device_check,
+        self_weighed: examined.self_weighed,
         device,
         clock,
         threaded: true,

@@ -44,6 +44,7 @@ fn took_part(protocol: &Path, results: &Path, kind: SeatKind, people: &[&str]) {
             device_kind: DeviceKind::Simulated,
             device: Box::new(VirtualDevice::new(Options::seeded(number))),
             device_check: None,
+            self_weighed: None,
             clock: Box::new(clock.clone()),
             threaded: false,
         };

@@ -151,6 +151,7 @@ fn session(falls_silent: bool) -> (Vec<Load>, Vec<serde_json::Value>) {
         device: Box::new(device),
         deliveries: Default::default(),
         device_check: None,
+        self_weighed: None,
         clock: Box::new(clock.clone()),
         threaded: false,
     };

@@ -11,11 +11,22 @@ use study_analysis::load;
 use study_device::firmware::{Wrong, WrongLoads};
 use study_device::virtual_device::{Options, VirtualDevice};
 use study_plan::protocol::DeviceKind;
-use study_session::outcome::{AttemptRow, Failure, RatingRow, Status, Verdict};
+use study_session::outcome::{
+    AttemptEvent, AttemptRow, Failure, RatingRow, SelfWeighed, Status, Verdict,
+};
 use study_session::store::{Derived, Frozen, SeatKind, StudyFolder};
 
 /// The results folder and the tables of a rehearsal of the study of the paper on a device that is wrong at some loads.
 fn rehearsed(home: &Path, wrong: Wrong, loads: [u32; 2]) -> (PathBuf, Derived) {
+    session(home, Some(WrongLoads { wrong, loads }), None)
+}
+
+/// The same, and what the motor told of itself.
+fn session(
+    home: &Path,
+    wrong: Option<WrongLoads>,
+    self_weighed: Option<SelfWeighed>,
+) -> (PathBuf, Derived) {
     let loaded = load::load(Path::new(&repository("protocols/turn-signal"))).unwrap();
     let clock = VirtualClock::starting_at(first_day());
     let frozen = Frozen {
@@ -26,7 +37,7 @@ fn rehearsed(home: &Path, wrong: Wrong, loads: [u32; 2]) -> (PathBuf, Derived) {
     let opened = StudyFolder::open_or_create(home, &frozen, clock.now()).unwrap();
     let folder = opened.path().to_owned();
     let mut options = Options::seeded(11);
-    options.device.wrong = Some(WrongLoads { wrong, loads });
+    options.device.wrong = wrong;
     let percepts = Percepts::of(&loaded.protocol, &loaded.models);
     let protocol = Arc::new(loaded.protocol);
     let setup = Setup {
@@ -42,6 +53,7 @@ fn rehearsed(home: &Path, wrong: Wrong, loads: [u32; 2]) -> (PathBuf, Derived) {
         device: Box::new(VirtualDevice::new(options)),
         deliveries: Default::default(),
         device_check: None,
+        self_weighed,
         clock: Box::new(clock.clone()),
         threaded: false,
     };
@@ -54,6 +66,40 @@ fn rehearsed(home: &Path, wrong: Wrong, loads: [u32; 2]) -> (PathBuf, Derived) {
             .refresh(&protocol)
             .unwrap(),
     )
+}
+
+/// A row of attempts.csv, and not a word in the ratings.
+#[test]
+fn what_the_motor_told_of_itself_is_a_row() {
+    let [home, without] = [(); 2].map(|()| tempfile::tempdir().unwrap());
+    let weighed = SelfWeighed {
+        commissioning: "20260301-090000-commission".to_owned(),
+        ok: false,
+        gain: Some(0.851),
+        lag_ms: Some(0.26),
+        apparent_kg: Some(0.7049),
+        why: Some("its motor gives 85 % of the force of its commissioning".to_owned()),
+    };
+    let (folder, with) = session(home.path(), None, Some(weighed));
+    let (_, without) = session(without.path(), None, None);
+    let is_own = |row: &&AttemptRow| row.what == AttemptEvent::SelfWeighed;
+    let own: Vec<&AttemptRow> = with.attempts.iter().filter(is_own).collect();
+    let [own] = &own[..] else { panic!("{own:?}") };
+    assert_eq!((own.trial, own.attempt, &own.model), (None, None, &None));
+    assert_eq!(
+        own.text,
+        "gain 0.851, lag 0.3 ms, apparent mass 0.705 kg, against 20260301-090000-commission, \
+         its motor gives 85 % of the force of its commissioning"
+    );
+    assert_eq!(with.attempts.len(), without.attempts.len() + 1);
+    let answers = |derived: &Derived| -> Vec<_> {
+        let rows = derived.rows.iter();
+        rows.map(|row| (row.trial, row.model.clone(), row.answers.clone()))
+            .collect()
+    };
+    assert_eq!(answers(&with), answers(&without));
+    let (code, out, err) = study(&["verify", folder.to_str().unwrap()], &folder);
+    assert_eq!(code, 0, "{out}{err}");
 }
 
 fn verdict(row: &RatingRow) -> Option<Verdict> {

@@ -171,6 +171,7 @@ impl Run {
             device_kind: DeviceKind::Simulated,
             device_id: "simulated-1".to_owned(),
             device_check: None,
+            self_weighed: None,
             device_telemetry: true,
             assigned: study_plan::protocol::Assigned::default(),
             notices: Vec::new(),

@@ -97,6 +97,7 @@ fn session(
         device_kind: study_plan::protocol::DeviceKind::Simulated,
         device: device(options),
         device_check: None,
+        self_weighed: None,
         deliveries: Default::default(),
         clock: Box::new(clock.clone()),
         threaded: false,

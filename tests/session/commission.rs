@@ -4,6 +4,7 @@
 //! Each question and each wrong device is tested in virtual time, beside the dialog.
 
 use crate::support::simulator::Simulator;
+use crate::support::{PATIENCE, Terminal, changed_protocol};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -122,6 +123,101 @@ fn step<'r>(record: &'r serde_json::Value, what: &str) -> &'r serde_json::Value 
     parts.iter().find(|part| part["what"] == what).unwrap()
 }
 
+/// A session of a protocol with `self_weigh` up to its first page, or to its refusal. Somebody types `go`
+/// for the swings whenever it is asked for.
+fn run_weighed(folder: &Path, port: &str, more: &[&str]) -> Terminal {
+    let arguments = ["run", "protocol", "--port", port, "--operator", "lw"];
+    let mut terminal = Terminal::start(&[&arguments, more].concat(), folder, 40, 120);
+    let begun = std::time::Instant::now();
+    while terminal.runs() && !terminal.screen().contains("Who takes part?") {
+        let screen = terminal.screen();
+        let last = screen.lines().rev().find(|line| !line.trim().is_empty());
+        if last.is_some_and(|line| line.starts_with("Type `go` to begin")) {
+            terminal.keys("go\r");
+        }
+        assert!(begun.elapsed() < PATIENCE, "{screen}");
+        // what was typed is echoed meanwhile
+        std::thread::sleep(Duration::from_millis(500));
+    }
+    terminal
+}
+
+/// What the journal of a participant's session tells of the motor.
+fn told(folder: &Path, terminal: &mut Terminal, participant: &str) -> serde_json::Value {
+    terminal.keys(&format!("{participant}\r"));
+    let of = format!("results/turn-signal/sessions/{participant}/1/journal.jsonl");
+    let text = || std::fs::read_to_string(folder.join(&of)).unwrap_or_default();
+    let whole = |text: &str| {
+        let mut lines = text
+            .split_inclusive('\n')
+            .filter(|line| line.ends_with('\n'));
+        lines.find_map(|line| {
+            let event: serde_json::Value = serde_json::from_str(line).unwrap();
+            (event["event"] == "self_weighed").then_some(event)
+        })
+    };
+    terminal.wait_until("the journal", |_| whole(&text()).is_some());
+    whole(&text()).unwrap()
+}
+
+/// The motor weighs itself on the free handle before a session, which records it. One that has become
+/// weak since its commissioning is refused in words, and the record of the device says so.
+fn weighs_itself(folder: &Path, mut device: Simulator) {
+    let changes = [
+        ("study-protocol/1", "study-protocol/3"),
+        ("\"simulated\"", "\"serial\""),
+        ("[device]\n", "[device]\nself_weigh = true\n"),
+    ];
+    changed_protocol("turn-signal", &folder.join("protocol"), &changes);
+    let port = device.port.to_str().unwrap().to_owned();
+    device.control("free");
+    let mut terminal = run_weighed(folder, &port, &[]);
+    let weighed = told(folder, &mut terminal, "P01");
+    assert_eq!(weighed["ok"], true, "{weighed}");
+    let gain = weighed["gain"].as_f64().unwrap();
+    assert!((gain - 1.0).abs() < 0.03, "{weighed}");
+    let lag_ms = weighed["lag_ms"].as_f64().unwrap();
+    assert!(lag_ms.abs() < 3.0, "{weighed}");
+    let commissioning = weighed["commissioning"].as_str().unwrap();
+    assert!(commissioning.ends_with("-commission"), "{weighed}");
+    drop(terminal);
+    drop(device);
+
+    let mut weak = Simulator::start(folder, &["--wrong", "weak-motor"]);
+    weak.control("free");
+    let mut terminal = run_weighed(folder, &port, &[]);
+    assert_eq!(terminal.exit_code(), 3, "{}", terminal.screen());
+    let screen = terminal.screen();
+    let words = "% of the force of its commissioning";
+    assert!(screen.contains(words), "{screen}");
+    assert!(screen.contains("study device commission"), "{screen}");
+    let records = folder.join("results/devices/simulated-1");
+    let mut passes: Vec<(String, bool)> = (std::fs::read_dir(records).unwrap())
+        .map(|item| item.unwrap().path())
+        .filter(|path| path.to_str().unwrap().ends_with("-self-weighing.json"))
+        .map(|path| {
+            let text = std::fs::read_to_string(&path).unwrap();
+            let record: serde_json::Value = serde_json::from_str(&text).unwrap();
+            let pass = record["pass"].as_bool().unwrap();
+            assert_eq!(record["kind"], "self-weighing");
+            assert_eq!(record["parts"]["ok"], pass, "{record}");
+            (record["id"].as_str().unwrap().to_owned(), pass)
+        })
+        .collect();
+    passes.sort();
+    let passes: Vec<bool> = passes.iter().map(|(_, pass)| *pass).collect();
+    assert_eq!(passes, [true, false]);
+    let sessions = folder.join("results/turn-signal/sessions");
+    assert_eq!(std::fs::read_dir(sessions).unwrap().count(), 1);
+
+    let mut terminal = run_weighed(folder, &port, &["--unchecked"]);
+    let weighed = told(folder, &mut terminal, "P02");
+    assert_eq!(weighed["ok"], false, "{weighed}");
+    let gain = weighed["gain"].as_f64().unwrap();
+    assert!((gain - 0.5).abs() < 0.03, "{weighed}");
+    assert!(weighed["why"].as_str().unwrap().contains(words));
+}
+
 /// Also: a pipe full of answers that were typed before the first question changes nothing, and the
 /// free handle has been at no stop.
 #[test]
@@ -157,6 +253,7 @@ fn the_right_device_passes_and_is_marked_as_simulated() {
         place.contains(" 0 stops") && place.ends_with("0.000 N"),
         "{place}"
     );
+    weighs_itself(folder.path(), device);
 }
 
 /// A motor that is weak in one direction, and a ruler that shows another scale.

@@ -27,7 +27,7 @@ pub(crate) fn run(folder: &Path, protocol: &Path, more: &[&str]) -> Terminal {
 }
 
 /// Plays a whole session: the pages seen, and the rows of ratings.csv by column.
-fn session(folder: &Path, protocol: &Path, more: &[&str]) -> (Vec<String>, Vec<Row>) {
+pub(crate) fn session(folder: &Path, protocol: &Path, more: &[&str]) -> (Vec<String>, Vec<Row>) {
     let mut terminal = run(folder, protocol, more);
     let seen = play_to_end(&mut terminal, "P01");
     let (code, out, err) = study(&["verify", "results"], folder);
@@ -41,7 +41,7 @@ fn session(folder: &Path, protocol: &Path, more: &[&str]) -> (Vec<String>, Vec<R
 pub(crate) type Row = std::collections::BTreeMap<String, String>;
 
 /// How a trial ended, on which device, and whether it is a pilot's.
-fn felt(row: &Row) -> [&str; 4] {
+pub(crate) fn felt(row: &Row) -> [&str; 4] {
     ["status", "device_kind", "device_id", "pilot"].map(|column| row[column].as_str())
 }
 

@@ -93,6 +93,7 @@ fn session(from: usize, leave: &Input) -> Option<Session> {
         device: Box::new(Manual::default()),
         deliveries: Default::default(),
         device_check: None,
+        self_weighed: None,
         clock: Box::new(clock.clone()),
         threaded: false,
     };

@@ -84,6 +84,7 @@ fn session(exposure: Exposure, clock: VirtualClock, operator: &mut dyn Operator)
         device_kind: DeviceKind::Simulated,
         device: Box::new(VirtualDevice::new(options)),
         device_check: None,
+        self_weighed: None,
         clock: Box::new(clock),
         threaded: false,
     };

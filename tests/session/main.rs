@@ -4,6 +4,7 @@
 
 mod another_build;
 mod blinding;
+mod bridges;
 mod by_keys;
 mod channels;
 mod checked;

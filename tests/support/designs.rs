@@ -52,6 +52,7 @@ pub(crate) fn design(models: usize, repetitions: u32, order: Order) -> Protocol 
             rendering: Default::default(),
             check_within_h: None,
             commissioned_within_days: None,
+            self_weigh: false,
         },
         trial: TrialRules {
             reference: None,

@@ -10,9 +10,13 @@
 
 mod quantity;
 mod spring;
+mod swing;
 
 pub use quantity::{Instrument, Measured, QuantityError, instrument, measured};
 pub use spring::{NoRoom, Stage, VirtualSpring, force_free, stages};
+pub use swing::{
+    LONGEST_LAG_S, NoSelfWeighing, SWINGS, SelfWeighing, SwingNumbers, SwingPlan, SwingSpring,
+};
 
 use serde::{Deserialize, Serialize};
 
@@ -276,6 +280,9 @@ pub struct Numbers {
     pub directions: Vec<DirectionFit>,
     /// Each motion.
     pub travels: Vec<Travel>,
+    /// What the motor told when it weighed itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub swing: Option<SwingNumbers>,
 }
 
 #[cfg(test)]

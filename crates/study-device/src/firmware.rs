@@ -12,12 +12,15 @@
 mod body;
 mod flaw;
 mod free;
+mod motor;
 mod wrong;
 
 use body::Body;
 pub use flaw::Flaw;
 use flaw::FlawInjector;
 pub use free::Place;
+pub use motor::Motor;
+use motor::Pending;
 use std::time::Duration;
 use study_base::limits::Limits;
 use study_haptics::plant::{HandParameters, Parameters, Probe};
@@ -67,6 +70,8 @@ pub struct Options {
     pub clock_ms: u32,
     /// Serial number.
     pub serial: String,
+    /// What the motor makes of a commanded force; telemetry does not show it.
+    pub motor: Motor,
     /// Planted defect.
     pub flaw: Option<Flaw>,
     /// Wrong force.
@@ -91,6 +96,7 @@ impl Default for Options {
             least_mass_kg: -hand.slider_kg,
             clock_ms: 0,
             serial: "simulated-1".to_owned(),
+            motor: Motor::default(),
             flaw: None,
             wrong: None,
         }
@@ -105,6 +111,7 @@ pub struct Firmware {
     options: Options,
     handler: Box<AllHandler>,
     body: Body,
+    motor: Pending,
     /// Servo periods since the beginning.
     ticks: u64,
     period_ns: f64,
@@ -139,6 +146,7 @@ impl Firmware {
         Self {
             handler: Box::new(Handler::new(profile(&options))),
             body: Body::new(&options),
+            motor: Pending::new(options.motor, options.servo_hz),
             ticks: 0,
             period_ns: 1e9 / options.servo_hz,
             started: Duration::ZERO,
@@ -352,9 +360,13 @@ impl Firmware {
         let drive = self.with_handler(at, |handler, now_ms, out| {
             handler.servo(measured, now_ms, out)
         });
-        self.body.drive(match &mut self.saboteur {
+        let drive = match &mut self.saboteur {
             Some(saboteur) => saboteur.drive(drive),
             None => drive,
+        };
+        self.body.drive(match drive {
+            Drive::Force(force_n) => Drive::Force(self.motor.give(force_n)),
+            probe @ Drive::Position { .. } => probe,
         });
     }
 

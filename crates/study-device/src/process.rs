@@ -428,7 +428,7 @@ impl Device for ProcessDevice {
         self.restart(at);
         self.receive(at);
         self.await_free(at);
-        if at.saturating_sub(self.alive_at) >= ALIVE_INTERVAL {
+        if at < self.alive_at || at - self.alive_at >= ALIVE_INTERVAL {
             self.alive_at = at;
             self.send(messages::command("alive", self.load), at);
         }

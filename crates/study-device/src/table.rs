@@ -41,18 +41,18 @@ pub enum TableError {
     ParameterNotFinite(&'static str, &'static str, usize),
 }
 
-/// A table of forces at some positions and one damping, the same in both directions of motion, as
-/// tests of a device play it.
+/// A table of forces and damping at some positions, the same in both directions of motion, as tests
+/// of a device play it.
 pub fn both_ways(
     id: &str,
-    (x_mm, force_n): (Vec<f64>, Vec<f64>),
-    damping_n_s_per_mm: f64,
+    x_mm: Vec<f64>,
+    (force_n, damping_n_s_per_mm): (Vec<f64>, Vec<f64>),
     trained: Trained,
 ) -> Realization {
     let nodes = x_mm.len();
     let branch = Branch {
         m_kg: vec![0.0; nodes],
-        b_n_s_per_mm: vec![damping_n_s_per_mm; nodes],
+        b_n_s_per_mm: damping_n_s_per_mm,
         k_n_per_mm: vec![0.0; nodes],
         f0_n: force_n,
     };

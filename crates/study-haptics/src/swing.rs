@@ -35,17 +35,27 @@
 //! ```
 
 /// Lags that are tried, s: from the first to the last in these steps.
-const LAGS_S: [f64; 3] = [-0.004, 0.045, 0.001];
-/// Samples on each side of one from which its direction is taken.
-const APART: usize = 4;
+const LAGS_S: [f64; 3] = [-0.01, 0.045, 0.001];
+/// Samples on each side of one from which its direction is taken, least and most: one for each
+/// [`STEP_MM`] of the encoder's steps. Over fewer a coarse encoder tells none while the handle turns;
+/// over more it turns at another time, since friction brakes it before and after.
+const APART: [usize; 2] = [4, 12];
+/// See [`APART`], mm.
+const STEP_MM: f64 = 0.004;
 /// A handle that has moved less than this has not begun to swing, mm.
 const BEGUN_MM: f64 = 0.2;
 /// A smaller travel is no swing, mm.
 const LEAST_MM: f64 = 1.0;
 /// Below this speed, as a share of the fastest, a handle that stays so for [`STUCK_S`] has stopped.
-const SLOW: f64 = 0.01;
+const SLOW: f64 = 0.03;
 /// See [`SLOW`], s.
-const STUCK_S: f64 = 0.06;
+const STUCK_S: f64 = 0.01;
+/// The end of a swing below this speed, as a share of the fastest, is left out: where a handle creeps,
+/// an encoder does not tell when it stopped, and friction does not act afterwards.
+const CREEPS: f64 = 0.25;
+/// A little of each column is added as a row of its own, so that a friction is zero where a swing
+/// that never turns does not tell it from a constant force.
+const RIDGE: f64 = 1e-5;
 /// Fewer samples tell nothing.
 const LEAST_SAMPLES: usize = 100;
 /// Longest time without a sample, s.
@@ -137,12 +147,8 @@ pub fn estimate(swings: &[&[Point]]) -> Result<Swing, NoSwing> {
         _ => tried[best].lag_s,
     };
     let fit = of(lag_s).ok_or(NoSwing::NotDetermined)?;
+    let apparent_kg = fit.apparent_kg()?;
     let [mobility, damping, friction, offset] = fit.shared;
-    // 1 kg moved by 1 N: 1 m/s², which is 1000 mm/s²
-    let apparent_kg = 1e3 / mobility;
-    if !(apparent_kg.is_finite() && apparent_kg > 0.0) {
-        return Err(NoSwing::NotDetermined);
-    }
     let samples: usize = moving.iter().map(|m| m.t_s.len()).sum();
     Ok(Swing {
         apparent_kg,
@@ -155,7 +161,19 @@ pub fn estimate(swings: &[&[Point]]) -> Result<Swing, NoSwing> {
     })
 }
 
-/// The part of a recording from the beginning of the motion until the handle stops.
+/// The apparent mass, kg, with a lag that is known, s: one swing alone does not tell both well.
+///
+/// # Errors
+/// As those of [`estimate`].
+pub fn apparent_kg(swings: &[&[Point]], lag_s: f64) -> Result<f64, NoSwing> {
+    let moving: Vec<Moving> = (swings.iter())
+        .map(|all| moving(all))
+        .collect::<Result<_, _>>()?;
+    let fit = fit(swings, &moving, lag_s).ok_or(NoSwing::NotDetermined)?;
+    fit.apparent_kg()
+}
+
+/// The part of a recording from the beginning of the motion until the handle creeps to its stop.
 fn moving(all: &[Point]) -> Result<Moving, NoSwing> {
     let first = all.first().ok_or(NoSwing::Samples)?;
     let finite = |p: &Point| p.t_s.is_finite() && p.x_mm.is_finite() && p.command_n.is_finite();
@@ -164,17 +182,21 @@ fn moving(all: &[Point]) -> Result<Moving, NoSwing> {
         return Err(NoSwing::Samples);
     }
     let begun = (all.iter()).position(|p| (p.x_mm - first.x_mm).abs() > BEGUN_MM);
-    let begun = begun.ok_or(NoSwing::Rests)?.max(APART);
-    let last = all.len().saturating_sub(APART + 1);
+    let apart = apart(all);
+    let begun = begun.ok_or(NoSwing::Rests)?.max(apart);
+    let last = all.len().saturating_sub(apart + 1);
     let speed = |i: usize| {
-        let (before, after) = (all[i - APART], all[i + APART]);
+        let (before, after) = (all[i - apart], all[i + apart]);
         (after.x_mm - before.x_mm) / (after.t_s - before.t_s)
     };
     let speeds: Vec<f64> = (begun..last).map(speed).collect();
     let fastest = speeds.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+    let fast = |v: &f64| v.abs() >= CREEPS * fastest;
     let mut slow_since = None;
     let mut end = speeds.len();
-    for (i, v) in speeds.iter().enumerate() {
+    // it begins slowly as well
+    let under_way = speeds.iter().position(fast).unwrap_or(end);
+    for (i, v) in speeds.iter().enumerate().skip(under_way) {
         let at_s = all[begun + i].t_s;
         let since = *slow_since.get_or_insert((i, at_s));
         if v.abs() > SLOW * fastest {
@@ -184,6 +206,7 @@ fn moving(all: &[Point]) -> Result<Moving, NoSwing> {
             break;
         }
     }
+    let end = speeds[..end].iter().rposition(fast).map_or(0, |at| at + 1);
     let own = &all[begun..begun + end];
     let travel_mm = own
         .iter()
@@ -192,14 +215,32 @@ fn moving(all: &[Point]) -> Result<Moving, NoSwing> {
     if end < LEAST_SAMPLES || travel_mm < LEAST_MM {
         return Err(NoSwing::Rests);
     }
+    // where an encoder does not move, the direction is that of before
+    let mut side: Vec<f64> = Vec::with_capacity(end);
+    for v in &speeds[..end] {
+        side.push(match (*v == 0.0, side.last()) {
+            (true, last) => last.copied().unwrap_or(0.0),
+            (false, _) => v.signum(),
+        });
+    }
     let from_s = own[0].t_s;
     Ok(Moving {
         t_s: own.iter().map(|p| p.t_s - from_s).collect(),
         x_mm: own.iter().map(|p| p.x_mm).collect(),
-        side: speeds[..end].iter().map(|v| v.signum()).collect(),
+        side,
         from_s,
         travel_mm,
     })
+}
+
+/// See [`APART`].
+fn apart(all: &[Point]) -> usize {
+    let steps_mm = all
+        .windows(2)
+        .map(|pair| (pair[1].x_mm - pair[0].x_mm).abs());
+    let step_mm = steps_mm.filter(|mm| *mm > 1e-9).fold(f64::MAX, f64::min);
+    let [least, most] = APART;
+    ((step_mm / STEP_MM).ceil() as usize).clamp(least, most)
 }
 
 /// A least-squares problem with its lag.
@@ -209,6 +250,15 @@ struct Fit {
     shared: [f64; 4],
     /// Sum of squares that is left, mm².
     sum: f64,
+}
+
+impl Fit {
+    fn apparent_kg(&self) -> Result<f64, NoSwing> {
+        // 1 kg moved by 1 N: 1 m/s², which is 1000 mm/s²
+        let kg = 1e3 / self.shared[0];
+        let is_mass = kg.is_finite() && kg > 0.0;
+        is_mass.then_some(kg).ok_or(NoSwing::NotDetermined)
+    }
 }
 
 /// The command at a time, N: between its samples; zero before the first.
@@ -268,6 +318,13 @@ fn fit(swings: &[&[Point]], moving: &[Moving], lag_s: f64) -> Option<Fit> {
         }
         right.extend(way_mm);
         from += own.t_s.len();
+    }
+    for at in 0..columns.len() {
+        let size = columns[at].iter().map(|x| x * x).sum::<f64>().sqrt();
+        for (n, column) in columns.iter_mut().enumerate() {
+            column.push(if n == at { RIDGE * size } else { 0.0 });
+        }
+        right.push(0.0);
     }
     let (solution, sum) = least_squares(columns, right)?;
     Some(Fit {

@@ -268,6 +268,9 @@ pub struct DeviceRules {
     /// Days within which the device must have been commissioned. In no fingerprint.
     #[serde(skip)]
     pub commissioned_within_days: Option<f64>,
+    /// Whether the motor weighs itself before each session. In no fingerprint.
+    #[serde(skip)]
+    pub self_weigh: bool,
 }
 
 /// `[device.rendering]`: when a playback is right.

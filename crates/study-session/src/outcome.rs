@@ -15,8 +15,8 @@ pub mod ratings;
 pub mod rows;
 
 pub use event::{
-    Author, Channel, Choice, Entry, Event, Failure, FormId, Moment, Playback, STEP_BACK, Start,
-    State, TelemetryFile, TrackLevel,
+    Author, Channel, Choice, Entry, Event, Failure, FormId, Moment, Playback, STEP_BACK,
+    SelfWeighed, Start, State, TelemetryFile, TrackLevel,
 };
 pub use fidelity::{Defect, Fidelity, Verdict};
 pub use rows::{AttemptEvent, AttemptRow, IntervalRow, ParticipantRow, RatingRow, Status};

@@ -48,7 +48,7 @@ pub use unsaved::Unsaved;
 pub use view::{Screen, View};
 
 use crate::outcome::fold::History;
-use crate::outcome::{Channel, Event, Fidelity, Moment};
+use crate::outcome::{Channel, Event, Fidelity, Moment, SelfWeighed};
 use phase::{DeviceProblem, Phase, Told};
 use saving::SaveState;
 use std::collections::BTreeSet;
@@ -128,6 +128,7 @@ struct ClaimFacts {
     device_kind: DeviceKind,
     device_id: String,
     device_telemetry: bool,
+    self_weighed: Option<SelfWeighed>,
 }
 
 impl Session {

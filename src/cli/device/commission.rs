@@ -7,13 +7,18 @@
 
 pub(super) mod desk;
 pub(super) mod rig;
+mod self_weigh;
 mod steps;
+mod swing;
 mod weigh;
+
+pub(in crate::cli) use self_weigh::self_weighed;
 
 use super::hold::ActiveDevice;
 use super::record::{Record, RecordKind, prepare};
 use crate::cli::device_selection::{DeviceAddress, Tested, WaitDisplay};
 use crate::cli::{Console, Failure};
+use crate::runner::clock::RealClock;
 use desk::Terminal;
 use rig::{Rig, Stop, safe};
 use std::path::PathBuf;
@@ -142,7 +147,7 @@ fn left_out(what: &'static str, required: &str) -> Made {
 type StepOf = fn(&mut Rig<'_>, &mut Bench) -> Result<Made, Stop>;
 
 /// The steps in their order: the switch before any higher force.
-const STEPS: [(&str, StepOf); 6] = [
+const STEPS: [(&str, StepOf); 7] = [
     ("stroke", steps::stroke),
     ("ruler", steps::ruler),
     ("unpowered friction", steps::friction),
@@ -154,6 +159,7 @@ const STEPS: [(&str, StepOf); 6] = [
     ("force towards +x", |rig, bench| {
         weigh::direction(rig, bench, Side::Plus)
     }),
+    ("self-weighing", swing::step),
 ];
 
 /// Runs the command.
@@ -169,12 +175,13 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     };
     let tested = Tested::of(device.any());
     let stroke_mm = device.stroke_mm();
-    let device = device.into_any();
+    let mut device = device.into_any();
     refuse_unseen(&*device)?;
     prepare(&args.results, &tested.serial)?;
     let (done, numbers, ended) = {
-        let desk = Terminal::open(console)?;
-        let mut rig = Rig::new(device, Box::new(desk));
+        let clock = RealClock::default();
+        let desk = Terminal::open(console, &clock)?;
+        let mut rig = Rig::new(&mut *device, Box::new(desk));
         dialog(&mut rig, &tested, stroke_mm, args.force)
     };
     let pass = done.iter().all(|step| step.outcome == Outcome::Passed);

@@ -171,9 +171,9 @@ fn constant_force() -> Realization {
         x_mm: [1.5, 33.5],
         v_mm_s: 138.0,
     };
-    let force_n = vec![1.0; x_mm.len()];
+    let (force_n, damping) = (vec![1.0; x_mm.len()], vec![0.005; x_mm.len()]);
     Realization {
         direction: Direction::Play { delta_mm: 0.5 },
-        ..both_ways("push", (x_mm, force_n), 0.005, trained)
+        ..both_ways("push", x_mm, (force_n, damping), trained)
     }
 }

@@ -3,14 +3,11 @@
 //! One file for each test, named by its time. A session looks at the last check and at the
 //! commissionings.
 
-use crate::cli::device_selection::{Tested, commissioned};
-use crate::cli::{Console, Failure, Kind};
+use crate::cli::device_selection::Tested;
+use crate::cli::{Failure, Kind};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
-use study_base::text::Untrusted;
-use study_device::Device;
 use study_device::commission::{Numbers, Side};
-use study_plan::protocol::{DeviceKind, DeviceRules};
 
 /// `study-device-record/1`.
 const FORMAT: &str = "study-device-record/1";
@@ -20,8 +17,6 @@ const FOLDER: &str = "devices";
 const CLOCK_DAYS: f64 = 1.0 / 24.0;
 /// Least share of the force limit of a study that was weighed.
 const WEIGHED: f64 = 0.5;
-/// Longest text about a device in the record of a session, characters.
-const MOST_SAID: usize = 1000;
 
 /// Which test it is of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -31,6 +26,9 @@ pub(in crate::cli) enum RecordKind {
     Check,
     /// `study device commission`.
     Commission,
+    /// The motor weighed itself before a session.
+    #[serde(rename = "self-weighing")]
+    SelfWeighing,
 }
 
 impl RecordKind {
@@ -38,6 +36,7 @@ impl RecordKind {
         match self {
             Self::Check => "check",
             Self::Commission => "commission",
+            Self::SelfWeighing => "self-weighing",
         }
     }
 }
@@ -90,11 +89,15 @@ impl Record {
         !self.pass && steps.is_none_or(|steps| steps.iter().any(failed))
     }
 
+    /// The numbers of a commissioning; those of earlier releases have none.
+    pub(in crate::cli) fn numbers(&self) -> Option<Numbers> {
+        serde_json::from_value(self.parts.get("numbers")?.clone()).ok()
+    }
+
     /// The largest force that was weighed in both directions, N; those of earlier releases weighed
     /// one.
     fn weighed_n(&self) -> Option<f64> {
-        let numbers = self.parts.get("numbers")?.clone();
-        let numbers: Numbers = serde_json::from_value(numbers).ok()?;
+        let numbers = self.numbers()?;
         let largest_n = |side| {
             let own = numbers.directions.iter().filter(|fit| fit.pushes == side);
             own.map(|fit| fit.largest_n).reduce(f64::max)
@@ -160,7 +163,7 @@ fn all(results: &Path, serial: &str, kind: RecordKind) -> Vec<Record> {
 }
 
 /// The commissionings of a device, by their time; nothing was measured in those of a simulated one.
-fn commissionings(results: &Path, tested: &Tested) -> Vec<Record> {
+pub(in crate::cli) fn commissionings(results: &Path, tested: &Tested) -> Vec<Record> {
     let mut all = all(results, &tested.serial, RecordKind::Commission);
     all.retain(|record| record.tested.simulated == tested.simulated);
     all
@@ -293,122 +296,6 @@ pub(in crate::cli) fn commissioned_line(
                 format!("passed on {}", last.at.format("%Y-%m-%d %H:%M"))
             }),
     }
-}
-
-/// What is asked of a device before a session.
-#[derive(Debug, Clone, Copy)]
-pub(in crate::cli) struct Asked {
-    /// Its kind.
-    pub(in crate::cli) kind: DeviceKind,
-    /// `[device] check_within_h`.
-    pub(in crate::cli) check_within_h: Option<f64>,
-    /// `[device] commissioned_within_days`, with the force limit.
-    pub(in crate::cli) commissioned: Option<Within>,
-    /// Whether the session goes on although the device does not satisfy this.
-    pub(in crate::cli) unchecked: bool,
-}
-
-impl Asked {
-    /// What a protocol asks of a device of this kind.
-    pub(in crate::cli) fn of(rules: &DeviceRules, kind: DeviceKind, unchecked: bool) -> Self {
-        Self {
-            kind,
-            check_within_h: rules.check_within_h,
-            commissioned: (rules.commissioned_within_days).map(|days| Within {
-                days,
-                force_n: rules.limits.force_n.get(),
-            }),
-            unchecked,
-        }
-    }
-}
-
-/// What the session records of check and commissioning of a device; a failed commissioning is
-/// said in any case.
-///
-/// # Errors
-/// [`Failure`] if either does not count, and the user did not give `--unchecked`.
-pub(in crate::cli) fn examined(
-    device: &dyn Device,
-    results: &Path,
-    asked: Asked,
-    now: chrono::DateTime<chrono::FixedOffset>,
-    console: &mut Console,
-) -> Result<Option<String>, Failure> {
-    let within_h = asked.check_within_h;
-    let of_check = (asked.kind, within_h, asked.unchecked);
-    let mut said = checked(device, results, of_check, now, console)?;
-    if matches!(asked.kind, DeviceKind::Simulated | DeviceKind::Manual) {
-        return Ok(said);
-    }
-    let tested = Tested::of(device);
-    let all = commissionings(results, &tested);
-    let within = asked.commissioned;
-    let doubt = commission_doubt(&all, tested.firmware.as_deref(), within, now);
-    let serial = Untrusted(&tested.serial);
-    let mut more = |text: String| {
-        said = Some(match said.take() {
-            Some(said) => format!("{said}; {text}"),
-            None => text,
-        });
-    };
-    match doubt {
-        None => {
-            let passed = all.iter().rev().find(|record| record.pass);
-            more(passed.map_or_else(String::new, |last| format!("{}: passed", last.id)));
-        }
-        Some(doubt) if within.is_some() && !asked.unchecked => {
-            return Err(Failure::device(format!("{serial}: {}", doubt.why)).hint(
-                "`study device commission --port PORT` commissions it, with a scale and a ruler, in some minutes; \
-                 with --unchecked the session goes on, and its records say so",
-            ));
-        }
-        Some(doubt) if within.is_some() || doubt.failed => {
-            console.say(format!("warning: {serial}: {}", Untrusted(&doubt.why)));
-            more(match within {
-                Some(_) => format!("not commissioned, by choice: {}", doubt.why),
-                None => doubt.why,
-            });
-        }
-        Some(_) => {}
-    }
-    // It is recorded in every session, so its length is limited.
-    Ok(said.map(|said| said.chars().take(MOST_SAID).collect()))
-}
-
-/// What the session records of the last check of a device of this kind.
-///
-/// # Errors
-/// [`Failure`] if the check does not count, and the user did not give `--unchecked`.
-fn checked(
-    device: &dyn Device,
-    results: &Path,
-    (kind, within_h, unchecked): (DeviceKind, Option<f64>, bool),
-    now: chrono::DateTime<chrono::FixedOffset>,
-    console: &mut Console,
-) -> Result<Option<String>, Failure> {
-    if matches!(kind, DeviceKind::Simulated | DeviceKind::Manual) {
-        return Ok(None);
-    }
-    let tested = Tested::of(device);
-    let found = last(results, &tested.serial, RecordKind::Check);
-    let doubt = doubt(found.as_ref(), tested.firmware.as_deref(), within_h, now);
-    let said = match found {
-        Some(last) => Some(format!("{}: {}", last.id, last.summary)),
-        None => commissioned(&tested.serial, console),
-    };
-    let Some(doubt) = doubt else {
-        return Ok(said);
-    };
-    if !unchecked {
-        let serial = Untrusted(&tested.serial);
-        return Err(Failure::device(format!("{serial}: {doubt}")).hint(
-            "`study device check --save --port PORT` checks it; with --unchecked the session goes on, \
-             and its records say so",
-        ));
-    }
-    let said = said.map_or_else(String::new, |said| format!("; {said}"));
-    Ok(Some(format!("unchecked, by choice: {doubt}{said}")))
 }
 
 #[cfg(test)]

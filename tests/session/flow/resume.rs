@@ -4,7 +4,7 @@ use super::rig::{Rig, name};
 use super::studies::{plain, qid, rich};
 use std::collections::BTreeSet;
 use study_plan::protocol::{Answer, Protocol};
-use study_session::outcome::{Author, Choice, Entry, Event, Failure, FormId, State};
+use study_session::outcome::{Author, Choice, Entry, Event, Failure, FormId, SelfWeighed, State};
 use study_session::session::{Ending, Input, Screen};
 
 fn screen(rig: &Rig) -> &'static str {
@@ -165,6 +165,42 @@ fn a_playback_that_was_interrupted_comes_next_and_costs_no_attempt() {
         assert_eq!(rig.closed()[&2], Some(2));
         assert_eq!(rig.positions(), [1, 2, 3, 4, 5, 6]);
     }
+}
+
+/// The motor weighs itself whenever a session is opened.
+#[test]
+fn what_the_motor_told_follows_the_start_and_each_resumption() {
+    let weighed = |gain: f64| SelfWeighed {
+        commissioning: "c1".to_owned(),
+        ok: true,
+        gain: Some(gain),
+        lag_ms: Some(0.5),
+        apparent_kg: Some(0.6),
+        why: None,
+    };
+    let mut rig = Rig::new(plain());
+    rig.self_weighed = Some(weighed(1.01));
+    rig.until_reference(1).until("Playing");
+    let mut back = Rig::back(plain(), rig.journal.clone(), 60.0);
+    back.self_weighed = Some(weighed(0.99));
+    back.identify().finish();
+    back.assert_whole();
+    let events: Vec<&Event> = back.events().collect();
+    let told: Vec<(bool, f64)> = (events.windows(2))
+        .filter_map(|pair| match pair {
+            [before, Event::SelfWeighed(found)] => Some((
+                matches!(before, Event::SessionStarted(_) | Event::Reopened { .. }),
+                found.gain.unwrap(),
+            )),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(told, [(true, 1.01), (true, 0.99)]);
+    // finished, it says nothing more
+    let mut done = Rig::back(plain(), back.journal.clone(), 60.0);
+    done.self_weighed = Some(weighed(1.0));
+    done.identify();
+    assert_eq!(done.journal, back.journal);
 }
 
 #[test]

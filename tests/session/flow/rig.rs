@@ -7,7 +7,7 @@ use std::sync::Arc;
 use study_base::text::{ParticipantId, QuestionId};
 use study_plan::protocol::fingerprint::Fingerprints;
 use study_plan::protocol::*;
-use study_session::outcome::{Entry, Event, FormId, Moment, Playback};
+use study_session::outcome::{Entry, Event, FormId, Moment, Playback, SelfWeighed};
 use study_session::session::{Claim, Config, Effect, Ending, Input, Screen, Session, View};
 
 /// What the device of the tests does when it is asked.
@@ -43,6 +43,7 @@ pub(crate) struct Rig {
     pub(crate) store: StoreMood,
     pub(crate) seat: Seat,
     pub(crate) telemetry: bool,
+    pub(crate) self_weighed: Option<SelfWeighed>,
     pub(crate) playback: Playback,
     pub(crate) effects: Vec<Effect>,
     pub(crate) ending: Option<Ending>,
@@ -98,6 +99,7 @@ impl Rig {
             store: StoreMood::Prompt,
             seat: Seat::Row(1),
             telemetry: true,
+            self_weighed: None,
             playback: Playback {
                 exploration_s: 3.0,
                 strokes: 5,
@@ -156,6 +158,7 @@ impl Rig {
         Claim {
             seat: self.seat,
             device_telemetry: self.telemetry,
+            self_weighed: self.self_weighed.clone(),
             ..claim(&self.protocol, participant, self.journal.clone())
         }
     }
@@ -510,6 +513,7 @@ pub(crate) fn claim(protocol: &Protocol, participant: ParticipantId, entries: Ve
         device_kind: protocol.device.kind,
         device_id: "simulated-1".to_owned(),
         device_check: None,
+        self_weighed: None,
         device_telemetry: true,
         assigned: Assigned::default(),
         notices: Vec::new(),

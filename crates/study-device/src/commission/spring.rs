@@ -122,11 +122,11 @@ impl VirtualSpring {
         places.dedup_by(|b, a| *b - *a < 1e-6);
         let force_n =
             |place: &f64| (self.stiffness_n_per_mm * place).clamp(-self.force_n, self.force_n);
-        table(
+        table_of(
             "spring",
             places.iter().map(|place| self.rest_mm + place).collect(),
             places.iter().map(force_n).collect(),
-            self.damping_n_s_per_mm,
+            vec![self.damping_n_s_per_mm; places.len()],
             [self.rest_mm - self.reach_mm, self.rest_mm + self.reach_mm],
         )
     }
@@ -134,21 +134,28 @@ impl VirtualSpring {
 
 /// A table without force over a range, to read where the handle is.
 pub fn force_free(range_mm: [f64; 2]) -> Realization {
-    table("none", range_mm.to_vec(), vec![0.0; 2], 0.0, range_mm)
+    table_of(
+        "none",
+        range_mm.to_vec(),
+        vec![0.0; 2],
+        vec![0.0; 2],
+        range_mm,
+    )
 }
 
-fn table(
+/// A table of forces and damping at places, the same in both directions.
+pub(super) fn table_of(
     id: &str,
     x_mm: Vec<f64>,
     f0_n: Vec<f64>,
-    b_n_s_per_mm: f64,
+    b_n_s_per_mm: Vec<f64>,
     range_mm: [f64; 2],
 ) -> Realization {
     let trained = Trained {
         x_mm: range_mm,
         v_mm_s: 1000.0,
     };
-    both_ways(id, (x_mm, f0_n), b_n_s_per_mm, trained)
+    both_ways(id, x_mm, (f0_n, b_n_s_per_mm), trained)
 }
 
 #[cfg(test)]

@@ -167,7 +167,12 @@ fn push(talk: &Talk, force_n: f64) -> Realization {
         x_mm: ends_mm,
         v_mm_s: 300.0,
     };
-    both_ways("check", (ends_mm.to_vec(), vec![force_n; 2]), 0.0, trained)
+    both_ways(
+        "check",
+        ends_mm.to_vec(),
+        (vec![force_n; 2], vec![0.0; 2]),
+        trained,
+    )
 }
 
 fn greatest_n(samples: &[Sample]) -> f64 {

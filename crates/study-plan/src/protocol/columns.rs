@@ -466,6 +466,7 @@ table! {
             ("resume", "an interrupted session was resumed"),
             ("state", "the participant's state was set"),
             ("reveal", "the order was revealed"),
+            ("self-weighed", "the motor weighed itself before the session"),
         ], "what happened"),
         Question: text("question", "question that was answered or corrected")
             .empty("the event is neither an answer nor a correction"),

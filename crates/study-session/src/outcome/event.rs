@@ -243,6 +243,42 @@ pub struct Start {
 /// The reason of a correction that is made on a page to which somebody went back.
 pub const STEP_BACK: &str = "step back";
 
+/// How a motor that weighed itself before a session compares with its commissioning.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SelfWeighed {
+    /// Id of the record of the commissioning; empty if there is none.
+    pub commissioning: String,
+    /// Whether it is as it was; `false` also if that is not known.
+    pub ok: bool,
+    /// Its gain over that of the commissioning.
+    pub gain: Option<f64>,
+    /// By how much later its force comes, ms.
+    pub lag_ms: Option<f64>,
+    /// Mass of the handle over its gain, kg.
+    pub apparent_kg: Option<f64>,
+    /// Why it is not as it was, or why that is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub why: Option<String>,
+}
+
+impl SelfWeighed {
+    /// For a row of `attempts.csv`.
+    pub fn in_words(&self) -> String {
+        let mut parts: Vec<String> = Vec::new();
+        parts.extend(self.gain.map(|gain| format!("gain {gain:.3}")));
+        parts.extend(self.lag_ms.map(|ms| format!("lag {ms:.1} ms")));
+        parts.extend(
+            self.apparent_kg
+                .map(|kg| format!("apparent mass {kg:.3} kg")),
+        );
+        if !self.commissioning.is_empty() {
+            parts.push(format!("against {}", self.commissioning));
+        }
+        parts.extend(self.why.clone());
+        parts.join(", ")
+    }
+}
+
 /// Something that happened in a session.
 ///
 /// In all events `trial` is [`Trial::trial`], `attempt` counts from 1, and `queue` has the
@@ -256,6 +292,8 @@ pub const STEP_BACK: &str = "step back";
 pub enum Event {
     /// The session started: the first event, exactly once.
     SessionStarted(Box<Start>),
+    /// The motor weighed itself before the participant came to the device. Since `study-protocol/3`.
+    SelfWeighed(Box<SelfWeighed>),
     /// An unfinished session was resumed.
     Reopened {
         /// Operator from now on.

@@ -328,6 +328,7 @@ impl History {
             | Event::ClockStepped { .. }
             | Event::Interrupted { .. }
             | Event::TelemetryLost { .. }
+            | Event::SelfWeighed(_)
             | Event::Revealed { .. } => {}
         }
     }

@@ -191,6 +191,7 @@ study_base::named! {
         Resume = "resume",
         State = "state",
         Reveal = "reveal",
+        SelfWeighed = "self-weighed",
     }
 }
 
@@ -207,6 +208,7 @@ impl AttemptEvent {
             Event::Reopened { .. } => Self::Resume,
             Event::StateSet { .. } => Self::State,
             Event::Revealed { .. } => Self::Reveal,
+            Event::SelfWeighed(_) => Self::SelfWeighed,
             _ => return None,
         })
     }

@@ -1,6 +1,6 @@
 //! The inputs and effects of a session.
 
-use crate::outcome::{Author, Choice, Entry, Event, Fidelity, FormId, Playback};
+use crate::outcome::{Author, Choice, Entry, Event, Fidelity, FormId, Playback, SelfWeighed};
 use study_base::text::{ModelId, ParticipantId, QuestionId};
 use study_plan::protocol::fingerprint::Fingerprints;
 use study_plan::protocol::{Answer, Assigned, DeviceKind, Seat};
@@ -149,6 +149,8 @@ pub struct Claim {
     pub device_id: String,
     /// Result of the device's last commissioning test, if known.
     pub device_check: Option<String>,
+    /// How its motor weighed itself before the session.
+    pub self_weighed: Option<SelfWeighed>,
     /// Whether the device reports telemetry.
     pub device_telemetry: bool,
     /// Group and planned session of a new session.

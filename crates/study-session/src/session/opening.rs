@@ -54,6 +54,7 @@ impl Session {
             device_kind: claim.device_kind,
             device_id: claim.device_id.clone(),
             device_telemetry: claim.device_telemetry,
+            self_weighed: claim.self_weighed.clone(),
         });
         if !claim.notices.is_empty() {
             let notices = self.sanitized(&claim.notices.join(" · "));
@@ -91,8 +92,17 @@ impl Session {
                     assigned: claim.assigned,
                 };
                 self.record(Event::SessionStarted(Box::new(start)), at);
+                self.record_self_weighed(at);
                 self.phase = Phase::Saving;
             }
+        }
+    }
+
+    /// Records what the motor told of itself before the session, after the event that opens it.
+    fn record_self_weighed(&mut self, at: Moment) {
+        let weighed = self.claim.as_ref().and_then(|c| c.self_weighed.clone());
+        if let Some(weighed) = weighed {
+            self.record(Event::SelfWeighed(Box::new(weighed)), at);
         }
     }
 
@@ -194,6 +204,7 @@ impl Session {
             constraint_broken,
         };
         self.record(reopened, at);
+        self.record_self_weighed(at);
         let saved = self.history.completed().count();
         let greeting = match self.total(false) {
             Some(total) => format!("welcome back: {saved} of {total} trials are saved"),

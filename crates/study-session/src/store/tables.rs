@@ -250,6 +250,7 @@ mod tests {
                 AttemptEvent::Resume,
                 AttemptEvent::State,
                 AttemptEvent::Reveal,
+                AttemptEvent::SelfWeighed,
             ]),
             question: d.maybe(|_| question("realism")),
             from: d.maybe(|d| Answer::Choice(vec![d.text(), "b".to_owned()])),

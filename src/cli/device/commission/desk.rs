@@ -3,9 +3,10 @@
 //! A line that was typed before its question is dropped.
 
 use crate::cli::{Console, Failure};
+use crate::runner::clock::Clock;
 use crate::tui::Signals;
 use crate::tui::wrap::wrap;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Time between two looks, as in a session.
 const TURN: Duration = Duration::from_millis(20);
@@ -50,18 +51,22 @@ pub(in crate::cli::device) struct Terminal<'c> {
     console: &'c mut Console,
     lines: Lines,
     signals: Signals,
-    start: Instant,
+    /// That of the device's other user, if there is one: a device is told times of one clock.
+    clock: &'c dyn Clock,
 }
 
 impl<'c> Terminal<'c> {
     /// Takes the standard input, until it is dropped.
-    pub(in crate::cli::device) fn open(console: &'c mut Console) -> Result<Self, Failure> {
+    pub(in crate::cli::device) fn open(
+        console: &'c mut Console,
+        clock: &'c dyn Clock,
+    ) -> Result<Self, Failure> {
         let signals = Signals::register().map_err(Failure::device)?;
         Ok(Self {
             console,
             lines: Lines::default(),
             signals,
-            start: Instant::now(),
+            clock,
         })
     }
 }
@@ -105,7 +110,7 @@ impl Desk for Terminal<'_> {
     }
 
     fn now(&self) -> Duration {
-        self.start.elapsed()
+        Duration::from_nanos(self.clock.now().mono_ns)
     }
 
     fn wait(&mut self) {

@@ -6,10 +6,11 @@ use std::collections::VecDeque;
 use std::time::Duration;
 use study_base::limits::Limits;
 use study_base::text::Untrusted;
-use study_device::commission::{Travel, VirtualSpring, force_free};
+use study_device::commission::{SwingSpring, Travel, VirtualSpring, force_free};
 use study_device::{Device, Report, Stimulus};
 use study_haptics::model::Realization;
 use study_session::outcome::Sample;
+use study_wire::servo::ServoSettings;
 
 /// Time for a load, a start, a stop, or until a device answers again.
 const ANSWER: Duration = Duration::from_secs(10);
@@ -95,6 +96,8 @@ pub(in crate::cli::device) struct Reading {
 /// The bounds of a motion.
 #[derive(Debug, Clone, Copy)]
 struct Guard {
+    /// Where the handle is when it begins.
+    from_mm: f64,
     rest_mm: f64,
     reach_mm: f64,
     velocity_mm_s: f64,
@@ -102,12 +105,14 @@ struct Guard {
 
 /// The device and the person.
 pub(in crate::cli::device) struct Rig<'d> {
-    device: Box<dyn Device + 'd>,
+    device: &'d mut dyn Device,
     pub(in crate::cli::device) desk: Box<dyn Desk + 'd>,
     /// Limits of the device.
     pub(in crate::cli::device) limits: Limits,
     /// The last samples of the present playback.
     samples: VecDeque<Sample>,
+    /// All samples of a swing.
+    kept: Option<Vec<Sample>>,
     /// Where the present motion has to stay.
     guard: Option<Guard>,
     /// When a sample of the present motion came last; `None` before it began.
@@ -126,7 +131,7 @@ pub(in crate::cli::device) struct Rig<'d> {
 
 impl<'d> Rig<'d> {
     pub(in crate::cli::device) fn new(
-        device: Box<dyn Device + 'd>,
+        device: &'d mut dyn Device,
         desk: Box<dyn Desk + 'd>,
     ) -> Self {
         Self {
@@ -134,6 +139,7 @@ impl<'d> Rig<'d> {
             device,
             desk,
             samples: VecDeque::new(),
+            kept: None,
             guard: None,
             heard: None,
             polled: Duration::ZERO,
@@ -184,6 +190,9 @@ impl<'d> Rig<'d> {
         let is_first = std::mem::take(&mut self.unseen);
         self.samples.push_back(*sample);
         self.heard = self.heard.map(|_| self.desk.now());
+        if let Some(kept) = &mut self.kept {
+            kept.push(*sample);
+        }
         let newest_s = sample.t_s;
         while (self.samples.front()).is_some_and(|first| newest_s - first.t_s > READING_S) {
             self.samples.pop_front();
@@ -194,7 +203,7 @@ impl<'d> Rig<'d> {
         self.fastest_mm_s = self.fastest_mm_s.max(sample.v_mm_s.abs());
         let inside = far_mm <= BEYOND * guard.reach_mm
             && sample.v_mm_s.abs() <= BEYOND * guard.velocity_mm_s;
-        let moved = is_first && far_mm > MOVED * guard.reach_mm;
+        let moved = is_first && (sample.x_mm - guard.from_mm).abs() > MOVED * guard.reach_mm;
         if moved && self.trouble.is_none() {
             self.device.limp(self.desk.now());
             self.trouble = Some(MOVED_BEFORE.to_owned());
@@ -358,6 +367,7 @@ impl<'d> Rig<'d> {
     /// Plays a spring.
     pub(in crate::cli::device) fn hold(&mut self, spring: &VirtualSpring) -> Result<(), String> {
         self.guard = Some(Guard {
+            from_mm: spring.rest_mm,
             rest_mm: spring.rest_mm,
             reach_mm: spring.reach_mm,
             velocity_mm_s: spring.velocity_mm_s,
@@ -369,6 +379,44 @@ impl<'d> Rig<'d> {
             self.poll();
         }
         self.trouble.clone().map_or(Ok(()), Err)
+    }
+
+    /// Plays a spring beside whose rest the free handle is, and returns what it did.
+    pub(in crate::cli::device) fn swing(
+        &mut self,
+        spring: &SwingSpring,
+    ) -> Result<Vec<Sample>, String> {
+        self.guard = Some(Guard {
+            from_mm: spring.from_mm,
+            rest_mm: spring.rest_mm,
+            reach_mm: spring.reach_mm(),
+            velocity_mm_s: spring.velocity_mm_s,
+        });
+        let limits = spring.limits().map_err(|e| e.to_string())?;
+        self.kept = Some(Vec::new());
+        let played = self.play(&spring.table(), limits);
+        if played.is_ok() {
+            self.watch(Duration::from_secs_f64(spring.seconds));
+        }
+        let kept = self.kept.take().unwrap_or_default();
+        let trouble = self.take_trouble();
+        self.limp();
+        played?;
+        match trouble {
+            Some(why) => Err(why),
+            None => Ok(kept),
+        }
+    }
+
+    /// The constants of the servo, if the device tells them.
+    pub(in crate::cli::device) fn servo(&self) -> Option<ServoSettings> {
+        self.device.identity().servo
+    }
+
+    /// The mass of the handle, if the device tells what it can compensate, kg.
+    pub(in crate::cli::device) fn told_mass_kg(&self) -> Option<f64> {
+        let least_kg = -self.servo()?.least_mass_kg;
+        (least_kg.is_finite() && least_kg > 0.0).then_some(least_kg)
     }
 
     /// Where the handle rests, by a short playback without force.

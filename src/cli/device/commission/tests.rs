@@ -3,6 +3,7 @@
 
 mod guards;
 mod script;
+mod self_weigh;
 
 use super::*;
 use script::{Person, Script, Shared, Typed, typed};
@@ -101,7 +102,8 @@ fn commissioned(wrong: Option<Wrong>, person: Person<'_>) -> Found {
     });
     let device = Shared::new(options);
     let (script, said) = Script::new(&device, person);
-    let mut rig = Rig::new(Box::new(device.clone()), Box::new(script));
+    let mut own = device.clone();
+    let mut rig = Rig::new(&mut own, Box::new(script));
     let tested = Tested::of(&device);
     let (steps, numbers, ended) = dialog(&mut rig, &tested, Some(STROKE_MM), None);
     drop(rig);
@@ -148,7 +150,10 @@ fn the_right_device_passes_with_its_numbers() {
     }
     // each motion is asked for, and each question stands for one motion
     let plays = numbers.travels.len();
-    assert_eq!(found.said.matches("Type `go` to begin").count(), plays);
+    assert_eq!(found.said.matches("Type `go` to begin").count(), plays + 1);
+    let swing = numbers.swing.unwrap().found;
+    assert!((swing.apparent_kg / 0.6 - 1.0).abs() < 0.02, "{swing:?}");
+    assert!(swing.lag_s.abs() < 2e-3, "{swing:?}");
     assert!(found.place.stops == 0, "{:?}", found.place);
     // and the record is read again as it was written
     let text = serde_json::to_string(numbers).unwrap();
@@ -175,6 +180,7 @@ fn wrong_devices_are_found_with_their_numbers() {
         (Wrong::WeakMotor, "force towards −x", "gain 0.5"),
         (Wrong::WeakMotor, "force towards +x", "gain 0.5"),
         (Wrong::WeakMotorBackwards, "force towards +x", "gain 0.5"),
+        (Wrong::LateMotor, "self-weighing", "lag "),
         (
             Wrong::SaturatedMotor,
             "force towards −x",
@@ -283,7 +289,7 @@ fn what_was_typed_ahead_is_dropped() {
         }),
     );
     assert!(found.passed(), "{:#?}\n{}", found.steps, found.said);
-    assert_eq!(found.said.matches("Type `go` to begin").count(), 7);
+    assert_eq!(found.said.matches("Type `go` to begin").count(), 8);
     // Enter alone, or another word, begins nothing
     let mut wrong = ["", "yes", "ok"].into_iter();
     let found = commissioned(
@@ -411,7 +417,8 @@ fn whatever_ends_the_dialog_the_device_is_limp() {
             false => willing(said, device),
         };
         let (script, _) = Script::new(&device, Box::new(person));
-        let mut rig = Rig::new(Box::new(device.clone()), Box::new(script));
+        let mut own = device.clone();
+        let mut rig = Rig::new(&mut own, Box::new(script));
         let tested = Tested::of(&device);
         dialog(&mut rig, &tested, Some(STROKE_MM), None)
     }));
@@ -448,7 +455,8 @@ fn a_free_handle_never_hits_a_stop() {
                 });
                 let device = Shared::new(options);
                 let (script, _) = Script::new(&device, Box::new(willing));
-                let mut rig = Rig::new(Box::new(device.clone()), Box::new(script));
+                let mut own = device.clone();
+                let mut rig = Rig::new(&mut own, Box::new(script));
                 let mut bench = Bench {
                     numbers: Numbers {
                         stroke_mm: Some(STROKE_MM),

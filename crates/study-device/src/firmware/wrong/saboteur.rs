@@ -1,5 +1,6 @@
 //! What a wrong device changes.
 
+use super::super::motor::{Motor, Pending};
 use super::super::replies;
 use super::felt::{Felt, hum_n, tick_n};
 use super::{Wrong, WrongLoads};
@@ -35,8 +36,8 @@ pub(in crate::firmware) struct Saboteur {
     /// Commanded forces of the last samples, µN, with their periods.
     forces: VecDeque<(u32, i32)>,
     held: Option<TelemetrySample>,
-    /// Forces that the motor has not given yet, N.
-    late_n: VecDeque<f64>,
+    /// A motor that is late.
+    late: Pending,
     /// What its sensor measures.
     felt: Felt,
     /// Since when the handle rests, s.
@@ -46,9 +47,13 @@ pub(in crate::firmware) struct Saboteur {
     turned_mm: Option<f64>,
 }
 
-/// Largest force of a motor that saturates, N, and the delay of a late one, s.
+/// Largest force of a motor that saturates, N.
 const SATURATED_N: f64 = 9.0;
-const LATE_MOTOR_S: f64 = 0.02;
+/// A motor that is late.
+const LATE_MOTOR: Motor = Motor {
+    gain: 1.0,
+    lag_s: 0.02,
+};
 /// Servo periods of the late position and speed: 30 ms at 4 kHz.
 const LATE_PERIODS: usize = 120;
 /// Sum of a position and its mirror image, mm: the handle rests in the middle.
@@ -73,7 +78,7 @@ impl Saboteur {
             periods: 0,
             forces: VecDeque::new(),
             held: None,
-            late_n: VecDeque::new(),
+            late: Pending::new(LATE_MOTOR, told.servo_hz),
             felt: Felt::default(),
             rests_s: None,
             side: 1.0,
@@ -355,11 +360,7 @@ impl Saboteur {
                 Drive::Force(force_n.clamp(-SATURATED_N, SATURATED_N))
             }
             (Some(Wrong::LateMotor), Drive::Force(force_n)) => {
-                self.late_n.push_back(force_n);
-                let periods = (LATE_MOTOR_S * self.told.servo_hz) as usize;
-                let due = self.late_n.len() > periods;
-                let now_n = if due { self.late_n.pop_front() } else { None };
-                Drive::Force(now_n.unwrap_or(0.0))
+                Drive::Force(self.late.give(force_n))
             }
             (Some(Wrong::WeakMotor), Drive::Force(force_n)) => Drive::Force(0.5 * force_n),
             (Some(Wrong::Mirrored), Drive::Force(force_n)) => Drive::Force(-force_n),

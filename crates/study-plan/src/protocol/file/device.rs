@@ -29,6 +29,11 @@ pub(super) const DEVICE: &[Key] = keys! {
     /// firmware. A session on another device is refused, and also if a later commissioning failed,
     /// unless `study run --unchecked` says that it is meant. Needs the format `study-protocol/3`.
     "commissioned_within_days": Kind::positive("days"), "30.0";
+    /// Whether the motor weighs itself before each session: the free handle swings on weak virtual
+    /// springs, and its apparent mass and its lag are compared with those of the commissioning, by `gain`
+    /// and `max_delay_ms` of `rendering`. Needs a device that reports samples and the format
+    /// `study-protocol/3`.
+    "self_weigh": Kind::Flag, "true", default("false");
 };
 
 const RENDERING: &[Key] = keys! {
@@ -104,6 +109,7 @@ pub(super) fn read(mut section: Section<'_, '_>) -> Option<DeviceRules> {
     }
     let check_within_h = section.number("check_within_h");
     let commissioned_within_days = section.number("commissioned_within_days");
+    let self_weigh = section.flag("self_weigh");
     Some(DeviceRules {
         kind: kind?,
         limits: match limits {
@@ -117,6 +123,7 @@ pub(super) fn read(mut section: Section<'_, '_>) -> Option<DeviceRules> {
         rendering: rendering?,
         check_within_h,
         commissioned_within_days,
+        self_weigh: self_weigh?,
     })
 }
 

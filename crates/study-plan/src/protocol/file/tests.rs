@@ -497,19 +497,19 @@ fn newer_keys_need_the_newer_format() {
 
 #[test]
 fn keys_about_the_force_need_the_newer_format() {
-    let with_keys = LEAST.replace("[device]\n", "[device]\ncommissioned_within_days = 30\n");
-    assert_eq!(
-        messages(&with_keys),
-        ["`device.commissioned_within_days` needs the format `study-protocol/3`"]
-    );
+    let keys = "[device]\ncommissioned_within_days = 30\nself_weigh = true\n";
+    let with_keys = LEAST.replace("[device]\n", keys);
+    let needs = |key: &str| format!("`device.{key}` needs the format `study-protocol/3`");
+    let both = ["commissioned_within_days", "self_weigh"].map(needs);
+    assert_eq!(messages(&with_keys), both);
     let newer = with_keys.replace("study-protocol/1", "study-protocol/3");
     assert_eq!(messages(&newer), [""; 0]);
     let of = |text: &str| {
         let device = parse("p.toml", text).protocol.unwrap().device;
-        device.commissioned_within_days
+        (device.commissioned_within_days, device.self_weigh)
     };
-    assert_eq!(of(LEAST), None);
-    assert_eq!(of(&newer), Some(30.0));
+    assert_eq!(of(LEAST), (None, false));
+    assert_eq!(of(&newer), (Some(30.0), true));
 }
 
 #[test]

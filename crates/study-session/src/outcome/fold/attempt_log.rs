@@ -124,6 +124,7 @@ pub fn attempt_rows(
                         .push_str(" [the restart breaks the order's constraint]");
                 }
             }
+            Event::SelfWeighed(weighed) => row.text = weighed.in_words(),
             Event::StateSet { state, reason } => {
                 row.text = format!("{}: {reason}", state.as_str());
             }

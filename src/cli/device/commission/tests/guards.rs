@@ -121,7 +121,8 @@ fn a_motor_without_samples_is_switched_off() {
 fn a_handle_that_was_moved_feels_no_force() {
     let device = Shared::new(Options::seeded(3));
     let (script, _) = Script::new(&device, Box::new(|_, _| Typed::new()));
-    let mut rig = Rig::new(Box::new(device.clone()), Box::new(script));
+    let mut own = device.clone();
+    let mut rig = Rig::new(&mut own, Box::new(script));
     let [low, ..] = study_device::commission::stages(12.0, rig.limits);
     let spring = VirtualSpring::for_stage(low, 10.0, STROKE_MM).unwrap();
     device.lock().firmware().hold_at(25.0);
@@ -197,7 +198,8 @@ fn after_this_program_stood_still_the_motor_is_off() {
         false => Typed::new(),
     };
     let (script, _) = Script::new(&device, Box::new(person));
-    let mut rig = Rig::new(Box::new(device.clone()), Box::new(script));
+    let mut own = device.clone();
+    let mut rig = Rig::new(&mut own, Box::new(script));
     let [low, ..] = study_device::commission::stages(12.0, rig.limits);
     let at_mm = device.place().x_mm;
     let spring = VirtualSpring::for_stage(low, at_mm, STROKE_MM).unwrap();

@@ -11,6 +11,7 @@ use study_base::limits::Limits;
 use study_device::firmware::Place;
 use study_device::virtual_device::{Options, VirtualDevice};
 use study_device::{Device, DeviceError, Identity, Report, Stimulus};
+use study_wire::message::Fault;
 
 /// A device that the script can reach as well.
 #[derive(Clone)]
@@ -22,6 +23,8 @@ pub(super) struct Shared {
     mute: Arc<Mutex<bool>>,
     /// How often something was loaded.
     loads: Arc<Mutex<u32>>,
+    /// The number of a load with whose start it trips, and why.
+    trip: Arc<Mutex<Option<(u32, Fault)>>>,
 }
 
 impl Shared {
@@ -31,6 +34,7 @@ impl Shared {
             at: Arc::default(),
             mute: Arc::default(),
             loads: Arc::default(),
+            trip: Arc::default(),
         };
         device.lock().firmware().let_go();
         device
@@ -48,6 +52,11 @@ impl Shared {
     /// How often something was loaded.
     pub(super) fn loads(&self) -> u32 {
         *self.loads.lock().unwrap()
+    }
+
+    /// It trips as soon as the nth load plays.
+    pub(super) fn trips_at(&self, nth: u32, fault: Fault) {
+        *self.trip.lock().unwrap() = Some((nth, fault));
     }
 
     /// Lets a time pass in which nobody polls.
@@ -86,6 +95,13 @@ impl Device for Shared {
     fn poll(&mut self, at: Duration) -> Vec<Report> {
         *self.at.lock().unwrap() = at;
         let mut reports = self.lock().poll(at);
+        let loads = self.loads();
+        let due = |(nth, _): &mut (u32, Fault)| *nth == loads;
+        if reports.contains(&Report::Started)
+            && let Some((_, fault)) = self.trip.lock().unwrap().take_if(due)
+        {
+            self.lock().trip(fault);
+        }
         if *self.mute.lock().unwrap() {
             reports.retain(|report| !matches!(report, Report::Telemetry(_)));
         }
