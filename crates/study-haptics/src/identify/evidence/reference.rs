@@ -1,6 +1,7 @@
 //! The reference model with instruments: mass and damping, their errors, and their bounds.
 
 use super::Term;
+use super::alike::are_alike;
 use super::dissipation::Dissipation;
 use super::equations::{BORDER, EVERYWHERE, Equations, Row, Rule, directions, nodes, rows};
 use super::instruments::{self, Instruments};
@@ -82,6 +83,8 @@ pub(super) struct Reference {
     equations: Equations,
     /// Whether there are strokes enough to tell a term from what depends on position and direction.
     enough_strokes: bool,
+    /// Whether these are alike, so that the acceleration depends on position and direction as well.
+    alike: bool,
     /// Mass and damping with the best rule and with others that fit nearly as well, the best first.
     by_rule: Vec<[f64; 2]>,
     dissipation: Dissipation,
@@ -154,6 +157,7 @@ impl Reference {
                 .collect(),
             dissipation,
             enough_strokes,
+            alike: matches!(force, Force::Unknown) && are_alike(recordings, range_mm),
             rows,
             equations,
         })
@@ -198,7 +202,7 @@ impl Reference {
             equations.error_left_out(&without)?,
         ];
         let own_bound = (spread.upper_bound(value.max(0.0), model_error, LEAST_RATIO))
-            .filter(|_| self.enough_strokes);
+            .filter(|_| self.enough_strokes && !(self.alike && Term::BOTH[term] == Term::Mass));
         let dissipated = match Term::BOTH[term] {
             Term::Mass => None,
             Term::Damping => self.dissipated(&residual, &scales, inflated),
