@@ -62,6 +62,10 @@ struct ForceCurve {
     #[arg(long, value_name = "HZ", value_parser = rate)]
     rate: Option<f64>,
 
+    /// Accept a target that supplies energy: without this flag it is refused, because most likely the file is wrong
+    #[arg(long)]
+    active: bool,
+
     /// Overwrite OUT if it exists
     #[arg(long)]
     force: bool,
@@ -106,6 +110,13 @@ fn force_curve(args: &ForceCurve, console: &mut Console) -> Result<(), Failure> 
         let bytes = fs::read(path).map_err(|e| Failure::file(path, &e))?;
         let curve = curve::read(&String::from_utf8_lossy(&bytes))
             .map_err(|e| Failure::input(format!("{}: {e}", path.display())))?;
+        if let Err(wrong) = curve.passive()
+            && !args.active
+        {
+            return Err(Failure::input(format!("{}: {wrong}", path.display())).hint(
+                "nothing was written; --active accepts a target that has a drive of its own",
+            ));
+        }
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let (rows, layout) = (curve.x_mm.len(), curve.layout.as_str());
         let rate = match curve.rate_hz {
@@ -121,6 +132,12 @@ fn force_curve(args: &ForceCurve, console: &mut Console) -> Result<(), Failure> 
                 "note: {}: {} assumed; the names of the columns can say it, such as `force_n`",
                 path.display(),
                 curve.assumed.join(" and ")
+            ));
+        }
+        if curve.release_first {
+            console.say(format!(
+                "note: {}: the file begins at the bottom; its press was put before its release",
+                path.display()
             ));
         }
         let most_n = curve.f_n.iter().fold(0.0, |most: f64, n| most.max(n.abs()));

@@ -360,10 +360,13 @@ fn a_single_press_is_told_to_show_no_term() {
     }
 }
 
-/// Strokes that are alike show no damping, because the speed is a function of position and direction there, too.
+/// Strokes that are alike show no damping, because the speed is a function of position and direction there, too, and bound no mass.
 #[test]
-fn strokes_that_are_alike_show_no_damping() {
+fn strokes_that_are_alike_show_no_damping_and_bound_no_mass() {
     let sets = 12;
+    let mass = rates(Condition::Repeats, 0, 0..sets as u64, 24);
+    let said = [mass.bounded, mass.wrong, mass.taken_up];
+    assert_eq!(said, [0; 3], "{mass:?}");
     let found = rates(Condition::Repeats, 1, 0..sets as u64, 24);
     assert_eq!([found.wrong, found.taken_up], [0; 2], "{found:?}");
     assert_eq!(found.bounded, sets, "{found:?}");

@@ -133,22 +133,71 @@ fn what_is_no_curve_is_refused_with_file_and_line() {
         .stderr(contains("is no regular file"));
 }
 
-/// Rows in the wrong order of time: the release comes first, and the target would supply the energy.
+/// Measured curves with their rows and columns in other orders: the release first is the same recording, and the rest is refused with its cause.
 #[test]
-fn a_curve_that_was_turned_around_is_refused() {
+fn rows_and_columns_in_another_order_are_read_right_or_named() {
     let dir = tempfile::tempdir().unwrap();
     let path = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
-    let (turned, recording) = (path("turned.csv"), path("r.csv"));
+    let (changed, recording) = (path("changed.csv"), path("r.csv"));
+    let import = |rows: &[&str], names: &str, more: &[&str]| {
+        fs::write(&changed, format!("{names}\n{}\n", rows.join("\n"))).unwrap();
+        let args = [
+            "import",
+            "force-curve",
+            &changed,
+            "-o",
+            &recording,
+            "--force",
+        ];
+        study(&[&args[..], more].concat())
+    };
+    let values = || recording::read("r", fs::read(&recording).unwrap().as_slice()).unwrap();
+    for entry in fs::read_dir("tests/data/switches").unwrap() {
+        let file = entry.unwrap().path();
+        if file.extension().is_none_or(|of| of != "csv") {
+            continue;
+        }
+        let usual = imported(&file, Path::new(&recording), &[]);
+        let text = fs::read_to_string(&file).unwrap();
+        let (names, rows) = text.split_once('\n').unwrap();
+        let mut rows: Vec<&str> = rows.lines().collect();
+        let swapped = names.replace("force", "x").replace("displacement", "force");
+        import(&rows, &swapped.replace('x', "displacement"), &[])
+            .code(1)
+            .stderr(contains(
+                "changed.csv: line 1: the columns force and displacement are swapped",
+            ));
+        // the row of most displacement is the last one of the press
+        let top = (0..usual.len()).fold(0, |top, i| match usual.x_mm[i] > usual.x_mm[top] {
+            true => i,
+            false => top,
+        });
+        rows.rotate_left(top + 1);
+        import(&rows, names, &[]).success().stderr(contains(
+            "the file begins at the bottom; its press was put before its release",
+        ));
+        // it may come to rest below where it began
+        let [mut a, mut b] = [usual.clone(), values()].map(|r| r.f_n);
+        a.sort_by(f64::total_cmp);
+        b.sort_by(f64::total_cmp);
+        assert_eq!(a, b, "{}", file.display());
+        rows.rotate_right(top + 1);
+        rows.reverse();
+        import(&rows, names, &[]).code(1).stderr(contains(
+            "changed.csv: line 2: the rows from here on are in the reverse order of time",
+        ));
+    }
+    // who says that the target has a drive is believed, until it is to be identified
     let text = fs::read_to_string(CLICKIEZ).unwrap();
     let (names, rows) = text.split_once('\n').unwrap();
     let rows: Vec<&str> = rows.lines().rev().collect();
-    fs::write(&turned, format!("{names}\n{}\n", rows.join("\n"))).unwrap();
-    study(&["import", "force-curve", &turned, "-o", &recording]).success();
-    study(&[
+    import(&rows, names, &["--active"]).success();
+    let identify = [
         "identify", &recording, "--method", "passive", "--dx", "0.05",
-    ])
-    .failure()
-    .stderr(contains("the target supplies energy"));
+    ];
+    study(&identify)
+        .failure()
+        .stderr(contains("the target supplies energy"));
 }
 
 /// A curve and the same with a tenth more force: two loops that differ by a tenth of the force.

@@ -37,7 +37,7 @@
 //! functions of position and direction, and so is F − m a − b v for *every* m and b: whatever was measured, a force that depends on position and
 //! direction alone explains it with any mass. Nothing tells a mass from the shape of the force within the few counts in which the
 //! speed turns, so that it has **no bound**. Damping has one, because friction does not push: it cannot exceed what it would be if all
-//! hysteresis were damping (`dissipation`). The same bound serves where Fieller's limit of a damping does not exist.
+//! hysteresis were damping (`dissipation`). The same bound serves where Fieller's limit of a damping does not exist. Strokes that are `alike` bound no mass either.
 //!
 //! References for the instruments: Fuller, Measurement Error Models, 1987, section 1.4; for the bound: Fieller 1954, J. R. Stat. Soc. B
 //! 16:175; for the shifts: Chatfield, The Analysis of Time Series, 2004, section 8.1 (cross-correlations of shifted series); for errors of blocks:
@@ -50,6 +50,7 @@
 //! the known force. Damping is bounded by all of its hysteresis, because
 //! friction may be less than in slow motion.
 
+mod alike;
 mod carried;
 mod dissipation;
 mod equations;

@@ -27,10 +27,11 @@ pub struct Curve(pub [Vec<f64>; 2]);
 pub fn loops(x_mm: &[f64]) -> Vec<Range<usize>> {
     let [low, high] = range(x_mm);
     let at = |share: f64| low + share * (high - low);
-    let (mut found, mut begin, mut deep) = (Vec::new(), 0, false);
+    let first = first_press(x_mm, TURNS.map(at));
+    let (mut found, mut begin, mut deep) = (Vec::new(), first, false);
     // the row of least displacement since the loop was left
     let mut end: Option<usize> = None;
-    for (i, x) in x_mm.iter().enumerate() {
+    for (i, x) in x_mm.iter().enumerate().skip(first) {
         if *x > at(TURNS[1]) {
             if let Some(end) = end.take() {
                 found.push(begin..end + 1);
@@ -45,6 +46,21 @@ pub fn loops(x_mm: &[f64]) -> Vec<Range<usize>> {
         found.push(begin..x_mm.len());
     }
     found
+}
+
+/// The row at which the first press begins: a recording that begins at the bottom has a release before it.
+fn first_press(x_mm: &[f64], [low, high]: [f64; 2]) -> usize {
+    if x_mm.first().is_none_or(|x| *x <= high) {
+        return 0;
+    }
+    let after = |from: usize, is: &dyn Fn(f64) -> bool| {
+        let way = x_mm[from..].iter().position(|x| is(*x));
+        way.map_or(x_mm.len(), |way| from + way)
+    };
+    let rest = after(0, &|x| x < low);
+    let deep = after(rest, &|x| x > high);
+    let least = |least: usize, i: usize| if x_mm[i] < x_mm[least] { i } else { least };
+    (rest..deep).reduce(least).unwrap_or(x_mm.len())
 }
 
 impl Curve {
@@ -304,6 +320,14 @@ mod tests {
         let recording = curve(&[1.0, 1.0, 1.0]);
         assert_eq!(loops(&recording.x_mm), [0..400, 400..800, 800..1200]);
         assert_eq!(loops(&[0.0, 0.5, 1.0]), []);
+        assert_eq!(loops(&[]), []);
+        // a release whose press was not recorded is no loop
+        assert_eq!(loops(&[1.0, 0.5, 0.05, 0.0, 0.5, 1.0]), []);
+        let from_the_bottom = [1.0, 0.5, 0.05, 0.0, 0.05, 0.5, 1.0, 0.5, 0.0];
+        assert_eq!(
+            loops(&from_the_bottom).as_slice(),
+            std::slice::from_ref(&(3..9))
+        );
         assert_eq!(
             loops(&[0.0, 1.0, 0.0]).as_slice(),
             std::slice::from_ref(&(0..3))

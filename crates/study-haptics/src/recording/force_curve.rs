@@ -12,23 +12,22 @@
 //!
 //! Fields may be quoted.
 //!
-//! [`join`] makes one recording of several curves: repeated measurements, or several speeds.
+//! A file whose rows begin at the bottom has its press put before its release; [`ForceCurve::passive`] tells rows in reverse order and swapped columns.
+//! [`join()`] makes one recording of several curves: repeated measurements, or several speeds.
 
+mod join;
+mod order;
 mod time;
 
 use super::names::linear;
 use super::rows::{number, separator, shown};
-use super::{Columns, acceleration, range, resolution, velocity, write};
-use std::fmt::Write as _;
+pub use join::{Source, Stated, USUAL_RATE_HZ, join, unlike};
+use order::Order;
 use study_base::text::Untrusted;
 use time::{Time, moment, rate, time_of};
 
-/// Rows a second of a curve that has no time, unless another rate is given.
-pub const USUAL_RATE_HZ: f64 = 10.0;
 /// Column names are looked for in this many lines.
 const MOST_HEADER_LINES: usize = 100;
-/// Curves of one target differ by less than this factor, unless it is a damper at other speeds.
-const UNLIKE: f64 = 5.0;
 /// Fewest rows of a curve: second differences need three.
 const LEAST_ROWS: usize = 3;
 
@@ -59,6 +58,26 @@ pub struct ForceCurve {
     pub rate_hz: Option<f64>,
     /// The units that the file does not state, such as `force in gf`.
     pub assumed: Vec<String>,
+    /// Whether the file begins at the bottom: its press was put before its release.
+    pub release_first: bool,
+    /// The line of the first row.
+    first_line: usize,
+}
+
+impl ForceCurve {
+    /// Whether the press needs more force than the release gives back.
+    ///
+    /// # Errors
+    /// What is most likely wrong with the file: the order of its rows, the names of its columns, or the sign of the force.
+    pub fn passive(&self) -> Result<(), ForceCurveError> {
+        order::passive(&self.x_mm, &self.f_n).map_err(|fault| ForceCurveError {
+            line: match fault {
+                Fault::Swapped => self.first_line - 1,
+                _ => self.first_line,
+            },
+            fault,
+        })
+    }
 }
 
 /// Why a file is no force curve, and at which line.
@@ -125,8 +144,40 @@ pub enum ForceCurveFault {
     TooShort(usize),
     #[error("{0} never changes: nothing was measured")]
     Constant(&'static str),
-    #[error("the displacement goes one way only: a curve needs a press and a release")]
+    #[error(
+        "the displacement goes one way only: a curve needs a press and a release, in the order of time"
+    )]
     OneDirection,
+    #[error(
+        "displacement and force decrease during the press: change the sign of both, so that a press increases them"
+    )]
+    BothDownwards,
+    #[error(
+        "the displacement jumps here from {from_mm:.3} to {to_mm:.3} mm, and its strokes all go the same way: list the rows in the order of time, the press from rest to the bottom and the release from there to rest"
+    )]
+    SameWay { from_mm: f64, to_mm: f64 },
+    #[error("`{}` is a unit of {of}, not of {what}: the columns of force and displacement are swapped, exchange their names or units", Untrusted(.unit))]
+    UnitOfOther {
+        what: &'static str,
+        of: &'static str,
+        unit: String,
+    },
+    #[error(
+        "the columns force and displacement are swapped: what is called force advances evenly, as the displacement of a tester does, and what is called displacement does not; exchange their names"
+    )]
+    Swapped,
+    #[error(
+        "there is less force at the bottom than at rest, and the release has more of it than the press: change the sign of the force, so that it is positive against a press"
+    )]
+    Sign,
+    #[error(
+        "the rows from here on are in the reverse order of time: at {at_mm:.3} mm the press has {press_n:.4} N and the release {release_n:.4} N, but no passive target gives back more than it takes; sort them from first to last, or exchange press and release"
+    )]
+    TurnedAround {
+        at_mm: f64,
+        press_n: f64,
+        release_n: f64,
+    },
 }
 
 use ForceCurveFault as Fault;
@@ -161,12 +212,21 @@ impl Column {
     const DISPLACEMENT: (&'static str, usize, &'static str) = ("displacement", 1, "mm");
 
     fn unit(&mut self, unit: &str) -> Result<(), Fault> {
-        let factor = linear(self.kind, unit).ok_or_else(|| Fault::Unit {
-            what: self.what,
-            unit: shown(unit),
-            units: match self.kind {
-                1 => "mm, cm, m, um",
-                _ => "gf, kgf, N, mN, cN",
+        let (what, unit_shown) = (self.what, || shown(unit));
+        let (units, other) = match self.kind {
+            1 => ("mm, cm, m, um", Self::FORCE),
+            _ => ("gf, kgf, N, mN, cN", Self::DISPLACEMENT),
+        };
+        let factor = linear(self.kind, unit).ok_or_else(|| match linear(other.1, unit) {
+            Some(_) => Fault::UnitOfOther {
+                what,
+                of: other.0,
+                unit: unit_shown(),
+            },
+            None => Fault::Unit {
+                what,
+                unit: unit_shown(),
+                units,
             },
         })?;
         match self.factor.replace(factor) {
@@ -228,7 +288,7 @@ pub fn read(text: &str) -> Result<ForceCurve, ForceCurveError> {
     };
     let (mut x_mm, mut f_n, mut times) = (Vec::new(), Vec::new(), Vec::new());
     let mut target = None;
-    let mut last = first_row;
+    let (mut last, mut lines_of_rows) = (first_row, Vec::new());
     for (line, text) in lines().filter(|(line, text)| *line >= first_row && !text.is_empty()) {
         let separator = header.separator;
         let fields = fields(text, separator);
@@ -251,6 +311,7 @@ pub fn read(text: &str) -> Result<ForceCurve, ForceCurveError> {
         let name = || fields.get(header.name?).filter(|name| !name.is_empty());
         target = target.or_else(|| name().map(|name| (*name).to_owned()));
         last = line;
+        lines_of_rows.push(line);
     }
     if x_mm.len() < LEAST_ROWS {
         return Err(at(last)(Fault::TooShort(x_mm.len())));
@@ -260,15 +321,12 @@ pub fn read(text: &str) -> Result<ForceCurve, ForceCurveError> {
             return Err(at(first_row)(Fault::Constant(what)));
         }
     }
-    let top = (0..x_mm.len()).fold(0, |top, i| if x_mm[i] > x_mm[top] { i } else { top });
-    let travel = x_mm[top] - x_mm[0].min(x_mm[x_mm.len() - 1]);
-    let one_way = |end: f64| x_mm[top] - end < 0.5 * travel;
-    if one_way(x_mm[0]) || one_way(x_mm[x_mm.len() - 1]) {
-        let fault = match goes_down_and_back(&x_mm) {
-            true => Fault::Downwards,
-            false => Fault::OneDirection,
-        };
-        return Err(at(last)(fault));
+    let order = order::order(&x_mm, &f_n)
+        .map_err(|(row, fault)| at(row.map_or(last, |row| lines_of_rows[row]))(fault))?;
+    let release_first = order != Order::PressFirst;
+    if let Order::ReleaseFirst(rest) = order {
+        x_mm.rotate_left(rest);
+        f_n.rotate_left(rest);
     }
     let rate_hz = match settings {
         Some(settings) if settings.count != x_mm.len() => {
@@ -289,6 +347,8 @@ pub fn read(text: &str) -> Result<ForceCurve, ForceCurveError> {
         f_n,
         rate_hz,
         assumed,
+        release_first,
+        first_line: lines_of_rows[0],
     })
 }
 
@@ -416,14 +476,6 @@ fn column_at(at: usize, (what, kind, _): (&'static str, usize, &'static str)) ->
     }
 }
 
-/// Whether a displacement goes down for the press and comes back.
-fn goes_down_and_back(x_mm: &[f64]) -> bool {
-    let lowest = x_mm.iter().fold(f64::INFINITY, |low, x| low.min(*x));
-    let highest = x_mm.iter().fold(f64::NEG_INFINITY, |high, x| high.max(*x));
-    let near_the_top = |x: f64| highest - x < 0.5 * (highest - lowest);
-    near_the_top(x_mm[0]) && near_the_top(x_mm[x_mm.len() - 1])
-}
-
 /// The fields of a line, without their quotes.
 fn fields(line: &str, separator: u8) -> csv::StringRecord {
     let reader = csv::ReaderBuilder::new()
@@ -436,138 +488,6 @@ fn fields(line: &str, separator: u8) -> csv::StringRecord {
 /// A number; a comma in a field can only be a decimal one.
 fn number_in(text: &str, separator: u8) -> Option<f64> {
     number(text, if text.contains(',') { b';' } else { separator })
-}
-
-/// A curve and where it comes from.
-#[derive(Debug, Clone, Copy)]
-pub struct Source<'c> {
-    /// The curve.
-    pub curve: &'c ForceCurve,
-    /// Name of its file, without the folder.
-    pub file: &'c str,
-    /// SHA-256 hash of the file, hexadecimal.
-    pub sha256: &'c str,
-}
-
-/// What a person says of the curves, for the header. Untrusted.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Stated<'c> {
-    /// What was measured; otherwise what the first file says.
-    pub target: Option<&'c str>,
-    /// With what, and by whom.
-    pub instrument: Option<&'c str>,
-    /// Whom to credit.
-    pub credit: Option<&'c str>,
-    /// On which terms it may be used.
-    pub license: Option<&'c str>,
-    /// Rows a second of curves without a time.
-    pub rate_hz: Option<f64>,
-}
-
-/// Doubts that all curves are of one target in one unit: the force or the displacement of one varies by
-/// many times that of another. Untrusted.
-pub fn unlike(curves: &[Source<'_>]) -> Vec<String> {
-    let quantities = [
-        ("force", "N", "`force_gf` or `force_n`"),
-        ("displacement", "mm", "`displacement_mm`"),
-    ];
-    let mut doubts = Vec::new();
-    for (what, unit, names) in quantities {
-        let spread = |source: &Source<'_>| {
-            let ForceCurve { x_mm, f_n, .. } = source.curve;
-            let [low, high] = range(if what == "force" { f_n } else { x_mm });
-            high - low
-        };
-        let mut spreads: Vec<(f64, &str)> = (curves.iter())
-            .map(|source| (spread(source), source.file))
-            .collect();
-        spreads.sort_by(|a, b| a.0.total_cmp(&b.0));
-        if let [(small, one), .., (large, other)] = spreads[..]
-            && large > UNLIKE * small
-        {
-            doubts.push(format!(
-                "the {what} varies by {small:.4} {unit} in {one} and by {large:.4} {unit} in {other}: if both are of one target, their units differ, and the names of the columns have to say them, such as {names}"
-            ));
-        }
-    }
-    doubts
-}
-
-/// One recording of all curves, one after the other, as the bytes of its CSV file. Each line of the
-/// header begins with what it says: `measured force curve` with the next ones in short, `target`, `instrument`, `source` (one for each curve),
-/// `quasi-static` where a time was made up, `resolution`, `credit`, `license`.
-///
-/// Velocity and acceleration are differences within a curve.
-pub fn join(curves: &[Source<'_>], stated: Stated<'_>) -> Vec<u8> {
-    let usual_hz = stated.rate_hz.unwrap_or(USUAL_RATE_HZ);
-    let mut columns: [Vec<f64>; 5] = Default::default();
-    let mut begin_s = 0.0;
-    let mut sources = String::new();
-    for source in curves {
-        let curve = source.curve;
-        let interval_s = 1.0 / curve.rate_hz.unwrap_or(usual_hz);
-        let n = curve.x_mm.len();
-        let t: Vec<f64> = (0..n).map(|i| begin_s + i as f64 * interval_s).collect();
-        let x = &curve.x_mm;
-        let v: Vec<f64> = (0..n).map(|i| velocity(&t, x, i)).collect();
-        let a: Vec<f64> = (0..n).map(|i| acceleration(&t, x, i)).collect();
-        let _ = writeln!(
-            sources,
-            "source: {}, sha256 {}; {}, {n} rows from {begin_s:.3} s",
-            Untrusted(source.file),
-            source.sha256,
-            curve.layout.as_str(),
-        );
-        begin_s += n as f64 * interval_s;
-        let parts = [&t, x, &v, &a, &curve.f_n];
-        for (column, part) in columns.iter_mut().zip(parts) {
-            column.extend_from_slice(part);
-        }
-    }
-    let [t_s, x_mm, v_mm_s, a_m_s2, f_n] = &columns;
-    let mut header = String::new();
-    let mut line = |key: &str, text: Option<&str>| {
-        if let Some(text) = text {
-            let _ = writeln!(header, "{key}: {}", Untrusted(text));
-        }
-    };
-    let named = curves.iter().find_map(|s| s.curve.target.as_deref());
-    let target = stated.target.or(named);
-    let whose = [
-        target.or(Some("an unnamed target")),
-        stated.instrument,
-        stated.credit,
-    ];
-    let whose: Vec<&str> = whose.into_iter().flatten().collect();
-    // model files keep this line as their note
-    line("measured force curve", Some(&whose.join("; ")));
-    line("target", target);
-    line("instrument", stated.instrument);
-    line("credit", stated.credit);
-    line("license", stated.license);
-    if curves.iter().any(|source| source.curve.rate_hz.is_none()) {
-        let text = format!(
-            "the file has no time; {usual_hz} rows a second are assumed, and bounds of mass and damping rest on that"
-        );
-        line("quasi-static", Some(&text));
-    }
-    let steps = [("x", x_mm, "mm"), ("F", f_n, "N")].map(|(name, values, unit)| {
-        let step =
-            resolution(values).map_or("unknown".to_owned(), |step| format!("{step:.3e} {unit}"));
-        format!("{name} {step}")
-    });
-    line("resolution", Some(&steps.join(", ")));
-    header.push_str(&sources);
-    let columns = Columns {
-        t_s,
-        x_mm,
-        v_mm_s: Some(v_mm_s),
-        a_m_s2,
-        f_n,
-    };
-    let mut bytes = Vec::with_capacity(64 * t_s.len());
-    write(&mut bytes, &header, columns).expect("memory takes every write");
-    bytes
 }
 
 #[cfg(test)]

@@ -297,3 +297,128 @@ fn a_tester_that_counts_downwards_is_named() {
     let error = message("force,displacement\n0,0\n50,-0.5\n100,-1\n50,-0.5\n0,-0.01\n");
     assert!(error.contains("decreases during the press"), "{error}");
 }
+
+/// A press and a release of 1 mm in 2 × 101 rows: displacement, mm, and force, gf, with a stop from 0.9 mm on and friction.
+fn rows() -> Vec<[f64; 2]> {
+    let force = |x: f64, friction: f64| 40.0 + 20.0 * x + 900.0 * (x - 0.9).max(0.0) + friction;
+    let x = |i: i32| f64::from(i) / 100.0;
+    let press = (0..=100).map(|i| [x(i), force(x(i), 5.0)]);
+    let release = (0..=100).rev().map(|i| [x(i), force(x(i), -5.0)]);
+    press.chain(release).collect()
+}
+
+/// Their file.
+fn file(rows: &[[f64; 2]]) -> String {
+    let line = |[x, f]: &[f64; 2]| format!("{f:.3},{x:.3}\n");
+    "force,displacement\n".to_owned() + &rows.iter().map(line).collect::<String>()
+}
+
+#[test]
+fn a_file_that_begins_at_the_bottom_is_the_same_curve() {
+    let usual = read(&file(&rows())).unwrap();
+    assert!(!usual.release_first);
+    let mut turned = rows();
+    turned.rotate_left(101);
+    let turned = read(&file(&turned)).unwrap();
+    assert!(turned.release_first);
+    assert_eq!((&turned.x_mm, &turned.f_n), (&usual.x_mm, &usual.f_n));
+    assert_eq!([usual.passive(), turned.passive()], [Ok(()), Ok(())]);
+    let source = Source {
+        curve: &turned,
+        file: "a.csv",
+        sha256: "aa",
+    };
+    let bytes = join(&[source], Stated::default());
+    let recording = recording::read("r", bytes.as_slice()).unwrap();
+    let line = recording.header_line("source:").unwrap();
+    assert!(
+        line.ends_with("202 rows from 0.000 s, the press put before the release"),
+        "{line}"
+    );
+}
+
+/// More presses than releases, or less, are all in their order.
+#[test]
+fn half_a_loop_more_does_no_harm() {
+    let [press, release] = [0..101, 101..202].map(|of| rows()[of].to_vec());
+    for parts in [[&press, &release, &press], [&release, &press, &release]] {
+        let rows: Vec<[f64; 2]> = parts.into_iter().flatten().copied().collect();
+        let curve = read(&file(&rows)).unwrap();
+        assert!(!curve.release_first);
+        assert_eq!(curve.x_mm[0], rows[0][0]);
+        assert_eq!(curve.passive(), Ok(()));
+    }
+}
+
+#[test]
+fn what_makes_a_passive_target_active_is_told_with_the_line() {
+    let changed = |change: &dyn Fn([f64; 2]) -> [f64; 2]| -> Vec<[f64; 2]> {
+        rows().into_iter().map(change).collect()
+    };
+    let reversed: Vec<[f64; 2]> = rows().into_iter().rev().collect();
+    for (rows, expected) in [
+        (
+            reversed,
+            "line 2: the rows from here on are in the reverse order of time: at ",
+        ),
+        (
+            changed(&|[x, f]| [f, x]),
+            "line 1: the columns force and displacement are swapped: ",
+        ),
+        (
+            changed(&|[x, f]| [x, -f]),
+            "line 2: there is less force at the bottom than at rest",
+        ),
+    ] {
+        let message = read(&file(&rows)).unwrap().passive().unwrap_err();
+        assert!(message.to_string().starts_with(expected), "{message}");
+    }
+    // a latch whose force falls over most of its way takes energy all the same
+    let falls = changed(&|[x, f]| [x, 200.0 + f - 300.0 * x.min(0.9)]);
+    assert_eq!(read(&file(&falls)).unwrap().passive(), Ok(()));
+}
+
+#[test]
+fn an_order_that_is_none_of_time_is_told() {
+    let listed_upwards = {
+        let mut rows = rows();
+        rows[101..].reverse();
+        rows
+    };
+    assert_eq!(
+        message(&file(&listed_upwards)),
+        "line 103: the displacement jumps here from 1.000 to 0.000 mm, and its strokes all go the same way: list the rows in the order \
+         of time, the press from rest to the bottom and the release from there to rest"
+    );
+    let mut sorted = rows();
+    sorted.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let error = message(&file(&sorted));
+    assert!(
+        error.starts_with("line 203: the displacement goes one way only"),
+        "{error}"
+    );
+    let down: Vec<[f64; 2]> = rows().iter().map(|[x, f]| [-x, -f]).collect();
+    let error = message(&file(&down));
+    assert!(error.contains("change the sign of both"), "{error}");
+}
+
+#[test]
+fn the_unit_of_the_other_column_names_the_swap() {
+    for (text, expected) in [
+        (
+            "force_mm,displacement_gf\n0,0\n".to_owned(),
+            "line 1: `mm` is a unit of displacement, not of force: the columns of force and displacement are swapped",
+        ),
+        (
+            TABLE.replace("gf", "mm"),
+            "line 4: `mm` is a unit of displacement, not of force: ",
+        ),
+        (
+            FINE.replace("N,mm", "mm,N"),
+            "line 2: `mm` is a unit of displacement, not of force: ",
+        ),
+    ] {
+        let message = message(&text);
+        assert!(message.starts_with(expected), "{message}");
+    }
+}
