@@ -128,7 +128,7 @@ const FORMATS: &[Word] = &[
 const OF_FORMAT_2: [&str; 5] = ["parts", "families", "tracks", "groups", "sessions"];
 
 /// Keys that need [`FORMAT_3`], without the places in lists.
-pub const OF_FORMAT_3: [&str; 12] = [
+pub const OF_FORMAT_3: [&str; 13] = [
     "confirms",
     "design.order_version",
     "factors",
@@ -136,6 +136,7 @@ pub const OF_FORMAT_3: [&str; 12] = [
     "spaces",
     "models.levels",
     "parts.answers",
+    "parts.modulus",
     "analysis.model",
     "device.commissioned_within_days",
     "device.self_weigh",
