@@ -60,9 +60,8 @@ fn a_session_over(bridge: &str, mock: &[&str], options: &str) {
     assert_eq!(rows.len(), 5);
     for row in &rows {
         assert_eq!(felt(row), ["ok", "process", "lab-1", "true"]);
-        let number = |column: &str| row[column].parse::<f64>().unwrap();
-        assert!(number("exploration_s") >= 2.0, "{row:?}");
-        assert!(number("top_speed_mm_s") > 20.0, "{row:?}");
+        let felt_s: f64 = row["exploration_s"].parse().unwrap();
+        assert!(felt_s >= 2.0, "{row:?}");
         // on a computer that is late, too little may be known of the force
         assert_ne!(row["rendering"], "fault", "{row:?}");
     }
