@@ -22,11 +22,13 @@ mod looked;
 mod models;
 mod orders;
 mod outcomes;
+mod pairs;
 mod parts;
 mod power;
 mod questionnaires;
 mod questions;
 mod resolve;
+mod similarity;
 mod spaces;
 mod track_rules;
 mod tracks;
@@ -127,7 +129,7 @@ const FORMATS: &[Word] = &[
 const OF_FORMAT_2: [&str; 5] = ["parts", "families", "tracks", "groups", "sessions"];
 
 /// Keys that need [`FORMAT_3`], without the places in lists.
-pub const OF_FORMAT_3: [&str; 11] = [
+pub const OF_FORMAT_3: [&str; 12] = [
     "confirms",
     "design.order_version",
     "factors",
@@ -135,6 +137,7 @@ pub const OF_FORMAT_3: [&str; 11] = [
     "spaces",
     "models.levels",
     "parts.answers",
+    "parts.different",
     "analysis.model",
     "device.commissioned_within_days",
     "tracks.relative",

@@ -9,8 +9,10 @@ use crate::random::RandomSource;
 
 /// Most dimensions of a map.
 pub const MOST: usize = 3;
+/// Most objects of a map; more take too long.
+pub const MOST_OBJECTS: usize = 30;
 /// Number of random orders of the ratings of each participant.
-pub const DRAWS: u32 = 499;
+pub const DRAWS: u32 = 999;
 /// Random starts beside the classical map, of what is repeated.
 const STARTS: usize = 2;
 
@@ -33,8 +35,9 @@ pub struct Structure {
     pub p: f64,
 }
 
-/// Compares the ordinal stress of the mean dissimilarities with that after each participant's were dealt to the pairs at random: if nobody
-/// perceives a structure, all deals are equally likely. Both come from the same starts. `None` for fewer than four objects, or if
+/// Compares the stress of ratio scaling of the mean dissimilarities with that after each participant's were dealt to the pairs at random: if
+/// nobody perceives a structure, all deals are equally likely, and their means differ little. The order alone fits almost any dissimilarities of
+/// few objects. Both come from the same starts. `None` for fewer than four objects, or if
 /// there is no map.
 pub fn structure(
     participants: &[Dissimilarities],
@@ -47,7 +50,7 @@ pub fn structure(
         let found = smacof(
             &mean,
             dimensions,
-            Scale::Ordinal,
+            Scale::Ratio,
             STARTS,
             Precision::COARSE,
             random,

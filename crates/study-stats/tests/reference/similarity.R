@@ -1,5 +1,5 @@
 # Reference values of crates/study-stats/src/similarity/tests.rs: Rscript similarity.R (R 4.2.2, vegan 2.6-4).
-# Ekman (1954), "Dimensions of color vision", J. Psychol. 38: similarities of 14 colours, as in Shepard (1980), Science 210.
+# Ekman (1954), "Dimensions of color vision", J. Psychol. 38: similarities of 14 colors, as in Shepard (1980), Science 210.
 # With the package's files ekman.rda and morse.rda of smacof in the working folder they are compared with those.
 suppressMessages(library(vegan))
 options(digits = 12)
@@ -59,7 +59,7 @@ if (file.exists("morse.rda")) {
   show("ordinal morse, stress 2", ordinal(e$morse, 2))
 }
 
-# Procrustes' correlation of the classical map of the colours with wavelength, and with two properties.
+# Procrustes' correlation of the classical map of the colors with wavelength, and with two properties.
 wavelength <- c(434, 445, 465, 472, 490, 504, 537, 555, 584, 600, 610, 628, 651, 674)
 angle <- seq(0, 13) * 2 * pi / 16
 map <- cmdscale(ekman, k = 2)
