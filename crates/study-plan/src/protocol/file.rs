@@ -22,11 +22,13 @@ mod looked;
 mod models;
 mod orders;
 mod outcomes;
+mod pairs;
 mod parts;
 mod power;
 mod questionnaires;
 mod questions;
 mod resolve;
+mod similarity;
 mod spaces;
 mod standard;
 mod track_rules;
@@ -136,6 +138,7 @@ pub const OF_FORMAT_3: [&str; 12] = [
     "spaces",
     "models.levels",
     "parts.answers",
+    "parts.different",
     "analysis.model",
     "device.commissioned_within_days",
     "device.self_weigh",
