@@ -144,7 +144,7 @@ mod tests {
     #[test]
     fn the_font_is_that_of_the_release() {
         let sum = "8d91388f1d3604b3b8ae0e3ee2d140e50cd6122f9214514f4aca772540a4076d";
-        assert_eq!(study_base::hex::sha256(&DATA), sum);
+        assert_eq!(study_base::hex::sha256(&*DATA), sum);
     }
 
     #[test]
