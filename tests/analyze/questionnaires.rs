@@ -128,6 +128,7 @@ fn estimates_after_a_standard_refer_to_its_number() {
     let path = folder.path().join("m/protocol.toml");
     let text = fs::read_to_string(&path).unwrap();
     let with = text
+        .replace("study-protocol/2", "study-protocol/3")
         .replace(
             "range = [0.25, 1.7] ",
             "levels = [0.25, 0.5, 0.75, 1.0, 1.7] ",

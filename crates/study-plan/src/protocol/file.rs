@@ -130,7 +130,7 @@ const FORMATS: &[Word] = &[
 const OF_FORMAT_2: [&str; 5] = ["parts", "families", "tracks", "groups", "sessions"];
 
 /// Keys that need [`FORMAT_3`], without the places in lists.
-pub const OF_FORMAT_3: [&str; 12] = [
+pub const OF_FORMAT_3: [&str; 14] = [
     "confirms",
     "design.order_version",
     "factors",
@@ -139,6 +139,7 @@ pub const OF_FORMAT_3: [&str; 12] = [
     "models.levels",
     "parts.answers",
     "parts.different",
+    "parts.modulus",
     "analysis.model",
     "device.commissioned_within_days",
     "device.self_weigh",

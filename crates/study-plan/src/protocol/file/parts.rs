@@ -122,7 +122,7 @@ pub(super) const KINDS: [Variant<RawTask>; 8] = [
             "standard": Kind::ANY_NUMBER, "1.0";
             /// The same of realizations, in a part without a family.
             "reference": Kind::Id(Id::Model), r#""passive""#;
-            /// The number of the standard or reference. The prompt says it.
+            /// The number of the standard or reference. The prompt says it. It needs the format `study-protocol/3`.
             "modulus": Kind::positive(""), "100";
             /// From the end of the standard to the start of the level. Both are loaded anew in this time, whether they
             /// differ or not.

@@ -16,7 +16,7 @@ fn read(text: &str) -> Protocol {
 fn with(old: &str, new: &str) -> String {
     let text = SCALES.replacen(old, new, 1);
     assert_ne!(text, SCALES);
-    text
+    text.replace("study-protocol/2", "study-protocol/3")
 }
 
 /// What each trial that counts presents first, and what then.
@@ -73,6 +73,10 @@ fn a_standard_is_felt_first_in_each_trial() {
 #[test]
 fn faults_of_a_standard_are_named() {
     let family = "family = \"detent\"\nlevels = [4.0, 1.0]\n";
+    let early = with("levels = [4.0, 1.0]", "standard = 1.0\nmodulus = 100");
+    let early = early.replace("study-protocol/3", "study-protocol/2");
+    let shown = parse("p", &early).findings.render(false);
+    assert!(shown.contains("study-protocol/3"), "{shown}");
     for (keys, says) in [
         (
             "standard = 3.0\nmodulus = 10\n",
