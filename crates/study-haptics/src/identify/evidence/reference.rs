@@ -7,7 +7,6 @@ use super::equations::{BORDER, EVERYWHERE, Equations, Row, Rule, directions, nod
 use super::instruments::{self, Instruments};
 use super::spread::{ONE_SIDED, Spread};
 use crate::recording::Recording;
-use std::mem::discriminant;
 use study_wire::predict::Direction;
 
 /// Steps, as factors, in which the length of the play is refined.
@@ -117,7 +116,7 @@ impl Reference {
             let error = equations.total.error(&equations.solve(0, &free)?);
             Some((error, rule, estimates(&equations, &free)?))
         };
-        let mut tried: Vec<Tried> = Vec::new();
+        let mut tried: Vec<(f64, Rule, [f64; 2])> = Vec::new();
         for direction in directions(range_mm) {
             let mut last = f64::INFINITY;
             for smooth in SMOOTH {
@@ -133,10 +132,9 @@ impl Reference {
         }
         tried.sort_by(|a, b| a.0.total_cmp(&b.0));
         for factor in REFINED {
-            for best in to_refine(&tried, enough_strokes) {
-                let beside = [factor, 1.0 / factor];
-                tried.extend((beside.iter()).filter_map(|f| with(best.scaled(*f)?)));
-            }
+            let best = tried.first()?.1;
+            let beside = [factor, 1.0 / factor];
+            tried.extend((beside.iter()).filter_map(|f| with(best.scaled(*f)?)));
             tried.sort_by(|a, b| a.0.total_cmp(&b.0));
         }
         let (least, rule, _) = *tried.first()?;
@@ -242,24 +240,6 @@ impl Reference {
         let rules = (self.by_rule.iter()).map(|rule| (rule[term] - best).abs());
         Some(rules.fold((without_column - value).abs(), f64::max))
     }
-}
-
-/// The squared error of a rule, and mass and damping with it.
-type Tried = (f64, Rule, [f64; 2]);
-
-/// The best rule of each kind of which the length is refined, of rules in the order of their errors. With lengths a factor of two apart, the wrong kind may fit better
-/// than the right one between two of its lengths, and what it lacks at reversals would be taken for a damping. With too few strokes
-/// no term is found, and the best rule is refined alone.
-fn to_refine(tried: &[Tried], enough_strokes: bool) -> Vec<Rule> {
-    let mut best: Vec<Rule> = Vec::new();
-    for (_, rule, _) in tried {
-        let kind = discriminant(&rule.direction);
-        if best.iter().all(|one| discriminant(&one.direction) != kind) {
-            best.push(*rule);
-        }
-    }
-    best.truncate(if enough_strokes { best.len() } else { 1 });
-    best
 }
 
 /// The instruments at the scales that show most of acceleration and velocity.
@@ -377,39 +357,4 @@ fn local_scales(rows: &[Row], residual: &[f64]) -> Vec<f64> {
         (mean * square.max(LEAST_SCALE * LEAST_SCALE)).sqrt()
     };
     rows.iter().map(scale).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Three kinds in the order of their errors, one of them twice.
-    #[test]
-    fn the_best_rule_of_each_kind_is_refined_where_there_are_strokes_enough() {
-        let play = |delta_mm| Direction::Play { delta_mm };
-        let dahl = |delta_mm| Direction::Dahl { delta_mm };
-        let directions = [
-            play(0.02),
-            play(0.04),
-            Direction::Sign,
-            dahl(0.08),
-            dahl(0.04),
-        ];
-        let tried: Vec<Tried> = (directions.into_iter().enumerate())
-            .map(|(i, direction)| {
-                let rule = Rule {
-                    direction,
-                    smooth: 1,
-                };
-                (i as f64, rule, [0.0; 2])
-            })
-            .collect();
-        let refined = to_refine(&tried, true);
-        let lengths = refined.iter().filter_map(|rule| match rule.direction {
-            Direction::Play { delta_mm } | Direction::Dahl { delta_mm } => Some(delta_mm),
-            _ => None,
-        });
-        assert!(lengths.eq([0.02, 0.08]), "{refined:?}");
-        assert_eq!(to_refine(&tried, false).len(), 1);
-    }
 }
