@@ -139,18 +139,16 @@ fn estimates_after_a_standard_refer_to_its_number() {
             "standard = 0.5\nmodulus = 120\nfamily = \"detent\" ",
         );
     fs::write(&path, &with).unwrap();
-    let (out, _) = run(&["check", "m"]);
-    assert!(
-        out.contains("says 120, the number of the standard"),
-        "{out}"
-    );
+    let (_, warned) = run(&["check", "m"]);
+    let doubt = "says 120, the number of the standard";
+    assert!(warned.contains(doubt), "{warned}");
     let said = with.replace(
         "How strong did it feel?",
         "The first one is 120. How strong was the second one?",
     );
     fs::write(&path, said).unwrap();
-    let (out, _) = run(&["check", "m"]);
-    assert!(!out.contains("the number of the standard"), "{out}");
+    let (_, warned) = run(&["check", "m"]);
+    assert!(!warned.contains(doubt), "{warned}");
     run(&["rehearse", "m", "--participants", "12", "--out", "out"]);
     run(&["verify", "out"]);
     let document = analyzed(folder.path());

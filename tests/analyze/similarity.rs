@@ -32,7 +32,7 @@ fn similarity_has_its_table() {
         &["--task", "similarity"],
     ));
     assert!(
-        page.contains("Dimensions") && page.contains("m1 | m2"),
+        page.contains("dimensions  stress") && page.contains("m1 | m2"),
         "{page}"
     );
     let negative = "participant,first,second,rating\nP1,a,b,-1\n";

@@ -111,7 +111,11 @@ fn what_is_no_curve_is_refused_with_file_and_line() {
         .stderr(contains("--columns").and(contains("import").not()));
     let slow = path("slow.csv");
     let rows: String = (0..1900)
-        .map(|i| format!("{i},{i},{}\n", 1000 - (i - 1000i32).abs()))
+        .map(|i| {
+            let at = 1000 - (i - 1000i32).abs();
+            // five more while it is pressed
+            format!("{i},{},{at}\n", at + if i < 1000 { 5 } else { 0 })
+        })
         .collect();
     fs::write(&slow, format!("time,force,displacement\n{rows}")).unwrap();
     study(&["import", "force-curve", &slow, "-o", &path("slow-r.csv")])

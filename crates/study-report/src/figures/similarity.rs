@@ -1,7 +1,7 @@
 //! The map of the realizations, in which distances stand for differences.
 
 use super::{Canvas, Drawn, MAX_DRAWN, cell, drawn, head, rows_height};
-use crate::apa::digits;
+use crate::apa::plain;
 use crate::chart::{Axis, Label, Look, Mark, PALETTE, Panel, Whisker, shortened};
 use study_analysis::analyze::psychophysics::PartAnalysis;
 use study_analysis::analyze::psychophysics::results::Place;
@@ -49,7 +49,7 @@ pub(super) fn map(name: &str, part: &PartAnalysis) -> Option<Drawn> {
         }
         data.push(line);
     }
-    let stress = found.map_stress.number().map_or_else(String::new, digits);
+    let stress = found.map_stress.number().map_or_else(String::new, plain);
     let caption = format!(
         "Map of the realizations: distances stand for differences, in points of the scale; axes have no meaning of their own, and a unit is as long on both. Bars: one standard \
          error over participants to both sides. Stress {stress}."

@@ -57,7 +57,7 @@ fn willing(said: &str, device: &Shared) -> Typed {
     } else if said.contains("type `off`") {
         device.lock().firmware().pull(0.0);
         typed(3.0, "off")
-    } else if said.contains("too near to a stop") {
+    } else if said.contains("too near to a stop") || said.contains("bring it between") {
         device.lock().firmware().hold_at(17.5);
         typed(4.0, "go")
     } else if said.contains("`go`") {
