@@ -8,7 +8,8 @@ use study_base::text::ModelId;
 fn read(text: &str) -> Protocol {
     let parsed = parse("p", text);
     let faults = parsed.findings.render(false);
-    assert!(parsed.findings.faults.is_empty(), "{faults}");
+    // A family that only another part had is warned of.
+    assert!(!parsed.findings.has_errors(), "{faults}");
     parsed.protocol.unwrap()
 }
 
