@@ -53,14 +53,14 @@ fn it_writes_the_same_journals() {
     let own = OsString::from(env!("CARGO_BIN_EXE_study"));
     assert_ne!(program(), own, "STUDY_TEST_PROGRAM names the other build");
     for (name, more) in [
-        ("turn-signal", &[][..]),
+        ("cloth", &["--pilot"][..]),
+        ("turn-signal", &[]),
         ("turn-signal-extended", &[]),
         ("turn-signal-passive", &[]),
         ("knob", &[]),
         ("keyboard", &[]),
         ("yes-no", &[]),
         ("realism-search", &[]),
-        ("cloth", &["--pilot"]),
     ] {
         let home = tempfile::tempdir().unwrap();
         let protocol = home.path().join("protocol");
@@ -68,7 +68,9 @@ fn it_writes_the_same_journals() {
         let run = [&["run", protocol.to_str().unwrap(), "--plain"], more].concat();
         let [here, there] = [own.clone(), program()].map(|build| {
             let folder = tempfile::tempdir().unwrap();
-            played(build, folder.path(), &run, Some(HURRY));
+            // Samples that are laid by hand have no clock of a device to hurry.
+            let pace = Some(HURRY).filter(|_| name != "cloth");
+            played(build, folder.path(), &run, pace);
             events_of(folder.path(), name)
         });
         assert!(here.len() > 20, "{name}");
