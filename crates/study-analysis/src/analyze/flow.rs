@@ -178,6 +178,25 @@ mod tests {
         assert_eq!((young.recorded, young.analyzed), (share(2, 5), share(1, 3)));
     }
 
+    /// Of the two trials of S3 one is a pilot's: of equally many reasons the first one counts, and of more the one of most.
+    #[test]
+    fn who_is_left_out_has_one_reason() {
+        use study_session::outcome::ratings::Origin;
+        let reasons = |pilots: &[usize]| {
+            let mut ratings = ratings();
+            for at in pilots {
+                ratings.origin[*at] = Origin::Pilot;
+            }
+            let analysis = analyze(&ratings, &Rules::default());
+            analysis.flows[0].left_out.clone()
+        };
+        let place = |reason: &str| BTreeMap::from([(reason.to_owned(), share(1, 2))]);
+        assert_eq!(reasons(&[]), place("withdrawn"));
+        assert_eq!(reasons(&[6]), place("pilot"));
+        assert_eq!(reasons(&[7]), place("withdrawn"));
+        assert_eq!(reasons(&[6, 7]), place("pilot"));
+    }
+
     /// A participant with trials of several origins: the pilot's do not count beside real ones.
     #[test]
     fn trials_of_one_who_stays_are_left_out_by_themselves() {
