@@ -310,6 +310,18 @@ def pairs_of(seed, part, pairs, order, repetitions, interval_order, version, kin
         yield f"{b},{a}" if draw else f"{a},{b}"
 
 
+def similarity_of(seed, part, different, identical, practice, kind, number, pairs):
+    stream = Stream(seed, "schedule", "part", part, "practice", kind, str(number))
+    drawn = []
+    while len(drawn) < practice:
+        once = list(different)
+        stream.shuffle(once)
+        for a, b in once:
+            drawn.append(f"{b},{a}" if stream.below(2) else f"{a},{b}")
+    yield from drawn[:practice]
+    yield from pairs(different + [[m, m] for m in identical])
+
+
 def practice_of(seed, part, models, rounds, draw, kind, number):
     stream = Stream(seed, "schedule", "part", part, "practice", kind, str(number))
     for _ in range(rounds):
@@ -338,6 +350,7 @@ def main():
     what.add_argument("--track", action="append", help="ID:METHOD:TRIALS:CATCH:EASY, of a part")
     what.add_argument("--constant", help="ID:LEVELS:REPETITIONS, levels by comma")
     what.add_argument("--practice", help="ids by comma, of a part with a criterion")
+    what.add_argument("--similarity", help="such as a/b,a/c, pairs of different ones of a part")
     parser.add_argument("--part", help="its id")
     parser.add_argument("--repetitions", type=int)
     parser.add_argument("--order", help="blocked, shuffled, williams, latin-square or fixed")
@@ -345,6 +358,8 @@ def main():
     parser.add_argument("--min-distance", type=int)
     parser.add_argument("--interval-order", default="balanced", choices=["balanced", "random"])
     parser.add_argument("--order-version", type=int, default=1, choices=[1, 2])
+    parser.add_argument("--identical", default="", help="ids by comma, compared with themselves")
+    parser.add_argument("--practice-pairs", type=int, default=0)
     parser.add_argument("--rounds", type=int)
     parser.add_argument("--draw", default="rounds", choices=["rounds", "independent"])
     parser.add_argument("--kind", default="row", choices=["row", "pilot", "simulated"])
@@ -368,6 +383,19 @@ def main():
             own = order(len(pairs), a.kind, number)
             how = (a.repetitions, a.interval_order, a.order_version)
             return pairs_of(a.seed, a.part, pairs, own, *how, a.kind, number)
+    elif a.similarity:
+        head, different = "first,second", [pair.split("/") for pair in a.similarity.split(",")]
+        identical = [m for m in a.identical.split(",") if m]
+
+        def lines(number):
+            def of(pairs):
+                own = order(len(pairs), a.kind, number)
+                return pairs_of(
+                    a.seed, a.part, pairs, own, a.repetitions, "balanced", 2, a.kind, number
+                )
+
+            how = (identical, a.practice_pairs, a.kind, number, of)
+            return similarity_of(a.seed, a.part, different, *how)
     elif a.track:
         head, tracks = "track,intervals,easy", [Track(text) for text in a.track]
 

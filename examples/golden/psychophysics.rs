@@ -46,6 +46,7 @@ pub(crate) fn values(text: &str) -> Result<Map<String, Json>, Error> {
         "magnitude" => vec![(String::new(), magnitude(input)?)],
         "mushra" => vec![(String::new(), mushra(input)?)],
         "identification" => vec![(String::new(), identification(input)?)],
+        "similarity" => vec![(String::new(), similarity(input)?)],
         other => return Err(Error::Unknown("the kind", other.to_owned())),
     };
     let mut printed = Map::new();
@@ -509,6 +510,22 @@ fn identification(input: &Settings) -> Result<Values, Error> {
         .collect::<Result<Vec<_>, Error>>()?;
     let found = analysis::identification(&rows, &labels).0;
     Ok(named("identification", &found))
+}
+
+fn similarity(input: &Settings) -> Result<Values, Error> {
+    let rows = (input.rows()?.iter())
+        .map(|row| {
+            Ok(analysis::SimilarityRow {
+                participant: row.name("participant").unwrap_or_default(),
+                first: row.name("first").unwrap_or_default(),
+                second: row.name("second").unwrap_or_default(),
+                rating: row.number("rating")?,
+            })
+        })
+        .collect::<Result<Vec<_>, Error>>()?;
+    let none = analysis::Properties::new();
+    let found = analysis::similarity(&rows, &none, (SEED, "table"));
+    Ok(named("similarity", &found))
 }
 
 fn mushra(input: &Settings) -> Result<Values, Error> {

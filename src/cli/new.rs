@@ -93,6 +93,8 @@ enum TrialKind {
     Mushra,
     /// One of several labels for each realization
     Identification,
+    /// How different two realizations are, for a map
+    Similarity,
     /// Yes or no, with catch trials
     #[value(name = "yesno")]
     YesNo,
@@ -114,6 +116,7 @@ impl TrialKind {
             Self::Magnitude => (include_str!("new/magnitude.toml"), &[STATIC]),
             Self::Mushra => (include_str!("new/mushra.toml"), &WITH_ANCHORS),
             Self::Identification => (include_str!("new/identification.toml"), &CROSSED),
+            Self::Similarity => (include_str!("new/similarity.toml"), &[STATIC]),
             Self::YesNo => (include_str!("new/yesno.toml"), &[STATIC]),
             Self::Abx => (include_str!("new/abx.toml"), &[MODELS[0], MODELS[2]]),
         }

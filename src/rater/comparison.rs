@@ -1,5 +1,5 @@
 //! Raters who compare intervals, pairs and tracks, who estimate magnitudes, who rate
-//! beside a reference, and who say which label a realization has.
+//! beside a reference, who say which label a realization has, and who rate how different two are.
 //!
 //! Each interval is felt with normal noise of the rater's own, and the rater decides as an
 //! observer without memory would: the largest, the odd one, the nearer one, a distance
@@ -13,7 +13,8 @@ use study_base::rng::Stream;
 use study_base::text::{ModelId, PartId};
 use study_haptics::model::Realization;
 use study_plan::protocol::{
-    Answer, Identification, Label, Method, Protocol, Question, Role, Stimuli, Task, Trial,
+    Answer, Identification, Label, Method, Protocol, Question, Role, Similarity, Stimuli, Task,
+    Trial,
 };
 
 /// Median standard deviation of the noise of an interval of a track, N: the just
@@ -37,6 +38,9 @@ const CLOSE_N: (f64, f64) = (0.2, 1.5);
 /// easily labels are confused. What is named from memory differs by several just noticeable differences.
 const CONFUSED_N: f64 = 10.0 * FORCE_JND_N;
 
+/// Standard deviation of a rating of difference, as a share of the scale, for the median noise.
+const DIFFERENCE_NOISE: f64 = 0.1;
+
 /// What raters feel of the realizations of a study.
 #[derive(Debug, Default)]
 pub struct Percepts {
@@ -48,8 +52,8 @@ pub struct Percepts {
     distances: BTreeMap<(PartId, ModelId), f64>,
     /// Of each realization of a part with a reference its distance from it, N.
     from_reference: BTreeMap<(PartId, ModelId), f64>,
-    /// Of two realizations with labels the distance between them, N; the one that sorts first comes
-    /// first.
+    /// Of two realizations with labels, or of a part of similarity, the distance between them, N; the one
+    /// that sorts first comes first.
     between: BTreeMap<(ModelId, ModelId), f64>,
 }
 
@@ -121,7 +125,7 @@ impl Percepts {
         self.target.as_ref()
     }
 
-    /// How far apart two realizations with labels are, N.
+    /// How far apart two realizations with labels, or of a part of similarity, are, N.
     fn between_n(&self, a: &ModelId, b: &ModelId) -> Option<f64> {
         if a == b {
             return Some(0.0);
@@ -131,21 +135,41 @@ impl Percepts {
             .copied()
     }
 
+    /// The distance of two realizations of a part of similarity, as a share of the largest one.
+    fn share_of_most(&self, own: &Similarity, models: &[ModelId]) -> Option<f64> {
+        let [a, b] = models else { return None };
+        let all = own
+            .different
+            .iter()
+            .filter_map(|[a, b]| self.between_n(a, b));
+        let most_n = all.fold(0.0, f64::max);
+        let distance_n = self.between_n(a, b)?;
+        Some(if most_n > 0.0 {
+            distance_n / most_n
+        } else {
+            0.0
+        })
+    }
+
     /// The impression of a realization.
     pub fn impression(&self, model: &ModelId) -> Option<&Impression> {
         self.impressions.get(model)
     }
 }
 
-/// The distances of the realizations of each part of identification.
+/// The distances of the realizations of each part of identification and of similarity.
 fn between(
     protocol: &Protocol,
     tables: &BTreeMap<ModelId, Realization>,
     reference: &Reference,
 ) -> BTreeMap<(ModelId, ModelId), f64> {
     let mut between = BTreeMap::new();
-    for own in (protocol.parts.iter()).filter_map(|part| part.task.identification()) {
-        let mut models: Vec<&ModelId> = own.labels.iter().flat_map(|l| &l.models).collect();
+    for part in &protocol.parts {
+        let mut models: Vec<&ModelId> = match &part.task {
+            Task::Identification(own) => own.labels.iter().flat_map(|l| &l.models).collect(),
+            Task::Similarity(own) => own.models.iter().collect(),
+            _ => continue,
+        };
         models.sort_unstable();
         for (i, first) in models.iter().enumerate() {
             for second in &models[i + 1..] {
@@ -244,6 +268,15 @@ impl Comparing {
         Answer::Choice(label.map(|l| l.text.clone()).into_iter().collect())
     }
 
+    /// A rating from 0 to 100 of a difference, for its share of the largest one.
+    fn difference(&mut self, share: f64) -> Answer {
+        let felt = share + DIFFERENCE_NOISE * self.noise * self.stream.normal();
+        let lapses = self.stream.unit() < self.lapse_rate;
+        let anywhere = self.stream.unit();
+        let rating = if lapses { anywhere } else { felt };
+        Answer::Number((100.0 * rating).clamp(0.0, 100.0).round())
+    }
+
     /// A rating from 0 to 100 for a distance from the reference, N.
     fn beside_reference(&mut self, distance_n: f64) -> Answer {
         let felt = (distance_n + 0.5 * NOISE_N * self.noise * self.stream.normal()).abs();
@@ -298,6 +331,10 @@ impl Rater {
                     distance.unwrap_or(0.0)
                 };
                 return Some(self.comparing.name(own, distance_n));
+            }
+            (Some(Task::Similarity(own)), None) => {
+                let share = percepts.share_of_most(own, models).filter(|_| known);
+                return Some(self.comparing.difference(share.unwrap_or(0.5)));
             }
             _ => {}
         }
@@ -430,6 +467,25 @@ mod tests {
             let (found, expected) = (share(far * CONFUSED_N), expected(far));
             assert!((found - expected).abs() < 0.06, "{far}: {found} {expected}");
         }
+    }
+
+    #[test]
+    fn differences_are_rated_as_they_are() {
+        let mean = |share: f64| {
+            let rated = (1..=400).map(|number| {
+                let answer = Comparing::new(3, number).difference(share);
+                answer.number().unwrap()
+            });
+            rated.sum::<f64>() / 400.0
+        };
+        // One in fifty lapses, and nobody rates below 0.
+        let means = [0.0, 0.25, 0.5, 1.0].map(mean);
+        assert!((0.5..9.0).contains(&means[0]), "{means:?}");
+        assert!(
+            (means[1] - 25.5).abs() < 3.0 && (means[2] - 50.0).abs() < 3.0,
+            "{means:?}"
+        );
+        assert!((88.0..99.5).contains(&means[3]), "{means:?}");
     }
 
     #[test]

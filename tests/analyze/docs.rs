@@ -201,7 +201,7 @@ fn statistics(all: Vec<Declared>) -> Vec<(String, &'static str, bool)> {
 }
 
 /// What stands for names of the data.
-const NAMES: [&str; 16] = [
+const NAMES: [&str; 18] = [
     "M",
     "R",
     "D",
@@ -213,6 +213,8 @@ const NAMES: [&str; 16] = [
     "LABEL",
     "RIGHT",
     "GIVEN",
+    "K",
+    "PROPERTY",
     "GROUP",
     "PARAMETER",
     "ITEM",

@@ -33,6 +33,7 @@ mod report_support;
 mod rows;
 mod rules;
 mod schema;
+mod similarity;
 mod study;
 mod told_apart;
 mod trials;

@@ -36,7 +36,7 @@ pub(crate) fn analyzed(folder: &Path) -> Value {
 
 /// Rehearses the protocol of `study new --kind KIND`; the analysis of its only part, and
 /// the study's folder.
-fn rehearsed(folder: &Path, kind: &str) -> Value {
+pub(crate) fn rehearsed(folder: &Path, kind: &str) -> Value {
     for arguments in [
         vec!["new", "--seed", "20261123", kind, "--kind", kind],
         vec!["rehearse", kind, "--participants", "2", "--out", "out"],
@@ -52,7 +52,7 @@ fn rehearsed(folder: &Path, kind: &str) -> Value {
 }
 
 /// The values of a table of trials.
-fn of_table(folder: &Path, table: &str, arguments: &[&str]) -> Value {
+pub(crate) fn of_table(folder: &Path, table: &str, arguments: &[&str]) -> Value {
     fs::write(folder.join("table.csv"), table).unwrap();
     let mut all = vec!["analyze", "table.csv", "--json", "--task"];
     all.extend(arguments);
@@ -73,7 +73,7 @@ pub(crate) fn cells(path: &Path, columns: &[&str]) -> Vec<Vec<String>> {
 }
 
 /// Analyzes a study as a user would: the report, after a look at the files beside it.
-fn report(folder: &Path, study_id: &str, figures: &[&str], tables: &[&str]) -> String {
+pub(crate) fn report(folder: &Path, study_id: &str, figures: &[&str], tables: &[&str]) -> String {
     let results = format!("out/{study_id}");
     let (code, page, err) = study(&["analyze", &results], folder);
     assert_eq!(code, 0, "{err}");

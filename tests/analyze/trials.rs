@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-fn analyze(folder: &Path, table: &str, args: &[&str]) -> Command {
+pub(crate) fn analyze(folder: &Path, table: &str, args: &[&str]) -> Command {
     let path = folder.join("t.csv");
     fs::write(&path, table).unwrap();
     let mut command = Command::cargo_bin("study").unwrap();
@@ -18,19 +18,19 @@ fn analyze(folder: &Path, table: &str, args: &[&str]) -> Command {
     command
 }
 
-fn text(command: &mut Command) -> String {
+pub(crate) fn text(command: &mut Command) -> String {
     let done = command.assert().success();
     String::from_utf8(done.get_output().stdout.clone()).unwrap()
 }
 
-fn values(command: &mut Command) -> Json {
+pub(crate) fn values(command: &mut Command) -> Json {
     let document: Json = serde_json::from_str(&text(command)).unwrap();
     assert_eq!(document["format"], "study-trials/1");
     document["values"].clone()
 }
 
 /// The input of a reference file and the expected value of an identifier.
-fn golden(name: &str) -> Json {
+pub(crate) fn golden(name: &str) -> Json {
     let path = format!(
         "{}/tests/golden/psychophysics/{name}.json",
         env!("CARGO_MANIFEST_DIR")
@@ -38,7 +38,7 @@ fn golden(name: &str) -> Json {
     serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
 }
 
-fn csv(head: &str, golden: &Json, row: impl Fn(&[Json]) -> String) -> String {
+pub(crate) fn csv(head: &str, golden: &Json, row: impl Fn(&[Json]) -> String) -> String {
     let mut table = format!("{head}\n");
     for cells in golden["input"]["rows"].as_array().unwrap() {
         writeln!(table, "{}", row(cells.as_array().unwrap())).unwrap();
@@ -51,11 +51,11 @@ fn plain(cell: &Json) -> String {
         .map_or_else(|| cell.to_string(), str::to_owned)
 }
 
-fn joined(cells: &[Json]) -> String {
+pub(crate) fn joined(cells: &[Json]) -> String {
     cells.iter().map(plain).collect::<Vec<_>>().join(",")
 }
 
-fn close(got: &Json, want: &Json, id: &str) {
+pub(crate) fn close(got: &Json, want: &Json, id: &str) {
     let (got, want) = (
         got[id].as_f64().unwrap(),
         want["expected"][id]["value"].as_f64().unwrap(),

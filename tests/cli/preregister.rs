@@ -265,6 +265,16 @@ fn tracks_and_estimates_are_declared() {
                 "Power was not computed:",
             ],
         ),
+        (
+            "similarity",
+            &[
+                "ratings of difference from 0 to 100 of all 15 pairs of 6 levels and of each with itself, 2 trials each, in both orders in turn, order blocked",
+                "Part `difference`: Is there a structure that a map shows better than chance? Decided by: permutation test within participants",
+                "Part `difference`: Does it take more than one dimension? Decided by: t test over participants",
+                "Part `difference`: Does the map follow the level? Decided by: permutation test, exact",
+                "Power was not computed:",
+            ],
+        ),
     ] {
         let folder = tempfile::tempdir().unwrap();
         let at = folder.path();

@@ -242,6 +242,7 @@ fn the_templates_of_parts_are_valid_and_broken_ones_are_not() {
         "magnitude",
         "mushra",
         "identification",
+        "similarity",
         "yesno",
         "abx",
         "search",

@@ -173,6 +173,7 @@ fn studies(home: &Path) -> Vec<(PathBuf, &'static [&'static str])> {
         several("magnitude", 6),
         several("mushra", 6),
         several("identification", 6),
+        several("similarity", 6),
     ]
 }
 

@@ -219,6 +219,16 @@ fn the_headline_of_groups_and_sessions_is_that_of_the_analysis() {
                 "sessions/p",
             ],
         ),
+        (
+            "similarity",
+            "",
+            &[
+                "similarity/agreement/kendall_w",
+                "similarity/order/rms",
+                "similarity/dimensions/1/classical",
+                "similarity/pair/detent.1|detent.2/rescaled",
+            ],
+        ),
     ] {
         let home = tempfile::tempdir().unwrap();
         let folder = match kind {

@@ -4,7 +4,7 @@
 //! The shares are compared with chance by hand-made bounds: 0.02 and four standard errors of
 //! the simulation, which is printed (`--nocapture`).
 
-use crate::parts::{PAIRS, protocol};
+use crate::parts::{PAIRS, protocol, similarity};
 use std::collections::BTreeMap;
 use study_plan::protocol::{Method, Protocol, Seat, Stimuli};
 use study_plan::schedule::Planner;
@@ -294,13 +294,21 @@ fn answers_and_sequences_stay_in_balance() {
 #[test]
 fn which_of_a_pair_comes_first_cannot_be_guessed() {
     let rules = PAIRS.replace("repetitions = 3", "repetitions = 4");
-    let protocol = protocol(2, &[], &rules);
-    let planner = Planner::new(&protocol, None).unwrap();
+    first_cannot_be_guessed(&protocol(2, &[], &rules), 10);
+    // In whatever version of the orders of others.
+    let rules = "repetitions = 4\nidentical = true\npractice = 3";
+    first_cannot_be_guessed(&similarity(1, rules), 6);
+}
+
+/// `block`: different pairs in a block.
+fn first_cannot_be_guessed(protocol: &Protocol, block: usize) {
+    let planner = Planner::new(protocol, None).unwrap();
     let exchanged = |row: u32| -> Vec<(String, usize)> {
         let trials = planner.plan(Seat::Row(row)).unwrap();
-        let one = trials.iter().filter_map(|trial| match &trial.stimuli {
+        let counted = trials.iter().filter(|trial| !trial.practice);
+        let one = counted.filter_map(|trial| match &trial.stimuli {
             Stimuli::Pair { pair: [a, b] } if a < b => Some((format!("{a}{b}"), 0)),
-            Stimuli::Pair { pair: [a, b] } => Some((format!("{b}{a}"), 1)),
+            Stimuli::Pair { pair: [a, b] } if b < a => Some((format!("{b}{a}"), 1)),
             _ => None,
         });
         one.collect()
@@ -314,7 +322,7 @@ fn which_of_a_pair_comes_first_cannot_be_guessed() {
     };
     let first = share(&mut |row, at| rows[row][at].1 == 0);
     let alternate = share(&mut |row, at| rows[row][at].1 == at % 2);
-    let blocks = share(&mut |row, at| rows[row][at].1 == at / 10 % 2);
+    let blocks = share(&mut |row, at| rows[row][at].1 == at / block % 2);
     let rhythm = share(&mut |row, at| rows[row][at].1 == at / 2 % 2);
     // What the rows before had in the same repetition of the same pair.
     let as_row = |back: usize| {
@@ -347,5 +355,49 @@ fn which_of_a_pair_comes_first_cannot_be_guessed() {
     ] {
         println!("{name}: {share:.4} ± {error:.4}");
         assert!((share - 0.5).abs() < 0.02 + 4.0 * error, "{name}: {share}");
+    }
+}
+
+/// Whether the two are the same realization follows neither from the place of a trial in its block nor from the trial before,
+/// but for what has come already: nobody is told what that was.
+#[test]
+fn identical_pairs_come_anywhere() {
+    let protocol = similarity(2, "repetitions = 2\nidentical = true");
+    let planner = Planner::new(&protocol, None).unwrap();
+    let identical = |row: u32| -> Vec<bool> {
+        let trials = planner.plan(Seat::Row(row)).unwrap();
+        let same = trials.iter().map(|trial| match &trial.stimuli {
+            Stimuli::Pair { pair: [a, b] } => a == b,
+            other => panic!("{other:?}"),
+        });
+        same.collect()
+    };
+    let rows: Vec<Vec<bool>> = (1..=ROWS).map(identical).collect();
+    let share = |trials: &mut dyn Iterator<Item = bool>| {
+        let all: Vec<bool> = trials.collect();
+        let mean = all.iter().filter(|same| **same).count() as f64 / all.len() as f64;
+        (mean, (0.24 / all.len() as f64).sqrt())
+    };
+    // Of ten pairs of a block four are identical.
+    for place in 0..20 {
+        let (found, error) = share(&mut rows.iter().map(|row| row[place]));
+        assert!(
+            (found - 0.4).abs() < 4.0 * error,
+            "{place}: {found} ± {error}"
+        );
+    }
+    // After an identical one three of the nine others are.
+    let in_a_block = |row: &Vec<bool>| -> Vec<[bool; 2]> {
+        let blocks = row.chunks(10).flat_map(|block| block.windows(2));
+        blocks.map(|two| [two[0], two[1]]).collect()
+    };
+    let after: Vec<[bool; 2]> = rows.iter().flat_map(in_a_block).collect();
+    for (before, expected) in [(true, 3.0 / 9.0), (false, 4.0 / 9.0)] {
+        let own = after.iter().filter(|two| two[0] == before);
+        let (found, error) = share(&mut own.map(|two| two[1]));
+        assert!(
+            (found - expected).abs() < 4.0 * error,
+            "{before}: {found} ± {error}"
+        );
     }
 }

@@ -18,6 +18,7 @@ mod resume;
 mod rig;
 mod saving;
 mod search;
+mod similarity;
 mod studies;
 mod unasked;
 mod whole;

@@ -31,6 +31,7 @@ mod programs;
 mod rehearsed;
 mod releases;
 mod screen;
+mod similarity_by_keys;
 #[path = "../support/mod.rs"]
 mod support;
 mod tcp;

@@ -16,13 +16,13 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// What every form of a trial asks.
-const PROMPT: &str = "Which is it now?";
+pub(crate) const PROMPT: &str = "Which is it now?";
 
 /// How a trial is answered, and another answer for the correction.
 type Observer = fn(&Json) -> (String, String);
 
 /// A study of one part in `folder`, with the tables that the parts need.
-fn written(folder: &Path, rest: &str) {
+pub(crate) fn written(folder: &Path, rest: &str) {
     let models = folder.join("p/models");
     fs::create_dir_all(&models).unwrap();
     let shipped =
@@ -73,7 +73,7 @@ procedure = {procedure}
     )
 }
 
-fn models() -> String {
+pub(crate) fn models() -> String {
     let of = |name: &str| {
         format!("[[models]]\nid = \"l{name}\"\nfile = \"models/lambda-0.{name}.toml\"\n")
     };
@@ -184,7 +184,7 @@ fn start_with(folder: &Path, more: &[&str]) -> Terminal {
 
 /// A session with a failed interval, a correction, a quit during a trial and a resume. The
 /// columns of `ratings.csv` of the counted trials.
-fn eventful(folder: &Path, observer: Observer) -> Vec<csv::StringRecord> {
+pub(crate) fn eventful(folder: &Path, observer: Observer) -> Vec<csv::StringRecord> {
     eventful_with(folder, observer, &[])
 }
 

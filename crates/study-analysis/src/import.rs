@@ -73,6 +73,7 @@ impl Kind {
             Self::Task(TableKind::Identification) => {
                 &["participant", "realization", "target", "answer"]
             }
+            Self::Task(TableKind::Similarity) => &["participant", "first", "second", "rating"],
         }
     }
 
@@ -93,7 +94,7 @@ impl Kind {
             Self::Task(TableKind::Trials(_)) => &["answer", "correct", "positive"],
             Self::Task(TableKind::Pairs | TableKind::Identification) => &["answer"],
             Self::Task(TableKind::Magnitude) => &["estimate"],
-            Self::Task(TableKind::Mushra) => &["rating"],
+            Self::Task(TableKind::Mushra | TableKind::Similarity) => &["rating"],
         }
     }
 

@@ -25,6 +25,7 @@ pub mod keys;
 pub mod kinds;
 pub mod outcomes;
 pub mod pairs;
+mod part_design;
 pub mod parts;
 pub mod phrases;
 pub mod plan;
@@ -38,6 +39,7 @@ pub mod rules;
 pub mod scale;
 pub mod schema;
 mod section;
+pub mod similarity;
 pub mod spaces;
 
 pub use answer::{Answer, Given, Refusal};
@@ -60,6 +62,7 @@ pub use questionnaires::{Inventory, Questionnaire};
 pub use relative::Relative;
 pub use rules::Exclusion;
 pub use scale::Scale;
+pub use similarity::Similarity;
 pub use spaces::{Axis, SearchTask, SpaceRules};
 
 use keys::words;

@@ -25,13 +25,15 @@ mod pairs;
 mod requeue;
 mod search;
 mod sequence;
+mod similarity;
 mod tracks;
 
 pub use crate::protocol::{Seat, Trial};
 pub use requeue::{Felt, Requeued, breaks_constraint, requeue};
 
 use crate::protocol::{
-    Drawn, FileOrders, Identification, Magnitude, Mushra, PartsOrder, Protocol, Stimuli, Task,
+    Drawn, FileOrders, Identification, Magnitude, Mushra, PartsOrder, Protocol, Similarity,
+    Stimuli, Task,
 };
 use constraints::Violation;
 use pairs::PairOrders;
@@ -238,6 +240,8 @@ struct PartOrders {
     seed: u64,
     /// Felt before each realization.
     reference: Option<ModelId>,
+    /// Whose practice has pairs that are drawn.
+    similarity: Option<Similarity>,
     kind: Kind,
 }
 
@@ -276,6 +280,7 @@ impl Planner {
                 rounds: None,
                 seed,
                 reference: None,
+                similarity: None,
                 kind: Kind::Rating(Sequence::of_models(
                     seed,
                     None,
@@ -314,6 +319,9 @@ impl Planner {
                     Kind::Tracks(TrackOrders::new(seed, &part.id, protocol, tracks)?)
                 }
                 Task::Search(own) => Kind::Search(SearchOrders::new(seed, &part.id, own)),
+                Task::Similarity(own) => {
+                    Kind::Pairs(PairOrders::new(seed, &part.id, &own.pairs(), &design)?)
+                }
             };
             Ok(PartOrders {
                 part: id.cloned(),
@@ -323,6 +331,10 @@ impl Planner {
                     .map(|criterion| (criterion.rounds, criterion.draw)),
                 seed,
                 reference: part.task.reference().cloned(),
+                similarity: match &part.task {
+                    Task::Similarity(own) => Some(own.clone()),
+                    _ => None,
+                },
                 kind,
             })
         };
@@ -407,13 +419,13 @@ impl PartOrders {
         let mut number = u32::try_from(trials.len()).unwrap_or(u32::MAX);
         let block = last(|t| t.block, false);
         let (practiced, position) = (last(|t| t.position, true), last(|t| t.position, false));
-        for (place, model) in (1..).zip(&self.practiced(seat)) {
+        for (place, stimuli) in (1..).zip(self.practiced(seat)) {
             number += 1;
             trials.push(Trial {
                 trial: number,
                 block: 0,
                 position: practiced + place,
-                stimuli: Stimuli::rated(self.reference.as_ref(), model),
+                stimuli,
                 repetition: 0,
                 practice: true,
                 part: self.part.clone(),
@@ -436,8 +448,20 @@ impl PartOrders {
 }
 
 impl PartOrders {
-    /// The realizations of the practice trials, in their order for a seat.
-    fn practiced(&self, seat: Seat) -> Vec<ModelId> {
+    /// What the practice trials present, in their order for a seat.
+    fn practiced(&self, seat: Seat) -> Vec<Stimuli> {
+        if let (Some(own), Some(part)) = (&self.similarity, &self.part) {
+            return similarity::practiced(self.seed, part, own, seat);
+        }
+        let models = self.practiced_models(seat);
+        let rated = models
+            .iter()
+            .map(|m| Stimuli::rated(self.reference.as_ref(), m));
+        rated.collect()
+    }
+
+    /// The realizations of the practice trials of a part with one rating a trial.
+    fn practiced_models(&self, seat: Seat) -> Vec<ModelId> {
         let (Some((rounds, draw)), Some(part)) = (self.rounds, &self.part) else {
             return self.practice.clone();
         };

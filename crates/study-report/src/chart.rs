@@ -184,6 +184,23 @@ impl Figure {
         self
     }
 
+    /// Widens an axis of each panel, so that distances are as long in all directions.
+    #[must_use]
+    pub fn isometric(mut self) -> Self {
+        // An axis that is wider may have wider labels.
+        for _ in 0..4 {
+            let frames = frame::frames(&self);
+            for (panel, frame) in self.panels.iter_mut().zip(frames) {
+                let (width, height) = (frame.right - frame.left, frame.bottom - frame.top);
+                let (x, y) = (panel.x.high - panel.x.low, panel.y.high - panel.y.low);
+                let px = (width / x).min(height / y);
+                panel.x.widened(width / px);
+                panel.y.widened(height / px);
+            }
+        }
+        self
+    }
+
     /// Whether all labels have a place where they overlap nothing.
     pub fn labels_fit(&self) -> bool {
         (self.panels.iter().zip(frame::frames(self)))

@@ -16,6 +16,7 @@ mod outcomes;
 mod pairs;
 mod parts;
 mod rendering;
+mod similarity;
 mod strips;
 mod subjects;
 mod thresholds;

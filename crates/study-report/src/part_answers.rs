@@ -44,6 +44,13 @@ fn answer(part: &PartAnalysis, f: &PartFinding) -> Option<Answer> {
         answer.main.extend(information(part));
         answer.main.extend(most_confused(part));
     }
+    if f.question == PartQuestion::Structure {
+        answer.main.extend(agreement(part));
+        answer.main.extend(identical(part));
+    }
+    if f.question == PartQuestion::Dimensions {
+        answer.main.extend(dimensions(part));
+    }
     if f.question == PartQuestion::Sessions {
         answer.main.extend(retest(part));
     }
@@ -116,8 +123,11 @@ pub(super) fn results(part: &PartAnalysis) -> String {
     text.extend(scores(part));
     text.extend(exponent(part));
     text.extend(information(part));
+    text.extend(agreement(part));
+    text.extend(identical(part));
     let tested = part.findings.iter().filter(|f| f.test.is_some());
     text.extend(tested.filter_map(|f| wording::of_part(part, f).paper()));
+    text.extend(dimensions(part));
     text.extend(retest(part));
     let pairs = part.findings.iter().any(|f| {
         let of_conditions = [PartQuestion::Thresholds, PartQuestion::Magnitudes];
@@ -205,6 +215,61 @@ fn information(part: &PartAnalysis) -> Option<String> {
         apa::two(bits.stimulus.number()?),
         apa::one(bits.items.number()?),
     ))
+}
+
+/// Whether participants agree on what is different, and whether the order of two matters.
+fn agreement(part: &PartAnalysis) -> Option<String> {
+    let found = part.results.over.similarity.as_ref()?;
+    let correlation = found.agreement.mean_correlation.number()?;
+    let w = found.agreement.kendall_w.number();
+    let w = w.map_or_else(String::new, |w| format!("; Kendall's W = {}", apa::two(w)));
+    let order = match (found.order.rms.number(), found.order.p.number()) {
+        (Some(rms), Some(p)) => format!(
+            " The two orders of a pair differed by {} points (root mean square; p {} by random signs).",
+            apa::one(rms),
+            apa::p(p)
+        ),
+        _ => String::new(),
+    };
+    Some(format!(
+        "Agreement: the ratings of two participants correlate by {} on average{w}.{order}",
+        apa::two(correlation)
+    ))
+}
+
+/// How different something is from itself.
+fn identical(part: &PartAnalysis) -> Option<String> {
+    let found = part.results.over.similarity.as_ref()?;
+    let own = found.identical.as_ref()?;
+    Some(format!(
+        "Identical pairs were rated {} on average, different ones {}.",
+        apa::one(own.mean.number()?),
+        apa::one(found.mean.number()?)
+    ))
+}
+
+/// The map that is shown, and why it has so many dimensions.
+fn dimensions(part: &PartAnalysis) -> Option<String> {
+    let found = part.results.over.similarity.as_ref()?;
+    let chosen = found.map_dimensions.number()?;
+    let each: Vec<String> = (found.dimensions.iter())
+        .filter_map(|(k, own)| {
+            let predicted = apa::two(own.predicted.number()?);
+            Some(format!("{} {predicted}", k.as_str()))
+        })
+        .collect();
+    let shown = counted(chosen as usize, "dimension", "dimensions");
+    let stress = apa::two(found.map_stress.number()?);
+    Some(match each.is_empty() {
+        true => format!(
+            "The map has {shown} (stress {stress}): without other participants no number of dimensions predicts better."
+        ),
+        false => format!(
+            "The map has {shown} (stress {stress}): the fewest that predict the ratings of a participant who was left out as well as \
+             any, within one standard error. Correlations by number of dimensions: {}.",
+            each.join(", ")
+        ),
+    })
 }
 
 /// The two labels that are most alike.
@@ -343,6 +408,17 @@ pub(super) fn methods(part: &PartAnalysis) -> String {
              for fixed numbers of presentations (after Miller, 1955); similarities and biases of labels are those of Luce's \
              (1963) choice model by maximum likelihood. Intervals are by leaving out each participant in turn (Tukey, 1958), \
              that of information transfer on the logarithm of what it lacks of the stimulus information."
+                .to_owned(),
+        );
+    }
+    if over.similarity.is_some() {
+        text.push(
+            "Each participant's ratings of a pair were averaged over both orders and divided by the mean over that participant's \
+             pairs; their mean over participants was scaled by majorization of Kruskal's (1964) stress 1 on the order of the \
+             dissimilarities, from the classical map and from random starts. Stress was compared with that after each participant's \
+             ratings were dealt to the pairs at random. The number of dimensions is the smallest whose maps of all others predict the ratings of \
+             a participant as well as any, within one standard error. Standard errors of positions are by resampling participants; \
+             properties of the realizations were laid on the map by Procrustes' rotation and tested over the orders of the realizations."
                 .to_owned(),
         );
     }

@@ -464,6 +464,23 @@ fn trials(p: &Protocol, part: &Part) -> String {
                 ids.join(", ")
             )
         }
+        Task::Similarity(own) => format!(
+            "ratings of difference from 0 to 100 of {} of {}{}, {} each, in both orders in turn, order {}",
+            match own.different.len() == own.possible() {
+                true => format!("all {}", counted(own.possible(), "pair", "pairs")),
+                false => format!("{} of the {} pairs", own.different.len(), own.possible()),
+            },
+            match own.models.iter().all(|m| p.level_of(m).is_some()) {
+                true => counted(own.models.len(), "level", "levels"),
+                false => counted(own.models.len(), "realization", "realizations"),
+            },
+            match own.identical {
+                true => " and of each with itself",
+                false => "",
+            },
+            counted(own.repetitions as usize, "trial", "trials"),
+            order(&own.order)
+        ),
         Task::Search(own) => format!(
             "search in the space `{}`, {}, {}; it decides nothing",
             own.space,

@@ -38,6 +38,7 @@ pub(super) fn test_name(kind: TestKind) -> &'static str {
         TestKind::PairedT => "paired t test",
         TestKind::PermutationExact => "permutation test, exact",
         TestKind::PermutationMonteCarlo => "permutation test",
+        TestKind::StressPermutation => "permutation test within participants",
         TestKind::Interaction => "interaction of participants and realizations",
         TestKind::SlopesDiffer => "slopes of the participants on VAF",
         TestKind::SlopeT => "t test",

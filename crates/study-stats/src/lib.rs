@@ -25,6 +25,7 @@
 //! | Which is preferred in a space of stimuli, and which pair tells most? | [`preference_gp`] |
 //! | How do estimated magnitudes grow? | [`magnitude`] |
 //! | How well are several stimuli identified, and which are confused? | [`identification`] |
+//! | How different do stimuli seem, and along which dimensions? | [`similarity`] |
 //! | Who is screened in a MUSHRA test? | [`mushra`] |
 //! | Does a test reject at its level? | [`level`] |
 //! | Can a printed mean and standard deviation be right? | [`grim`] |
@@ -84,6 +85,7 @@ pub mod random;
 pub mod rank;
 pub mod regression;
 pub mod sequential;
+pub mod similarity;
 pub mod two_way_slope;
 pub mod within;
 

@@ -231,7 +231,7 @@ impl Kernel {
 }
 
 /// Calls `each` once for every order (Heap 1963).
-fn enumerate_orders(order: &mut [usize], mut each: impl FnMut(&[usize])) {
+pub(crate) fn enumerate_orders(order: &mut [usize], mut each: impl FnMut(&[usize])) {
     let n = order.len();
     let mut stack = vec![0; n];
     each(order);

@@ -79,6 +79,13 @@ pub(super) fn render(protocol: &Protocol, plans: &Plans, width: usize) -> String
                 tracks(&mut out, &rules.collect::<Vec<_>>(), &own, width);
             }
             Task::Search(task) => search(&mut out, task, &own, width),
+            Task::Similarity(task) => {
+                if task.practice > 0 {
+                    let trials = counted(task.practice as usize, "pair", "pairs");
+                    let _ = writeln!(out, "Practice, before every order: {trials}, drawn");
+                }
+                pairs(&mut out, protocol, part, &task.pairs(), &own, width);
+            }
         }
     }
     out
@@ -136,12 +143,19 @@ fn pairs(
         return;
     };
     let mut times: BTreeMap<String, u32> = BTreeMap::new();
-    for trial in plans.iter().flat_map(|(_, plan)| plan) {
+    let trials = plans.iter().flat_map(|(_, plan)| plan);
+    for trial in trials.filter(|t| !t.practice) {
         *times.entry(code(trial)).or_default() += 1;
     }
     let _ = writeln!(out, "\nOccurrences of each pair in both orders, {rows}");
     let mut uneven = 0;
     for [a, b] in &task.pairs {
+        if a == b {
+            let there = named(&[a.clone(), b.clone()]);
+            let n = times.get(&there).copied().unwrap_or(0);
+            let _ = writeln!(out, "  {there} {n}");
+            continue;
+        }
         let there = [
             named(&[a.clone(), b.clone()]),
             named(&[b.clone(), a.clone()]),

@@ -325,6 +325,7 @@ fn the_pages_of_a_trial_are_the_same_whatever_it_presents() {
         beside_a_reference(),
         magnitudes(),
         identification("feedback = \"never\""),
+        similarity("identical = true"),
         track("2ifc", STAIRCASE, "easy = 0.3"),
         track("3ifc", STAIRCASE, "easy = 0.3"),
         track("abx", QUEST, ""),

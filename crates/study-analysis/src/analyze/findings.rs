@@ -106,6 +106,8 @@ pub enum TestKind {
     PermutationExact,
     /// Permutation test over random orders of the realizations.
     PermutationMonteCarlo,
+    /// Stress after each participant's ratings were dealt to the pairs at random.
+    StressPermutation,
     /// F of the interaction of participants and realizations, against the variance within
     /// cells.
     Interaction,
@@ -154,6 +156,7 @@ impl TestKind {
             Self::WeightedTrend => "weighted-trend",
             Self::PermutationExact => "permutation-exact",
             Self::PermutationMonteCarlo => "permutation-monte-carlo",
+            Self::StressPermutation => "stress-permutation",
             Self::Interaction => "interaction",
             Self::SlopesDiffer => "slopes-differ",
             Self::SlopeT => "slope-t",

@@ -71,6 +71,10 @@ names! {
     ItemName = "NAME",
     /// A label by which something is identified.
     LabelName = "LABEL",
+    /// A number of dimensions of a map.
+    DimensionsName = "K",
+    /// A set of properties of realizations.
+    PropertyName = "PROPERTY",
     /// The name of a measured outcome.
     OutcomeName = "OUTCOME",
     /// The name of an effect: its factors, joined by `:`.

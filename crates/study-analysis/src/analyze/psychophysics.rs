@@ -1,5 +1,5 @@
 //! Statistics of thresholds and comparisons: tracks, psychometric functions, detection,
-//! paired preferences, magnitude estimation, MUSHRA, identification. Each function takes what was
+//! paired preferences, magnitude estimation, MUSHRA, identification, similarity. Each function takes what was
 //! answered and returns statistics as records; `docs/statistics-psychophysics.md`
 //! defines them.
 
@@ -15,6 +15,7 @@ mod identification;
 mod marginal;
 mod of_identification;
 mod of_scales;
+mod of_similarity;
 mod over_participants;
 mod part_data;
 mod population;
@@ -24,6 +25,7 @@ pub mod results;
 mod scales;
 pub mod search;
 mod sequential;
+mod similarity;
 mod standards;
 mod study;
 mod table;
@@ -40,6 +42,7 @@ pub use part_data::{LevelData, PartAnalysis, PartData, StudyData};
 pub(crate) use part_data::{asked, sessions_of};
 pub use preferences::{Choice, Preference, preferences};
 pub use scales::{MagnitudeRow, MushraRoles, MushraRow, magnitude, mushra};
+pub use similarity::{Properties, SimilarityRow, similarity};
 pub use study::parts;
 pub(crate) use study::searchers_of;
 pub(crate) use table::{PARTICIPANT, correct_column};

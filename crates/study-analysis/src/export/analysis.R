@@ -616,6 +616,95 @@ for (part in kept("identification")) {
   again(part, means_of(part, named))
 }
 
+#' ## Similarity
+#'
+#' Each participant's ratings of a pair are averaged, over both orders, and divided by the mean of
+#' that participant's pairs; their mean over participants is scaled. What is computed here again are these
+#' means, the agreement of the participants (mean correlation; Kendall's W), the asymmetry of the two orders, and
+#' the share of classical scaling (`cmdscale`). Ordinal maps have random starts and are in `values.json` only.
+
+for (part in kept("similarity")) {
+  put <- of_part(part)
+  answers <- ratings[ratings$included & ratings$part == part, ]
+  answers$value <- answers[[setting(paste("similarity", part))]]
+  answers <- answers[!is.na(answers$value), ]
+  felt <- read_table("intervals")
+  key <- function(data) paste(data$participant, data$session, data$trial, data$attempt, sep = "\r")
+  item <- function(number) {
+    own <- felt[felt$interval == number, ]
+    as.character(own$model)[match(key(answers), key(own))]
+  }
+  answers$first <- item(1)
+  answers$second <- item(2)
+  answers$who <- as.character(answers$participant)
+  if (nrow(answers) == 0) next
+  items <- sorted(c(answers$first, answers$second))
+  same <- answers[answers$first == answers$second, ]
+  rated <- answers[answers$first != answers$second, ]
+  if (nrow(rated) == 0) next
+  people <- sorted(rated$who)
+  ends <- combn(items, 2)
+  pair <- paste(ends[1, ], ends[2, ], sep = "|")
+  # Participants by pairs: means of one order, of the other, and of both.
+  order_mean <- function(a, b) sapply(seq_along(pair), function(i) sapply(people, function(who) {
+    own <- rated$value[rated$who == who & rated$first == a[i] & rated$second == b[i]]
+    if (length(own) > 0) mean(own) else NA
+  }))
+  as_table <- function(x) matrix(x, nrow = length(people), dimnames = list(people, pair))
+  one <- as_table(order_mean(ends[1, ], ends[2, ]))
+  other <- as_table(order_mean(ends[2, ], ends[1, ]))
+  both <- ifelse(is.na(one), other, ifelse(is.na(other), one, (one + other) / 2))
+  own_mean <- rowMeans(both, na.rm = TRUE)
+  points <- mean(own_mean)
+  known <- both[own_mean > 0, , drop = FALSE]
+  unit <- known / rowMeans(known, na.rm = TRUE)
+  mean_unit <- colMeans(unit, na.rm = TRUE)
+  print(round(colMeans(both, na.rm = TRUE), 2))
+  put("similarity/n", nrow(rated))
+  put("similarity/mean", points)
+  put("similarity/n_participants", nrow(unit))
+  for (i in seq_along(pair)) {
+    id <- paste0("similarity/pair/", pair[i], "/")
+    here <- both[!is.na(both[, i]), i]
+    put(paste0(id, "n"), sum((rated$first == ends[1, i] & rated$second == ends[2, i]) |
+                             (rated$first == ends[2, i] & rated$second == ends[1, i])))
+    if (length(here) > 0) put(paste0(id, "mean"), mean(here))
+    if (length(here) > 1) put(paste0(id, "sd"), sd(here))
+    if (is.finite(mean_unit[i])) put(paste0(id, "rescaled"), mean_unit[i] * points)
+  }
+  if (nrow(unit) > 1) {
+    correlations <- suppressWarnings(cor(t(unit), use = "pairwise.complete.obs"))
+    put("similarity/agreement/mean_correlation", mean(correlations[lower.tri(correlations)], na.rm = TRUE))
+    whole <- unit[stats::complete.cases(unit), , drop = FALSE]
+    if (nrow(whole) > 1) {
+      ranks <- t(apply(round(whole, 10), 1, rank))
+      m <- nrow(ranks)
+      k <- ncol(ranks)
+      ties <- sum(apply(ranks, 1, function(x) sum(table(x)^3 - table(x))))
+      spread <- sum((colSums(ranks) - m * (k + 1) / 2)^2)
+      put("similarity/agreement/kendall_w", 12 * spread / (m^2 * (k^3 - k) - m * ties))
+    }
+  }
+  difference <- colMeans(one - other, na.rm = TRUE)
+  if (any(is.finite(difference))) {
+    put("similarity/order/rms", sqrt(mean(difference[is.finite(difference)]^2)))
+  }
+  if (nrow(same) > 0) {
+    own <- tapply(same$value, same$who, mean)
+    put("similarity/identical/n", nrow(same))
+    put("similarity/identical/mean", mean(own))
+    put("similarity/identical/share", mean(own) / mean(own_mean[names(own)]))
+  }
+  if (length(items) > 3 && length(items) <= 30 && all(is.finite(mean_unit))) {
+    full <- matrix(0, length(items), length(items))
+    full[lower.tri(full)] <- mean_unit
+    values <- cmdscale(as.dist(full), k = 1, eig = TRUE)$eig
+    for (k in seq_len(min(3, (length(items) - 2) %/% 2))) {
+      put(paste0("similarity/dimensions/", k, "/classical"), sum(pmax(values[1:k], 0)) / sum(abs(values)))
+    }
+  }
+}
+
 #' ## Pairs
 #'
 #' Abilities by maximum likelihood, as a log-linear model of the counts: the weight of the

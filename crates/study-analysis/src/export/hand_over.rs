@@ -296,6 +296,7 @@ fn settings(
             Task::Pairs(_) => "pairs",
             Task::Discrimination { .. } => "tracks",
             Task::Search(_) => "search",
+            Task::Similarity(_) => "similarity",
         };
         put(&format!("{kind} {}", part.id), question);
         for session in sessions_of(protocol, part).into_iter().flatten() {
@@ -334,7 +335,7 @@ fn settings(
                     put(&format!("label {} {model}", part.id), label);
                 }
             }
-            Task::Rating(_) | Task::Mushra(_) | Task::Search(_) => {}
+            Task::Rating(_) | Task::Mushra(_) | Task::Search(_) | Task::Similarity(_) => {}
         }
     }
     for (path, sum) in sums {

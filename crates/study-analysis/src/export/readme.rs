@@ -101,6 +101,15 @@ pub(super) fn methods(job: &Job<'_>) -> String {
                 "levels were told from a standard on {}",
                 counted(tracks.len(), "track", "tracks")
             ),
+            Task::Similarity(own) => format!(
+                "{} rated {} for how different the two are, from 0 to 100",
+                counted(
+                    own.pairs().pairs.len(),
+                    "pair of realizations was",
+                    "pairs of realizations were"
+                ),
+                counted(own.repetitions as usize, "time", "times")
+            ),
             Task::Search(own) => format!(
                 "two points of the space {} were compared in {}, chosen from the answers before",
                 own.space,

@@ -139,7 +139,8 @@ fn plan(protocol: &Protocol, flags: &Overrides, part: &Part) -> Result<Plan, Pla
         | Task::Magnitude(_)
         | Task::Mushra(_)
         | Task::Identification(_)
-        | Task::Search(_) => {
+        | Task::Search(_)
+        | Task::Similarity(_) => {
             return Err(PlanError::NoPower(part.id.clone()));
         }
     };

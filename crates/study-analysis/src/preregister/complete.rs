@@ -8,7 +8,7 @@ use study_base::text::{ModelId, PartId, ParticipantId, QuestionId};
 use study_plan::protocol::pairs::Pairs;
 use study_plan::protocol::parts::{Part, Task, TrackRules};
 use study_plan::protocol::presentations::Presentations;
-use study_plan::protocol::{Answer, GroupRules, ModelEntry, Protocol, Role, Scale};
+use study_plan::protocol::{Answer, GroupRules, ModelEntry, Protocol, Role, Scale, Similarity};
 use study_session::outcome::ratings::{Ratings, Realization, Row, Subject};
 use study_session::outcome::{IntervalRow, RatingRow};
 
@@ -187,6 +187,7 @@ impl Made<'_> {
             }
             // It has no test.
             Task::Search(_) => {}
+            Task::Similarity(own) => self.similarity(part, own, who),
         }
     }
 
@@ -237,19 +238,40 @@ impl Made<'_> {
     }
 
     fn pairs(&mut self, part: &Part, pairs: &Pairs, who: Who<'_>) {
+        self.compared(part, pairs, who, |draws| {
+            let choice = if draws.unit() < 0.5 {
+                "first"
+            } else {
+                "second"
+            };
+            Answer::Choice(vec![choice.to_owned()])
+        });
+    }
+
+    /// More participants choose no other test, and each takes a map.
+    fn similarity(&mut self, part: &Part, own: &Similarity, who: Who<'_>) {
+        if who.number < ENOUGH_WITH_LEVELS {
+            self.compared(part, &own.pairs(), who, |draws| {
+                Answer::Number((100.0 * draws.unit()).round())
+            });
+        }
+    }
+
+    fn compared(
+        &mut self,
+        part: &Part,
+        pairs: &Pairs,
+        who: Who<'_>,
+        answer: fn(&mut Stream) -> Answer,
+    ) {
         for repetition in 0..pairs.repetitions {
             let both = |pair: &&[ModelId; 2]| pair.iter().all(|id| who.rates(id));
             for pair in pairs.pairs.iter().filter(both) {
                 let first = usize::from((repetition + who.number) % 2 == 1);
-                let choice = if self.draws.unit() < 0.5 {
-                    "first"
-                } else {
-                    "second"
-                };
+                let answer = answer(&mut self.draws);
                 let Some(question) = part.asks.first() else {
                     return;
                 };
-                let answer = Answer::Choice(vec![choice.to_owned()]);
                 let row = self.row(part, who, answer, question);
                 let trial = row.trial;
                 for (interval, model) in (1..).zip([first, 1 - first]) {

@@ -6,6 +6,7 @@
 mod counted_out;
 mod exposure;
 mod ladders;
+mod maps;
 mod parts;
 
 pub use ladders::coarse;

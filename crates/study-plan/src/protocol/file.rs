@@ -22,11 +22,13 @@ mod looked;
 mod models;
 mod orders;
 mod outcomes;
+mod pairs;
 mod parts;
 mod power;
 mod questionnaires;
 mod questions;
 mod resolve;
+mod similarity;
 mod spaces;
 mod standard;
 mod track_rules;
@@ -128,7 +130,7 @@ const FORMATS: &[Word] = &[
 const OF_FORMAT_2: [&str; 5] = ["parts", "families", "tracks", "groups", "sessions"];
 
 /// Keys that need [`FORMAT_3`], without the places in lists.
-pub const OF_FORMAT_3: [&str; 13] = [
+pub const OF_FORMAT_3: [&str; 14] = [
     "confirms",
     "design.order_version",
     "factors",
@@ -136,6 +138,7 @@ pub const OF_FORMAT_3: [&str; 13] = [
     "spaces",
     "models.levels",
     "parts.answers",
+    "parts.different",
     "parts.modulus",
     "analysis.model",
     "device.commissioned_within_days",

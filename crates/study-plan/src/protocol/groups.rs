@@ -134,6 +134,9 @@ impl Protocol {
                         let stays = |m: &ModelId| models.contains(m) || self.level_of(m).is_some();
                         task.presentations.models.retain(stays);
                     }
+                    Task::Similarity(task) => {
+                        task.keep(|m| models.contains(m) || self.level_of(m).is_some());
+                    }
                     Task::Discrimination { .. } | Task::Search(_) => {}
                 }
             }

@@ -42,6 +42,13 @@ impl Pairs {
     }
 }
 
+/// Each realization of a list with each later one.
+pub(super) fn every(models: &[ModelId]) -> Vec<[ModelId; 2]> {
+    let from = |i: usize| models[i + 1..].iter().map(move |b| (i, b));
+    let all = (0..models.len()).flat_map(from);
+    all.map(|(i, b)| [models[i].clone(), b.clone()]).collect()
+}
+
 /// Each realization of a list with the next one.
 pub(super) fn neighbors(models: &[ModelId]) -> Vec<[ModelId; 2]> {
     let two = |two: &[ModelId]| [two[0].clone(), two[1].clone()];

@@ -7,7 +7,7 @@
 
 use super::keys::words;
 use super::presentations::{Magnitude, Mushra, Presentations};
-use super::{Answer, Design, Identification, Pairs, Protocol, Relative, SearchTask, Seat};
+use super::{Answer, Identification, Pairs, Protocol, Relative, SearchTask, Seat, Similarity};
 use crate::procedure::{Ladder, ProcedureError, Rule, Track};
 use serde::{Deserialize, Serialize};
 use study_base::rng::Stream;
@@ -52,6 +52,8 @@ pub enum Task {
     },
     /// Two points of a space are felt, and one is chosen; which come next follows from the answers.
     Search(SearchTask),
+    /// Two realizations are felt, and how different they are is rated.
+    Similarity(Similarity),
 }
 
 impl Task {
@@ -62,7 +64,10 @@ impl Task {
             Self::Magnitude(own) => Some(&own.presentations),
             Self::Mushra(own) => Some(&own.presentations),
             Self::Identification(own) => Some(&own.presentations),
-            Self::Pairs(_) | Self::Discrimination { .. } | Self::Search(_) => None,
+            Self::Pairs(_)
+            | Self::Discrimination { .. }
+            | Self::Search(_)
+            | Self::Similarity(_) => None,
         }
     }
 
@@ -75,7 +80,8 @@ impl Task {
             | Self::Identification(_)
             | Self::Pairs(_)
             | Self::Discrimination { .. }
-            | Self::Search(_) => None,
+            | Self::Search(_)
+            | Self::Similarity(_) => None,
         }
     }
 
@@ -471,34 +477,6 @@ impl Protocol {
             Rule::QuestPlus(rule) => rule.sd_below.is_some() || rule.entropy_below.is_some(),
             Rule::Constant(_) => false,
         })
-    }
-
-    /// The rules of order that apply to the trials of a part: its own, or `[design]`'s
-    /// without parts.
-    pub fn design_of(&self, part: Option<&PartId>) -> Design {
-        let mut design = self.design.clone();
-        let task = part.and_then(|id| self.part(id)).map(|part| &part.task);
-        match (task, task.and_then(Task::presentations)) {
-            (None, _) => {}
-            (_, Some(own)) => {
-                design.repetitions = own.repetitions;
-                design.order = own.order.clone();
-                design.max_run = own.max_run;
-                design.min_distance = own.min_distance;
-                design.practice.clone_from(&own.practice);
-            }
-            (Some(Task::Pairs(own)), _) => {
-                design.repetitions = own.repetitions;
-                design.order = own.order.clone();
-                (design.max_run, design.min_distance) = (None, None);
-                design.practice.clear();
-            }
-            (Some(_), None) => {
-                (design.max_run, design.min_distance) = (None, None);
-                design.practice.clear();
-            }
-        }
-        design
     }
 }
 

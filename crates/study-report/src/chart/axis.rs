@@ -129,6 +129,12 @@ impl Axis {
         self
     }
 
+    /// As long as `range`, about the same middle.
+    pub(super) fn widened(&mut self, range: f64) {
+        let (middle, half) = (0.5 * (self.low + self.high), 0.5 * range);
+        (self.low, self.high) = (middle - half, middle + half);
+    }
+
     /// Removes the ticks.
     #[must_use]
     pub fn bare(mut self) -> Self {

@@ -101,6 +101,10 @@ impl Obstacles {
                     let ((x, low), (_, high)) = (place(b.at, b.low)?, place(b.at, b.high)?);
                     Some([x - 3.0, high, x + 3.0, low])
                 })),
+                Mark::ErrorBarsAcross(all) => bars.extend(all.iter().filter_map(|b| {
+                    let ((low, y), (high, _)) = (place(b.low, b.at)?, place(b.high, b.at)?);
+                    Some([low, y - 3.0, high, y + 3.0])
+                })),
                 Mark::Line(all) => lines.extend(
                     (all.windows(2))
                         .filter_map(|w| Some((place(w[0].0, w[0].1)?, place(w[1].0, w[1].1)?))),

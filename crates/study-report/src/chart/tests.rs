@@ -74,6 +74,27 @@ fn ids_begin_with_the_figures_own_and_are_unique() {
 }
 
 #[test]
+fn an_isometric_panel_has_the_same_unit_on_both_axes() {
+    for (x, y) in [((-30.0, 50.0), (0.0, 7.0)), ((0.0, 1.0), (-400.0, 900.0))] {
+        let panel = Panel::new(Axis::new("x", x.0, x.1), Axis::new("y", y.0, y.1));
+        let mut figure = Figure::new("f", "", 700.0, 300.0).with(panel.clone());
+        figure = figure.with(panel);
+        figure.columns = 2;
+        let figure = figure.isometric();
+        for (panel, frame) in figure.panels.iter().zip(frame::frames(&figure)) {
+            let unit = |px: f64, axis: &Axis| px / (axis.high - axis.low);
+            let across = unit(frame.right - frame.left, &panel.x);
+            let up = unit(frame.bottom - frame.top, &panel.y);
+            assert!((across / up - 1.0).abs() < 0.01, "{across} {up}");
+            let has = |axis: &Axis, range: (f64, f64)| {
+                axis.low <= range.0 + 1e-9 && axis.high >= range.1 - 1e-9
+            };
+            assert!(has(&panel.x, x) && has(&panel.y, y));
+        }
+    }
+}
+
+#[test]
 fn scales_darken_all_the_way() {
     let luminances = |scale: Scale, from: f64, to: f64| -> Vec<f64> {
         let at = |i| from + (to - from) * f64::from(i) / 20.0;

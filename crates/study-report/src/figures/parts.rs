@@ -6,6 +6,7 @@ use super::functions::{
     MAX_PANELS, cut, grid, level_axis, level_label, of_everybody, place, psychometric,
 };
 use super::identification::confusions;
+use super::similarity::map;
 use super::thresholds::{by_conditions, by_participant};
 use super::weber::webers_law;
 use super::{Canvas, Drawn, MAX_DRAWN, cell, drawn, head};
@@ -34,6 +35,7 @@ pub fn of_part(number: usize, part: &PartAnalysis) -> Vec<Drawn> {
         against_vaf(&name("preference-against-vaf"), part),
         magnitudes(&name("magnitudes"), part),
         confusions(&name("confusions"), part),
+        map(&name("map"), part),
     ];
     let note = match (part.simulated, part.pilot) {
         (true, _) => Some("includes simulated data"),

@@ -120,6 +120,29 @@ fn trials(protocol: &Protocol, part: &Part) -> String {
             let tracks = tracks.iter().filter_map(|id| protocol.track(id));
             text.extend(tracks.map(|track| track_in_words(protocol, track)));
         }
+        Task::Similarity(own) => {
+            let identical = match own.identical {
+                true => "each was also compared with itself",
+                false => "none was compared with itself",
+            };
+            let practice = match own.practice {
+                0 => String::new(),
+                n => format!(
+                    " {} with pairs that were drawn came before.",
+                    counted(n as usize, "practice trial", "practice trials")
+                ),
+            };
+            text.push(format!(
+                "In each trial two of {} were felt one after the other, and how different they were was rated from 0 to 100: \
+                 {}, {} each, in both orders in turn; {identical}.{practice}",
+                counted(own.models.len(), "realization", "realizations"),
+                match own.different.len() == own.possible() {
+                    true => counted(own.possible(), "pair", "pairs"),
+                    false => format!("{} of the {} pairs", own.different.len(), own.possible()),
+                },
+                counted(own.repetitions as usize, "trial", "trials")
+            ));
+        }
         Task::Search(own) => text.push(format!(
             "In each of {} two points of the space {} were felt one after the other and one was chosen; the pairs were {}. \
              Which of the two came first was drawn for each trial.",

@@ -4,6 +4,7 @@
 mod identification;
 mod population;
 mod scales;
+mod similarity;
 
 use crate::apa::{self, bare_p, interval_or_dash, listing, name, or_dash, plain, two};
 use crate::table::{Builder, Head, Table, file, page};
@@ -20,7 +21,7 @@ use study_base::text::Untrusted;
 type Kind = (&'static str, fn(&PartResults) -> Table);
 
 /// All tables, in the order of a page; those without rows and notes are left out of it.
-pub(crate) const KINDS: [Kind; 20] = [
+pub(crate) const KINDS: [Kind; 25] = [
     ("part_thresholds.csv", thresholds),
     ("part_population.csv", population::population),
     ("part_population_contrasts.csv", population::contrasts),
@@ -37,6 +38,11 @@ pub(crate) const KINDS: [Kind; 20] = [
     ("part_label_pairs.csv", identification::label_pairs),
     ("part_recall.csv", identification::recall),
     ("part_identification.csv", identification::participants),
+    ("part_dimensions.csv", similarity::dimensions),
+    ("part_map.csv", similarity::map),
+    ("part_map_follows.csv", similarity::follows),
+    ("part_differences.csv", similarity::pairs),
+    ("part_similarity.csv", similarity::participants),
     ("part_scores.csv", scores),
     ("part_items.csv", items),
     ("part_groups.csv", groups),

@@ -5,6 +5,7 @@ use crate::{apa, sentences};
 use study_analysis::analyze::Pair;
 use study_analysis::analyze::psychophysics::{PartAnalysis, PartFinding, PartQuestion};
 use study_analysis::analyze::results::Number as _;
+use study_base::text::counted;
 
 /// What most questions about parts share.
 const PART: Wording = Wording {
@@ -89,6 +90,27 @@ fn texts(question: &PartQuestion) -> Wording {
             shown: "{size} of the answers were correct, {guesses} by guessing, {result} ({corrected}, {people})",
             ..PART
         },
+        PartQuestion::Structure => Wording {
+            ask: "Is there a structure that a map shows better than chance?",
+            yes: "A map of the realizations had less stress than by chance",
+            not_shown: "It was not shown that a map of the realizations has less stress than by chance",
+            shown: "stress {size} in {tested}, {chance} by chance, {result} ({corrected}, {people})",
+            ..PART
+        },
+        PartQuestion::Dimensions => Wording {
+            ask: "Does it take more than one dimension?",
+            yes: "Two dimensions predicted the ratings of a participant better than one",
+            not_shown: "It was not shown that two dimensions predict the ratings of a participant better than one",
+            shown: "difference of the correlations {size}, {result} ({corrected}, {people})",
+            ..PART
+        },
+        PartQuestion::MapFollows(_) => Wording {
+            ask: "Does the map follow {of}?",
+            yes: "The map followed {of}",
+            not_shown: "It was not shown that the map follows {of}",
+            shown: "Procrustes correlation {size}, {result} ({corrected}, {realizations})",
+            ..PART
+        },
         PartQuestion::Groups => Wording {
             ask: "Do the groups differ?",
             yes: "The groups differed",
@@ -119,8 +141,20 @@ fn value(part: &PartAnalysis, f: &PartFinding, key: &str) -> Option<String> {
         "part" => part.part.to_string(),
         "of" => match &f.question {
             PartQuestion::ToldApart(condition) => condition.clone(),
+            PartQuestion::MapFollows(properties) => of_properties(properties),
             _ => return None,
         },
+        "tested" => {
+            let found = part.results.over.similarity.as_ref();
+            let dimensions = found.and_then(|own| own.structure.dimensions.number());
+            let n = dimensions.map_or(2, |d| d as usize);
+            counted(n, "dimension", "dimensions")
+        }
+        "chance" => {
+            let found = part.results.over.similarity.as_ref();
+            let chance = found.and_then(|own| own.structure.by_chance.number());
+            chance.map_or_else(String::new, apa::two)
+        }
         "guesses" => {
             let found = part.results.over.identification.as_ref();
             found
@@ -146,6 +180,15 @@ fn value(part: &PartAnalysis, f: &PartFinding, key: &str) -> Option<String> {
         }),
         _ => return None,
     })
+}
+
+/// Properties of the realizations, as a noun.
+fn of_properties(name: &str) -> String {
+    match name {
+        "level" => "the level".to_owned(),
+        "covariates" => "the covariates".to_owned(),
+        other => other.to_owned(),
+    }
 }
 
 /// The pair with the smallest p, the higher one first.

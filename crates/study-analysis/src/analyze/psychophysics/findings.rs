@@ -4,6 +4,7 @@ use super::again::Again;
 use super::identification::Identified;
 use super::over_participants::{ConditionModel, Contrast, FTest, GroupSensitivity};
 use super::preferences::{AbilityDifference, Preferences};
+use super::similarity::{MapFit, Similarities};
 use crate::analyze::design::Design;
 use crate::analyze::findings::{Direction, Estimate, Finding, Pair, Test, TestKind, Verdict};
 use crate::analyze::identifiers::group_id;
@@ -32,6 +33,12 @@ pub enum PartQuestion {
     MagnitudeVaf,
     /// Are the labels of what is felt given more often than by guessing?
     Identified,
+    /// Has a map of the realizations less stress than by chance?
+    Structure,
+    /// Do two dimensions predict a participant's ratings better than one?
+    Dimensions,
+    /// Does the map follow these properties of the realizations?
+    MapFollows(String),
     /// Do the groups differ?
     Groups,
     /// Do the differences between conditions depend on the group?
@@ -52,6 +59,9 @@ impl PartQuestion {
             Self::Magnitudes => "magnitudes".to_owned(),
             Self::MagnitudeVaf => "magnitude-vaf".to_owned(),
             Self::Identified => "identified".to_owned(),
+            Self::Structure => "structure".to_owned(),
+            Self::Dimensions => "dimensions".to_owned(),
+            Self::MapFollows(of) => group_id("map-follows", &[of]),
             Self::Groups => "groups".to_owned(),
             Self::GroupsConditions => "groups-conditions".to_owned(),
             Self::Sessions => "sessions".to_owned(),
@@ -290,6 +300,78 @@ pub(super) fn identified(facts: &PartFacts, found: &Identified) -> PartFinding {
         finding.caveat(
             "below-chance",
             "answers are below those of guesses: are the labels of the part interchanged?",
+        );
+    }
+    finding
+}
+
+/// Whether there is structure, how many dimensions it has, and what it follows.
+pub(super) fn maps_of(facts: &PartFacts, found: &Similarities) -> Vec<PartFinding> {
+    let realizations = found.map.len();
+    let mut all = vec![
+        has_structure(facts, found, realizations),
+        dimensions(facts, found, realizations),
+    ];
+    let follows = found.follows.iter();
+    all.extend(follows.map(|(name, fit)| map_follows(facts, name.as_str(), fit, realizations)));
+    all
+}
+
+fn has_structure(facts: &PartFacts, found: &Similarities, realizations: usize) -> PartFinding {
+    let (question, structure) = (PartQuestion::Structure, &found.structure);
+    let Some(p) = structure.p.number() else {
+        return facts.undefined(question, &structure.p, realizations);
+    };
+    let test = Test::single(TestKind::StressPermutation, p, facts.alpha);
+    Finding {
+        estimate: structure
+            .stress
+            .number()
+            .and_then(|stress| Estimate::of("stress", stress)),
+        ..Finding::decided(question, test, facts.design(realizations))
+    }
+}
+
+fn dimensions(facts: &PartFacts, found: &Similarities, realizations: usize) -> PartFinding {
+    let (question, second) = (PartQuestion::Dimensions, &found.second);
+    let Some(p) = second.p.number() else {
+        return facts.undefined(question, &second.p, realizations);
+    };
+    let test = Test::single(TestKind::OneSampleT, p, facts.alpha);
+    let test = test.with("t", second.t.number(), &[second.df.number()]);
+    let mut finding = Finding {
+        estimate: (second.difference.number()).map(|d| estimate("difference", d, &second.ci95)),
+        ..Finding::decided(question, test, facts.design(realizations))
+    };
+    // One dimension predicts better: a second one is not shown.
+    if finding.is_yes() && second.difference.number().unwrap_or(0.0) <= 0.0 {
+        finding.verdict = Verdict::NotShown;
+    }
+    finding
+}
+
+fn map_follows(facts: &PartFacts, name: &str, fit: &MapFit, realizations: usize) -> PartFinding {
+    let question = PartQuestion::MapFollows(name.to_owned());
+    let (Some(r), Some(p)) = (fit.r.number(), fit.p.number()) else {
+        return facts.undefined(question, &fit.p, realizations);
+    };
+    let kind = match fit.exact.is_set() {
+        true => TestKind::PermutationExact,
+        false => TestKind::PermutationMonteCarlo,
+    };
+    let test = Test::single(kind, p, facts.alpha).with("r", Some(r), &[]);
+    let mut finding = Finding {
+        estimate: Some(estimate("r", r, &fit.ci95)),
+        ..Finding::decided(question, test, facts.design(realizations))
+    };
+    let least = fit.smallest_p.number();
+    if let Some(least) = least.filter(|p| !rejects(*p, facts.alpha)) {
+        finding.caveat(
+            "too-few",
+            format!(
+                "with these {realizations} realizations no p below {} is possible",
+                apa::bare_p(least)
+            ),
         );
     }
     finding

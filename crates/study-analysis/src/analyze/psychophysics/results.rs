@@ -19,12 +19,17 @@ pub use super::scales::{
     GeometricMean, Magnitudes, MeanExponent, Mushra, OwnExponent, PowerLaw, Rated, Screened,
 };
 pub use super::sequential::{SequentialEffect, SequentialResult};
+pub use super::similarity::{
+    Agreed, IdenticalPairs, MapFit, MapOf, OrderOfPairs, OwnDifferences, PairDifference, Place,
+    SecondDimension, Similarities, StressByChance,
+};
 pub use super::standards::{AboveStandard, WebersLaw};
 pub use super::tracks::{
     EasyTrials, MarginalResult, QuestPlusResult, StaircaseResult, TrackResult,
 };
 pub use crate::analyze::keys::{
-    At, CellName, ConditionName, ConfusionName, GroupName, ItemName, LabelName, ParameterName,
+    At, CellName, ConditionName, ConfusionName, DimensionsName, GroupName, ItemName, LabelName,
+    ParameterName, PropertyName,
 };
 use crate::analyze::record::{Interval, ParticipantName, RealizationName, Stat, statistics};
 use crate::analyze::results::Pearson;
@@ -81,6 +86,8 @@ statistics! {
         sequential: Option<SequentialResult>,
         /// labels that were given
         identification: Option<Identified>,
+        /// how different realizations are
+        similarity: Option<Similarities>,
         /// groups and sessions
         again: Again as "",
     }

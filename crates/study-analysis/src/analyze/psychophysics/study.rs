@@ -4,11 +4,12 @@ use super::again::{again, by_condition};
 use super::counting::{Counting, PartRows};
 use super::discriminations::of_tracks;
 use super::findings::{
-    PartFacts, PartFinding, PartQuestion, identified, of_groups_and_sessions, of_model,
+    PartFacts, PartFinding, PartQuestion, identified, maps_of, of_groups_and_sessions, of_model,
     of_preferences, of_realizations, told_apart,
 };
 use super::of_identification::of_identification;
 use super::of_scales::{of_magnitudes, of_mushra};
+use super::of_similarity::of_similarity;
 use super::over_participants::Measured;
 use super::part_data::{
     Found, Intervals, PartAnalysis, PartData, StudyData, asked, chosen, groups, sessions_of, trial,
@@ -78,6 +79,10 @@ pub fn parts(study: &StudyData<'_>, include: Include) -> Vec<PartAnalysis> {
                 "groups and sessions are not compared in this part: its means are those of all participants \
                  together",
             ),
+            Task::Similarity(_) => Some(
+                "groups and sessions are not compared in this part: its map is that of all participants and \
+                 sessions together",
+            ),
             Task::Rating(_)
             | Task::Discrimination { .. }
             | Task::Identification(_)
@@ -130,6 +135,8 @@ fn findings(facts: &PartFacts, own: &Found) -> (Vec<PartFinding>, Vec<Pair>) {
         }
     };
     found.extend((over.identification.as_ref()).map(|own| identified(facts, own)));
+    let similarity = over.similarity.iter();
+    found.extend(similarity.flat_map(|own| maps_of(facts, own)));
     let told = |name: &String| Some(told_apart(facts, name, over.sdt_group.get(name.as_str())?));
     found.extend(own.names.iter().filter_map(told));
     found.extend(of_groups_and_sessions(facts, &over.again));
@@ -171,6 +178,10 @@ fn of_part_task(
             Some(found)
         }
         Task::Search(_) => Some(of_search(rows)),
+        Task::Similarity(own) => {
+            let trials = (rows, intervals);
+            Some(of_similarity(study.protocol, part, own, trials, rules))
+        }
     }
 }
 

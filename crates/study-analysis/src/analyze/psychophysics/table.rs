@@ -4,6 +4,7 @@ use super::identification::{LabelRow, identification, labels_of};
 use super::preferences::{Choice, Preference, in_both_orders, preferences};
 use super::results::PartResults;
 use super::scales::{MagnitudeRow, MushraRoles, MushraRow, magnitude, mushra};
+use super::similarity::{Properties, SimilarityRow, similarity};
 use super::trials::{Asked, TrialCount, TrialSettings, discrimination};
 use std::io::BufRead;
 use study_base::text::Untrusted;
@@ -24,15 +25,18 @@ pub enum TableKind {
     Mushra,
     /// Identification: `participant[,realization],target,answer`.
     Identification,
+    /// Similarity: `participant,first,second,rating`.
+    Similarity,
 }
 
 impl TableKind {
     /// The kinds that are no trials, with their names.
-    const OTHERS: [(Self, &str); 4] = [
+    const OTHERS: [(Self, &str); 5] = [
         (Self::Pairs, "pairs"),
         (Self::Magnitude, "magnitude"),
         (Self::Mushra, "mushra"),
         (Self::Identification, "identification"),
+        (Self::Similarity, "similarity"),
     ];
 
     /// The kind of a name.
@@ -137,6 +141,10 @@ pub fn analyze_table(
             let (answers, labels) = rows.labels()?;
             results.over.identification = Some(identification(&answers, &labels).0);
         }
+        TableKind::Similarity => {
+            let (ratings, streams) = (rows.differences()?, (settings.seed, "table"));
+            results.over.similarity = Some(similarity(&ratings, &Properties::new(), streams));
+        }
     }
     Ok((results, rows.records.len()))
 }
@@ -153,6 +161,7 @@ pub fn read_table(name: &str, input: impl BufRead, kind: TableKind) -> Result<()
         TableKind::Magnitude => rows.estimates().map(|_| ()),
         TableKind::Mushra => rows.ratings().map(|_| ()),
         TableKind::Identification => rows.labels().map(|_| ()),
+        TableKind::Similarity => rows.differences().map(|_| ()),
     }
 }
 
@@ -238,6 +247,7 @@ impl<'a> Rows<'a> {
             TableKind::Identification => {
                 ("identification", "participant[,realization],target,answer")
             }
+            TableKind::Similarity => ("similarity", "participant,first,second,rating"),
         };
         found.ok_or_else(|| TableError::Column {
             name: self.name.to_owned(),
@@ -450,6 +460,22 @@ impl<'a> Rows<'a> {
         };
         let rows: Result<Vec<_>, _> = self.records.iter().map(one).collect();
         Ok((rows?, labels))
+    }
+
+    /// Ratings of how different two were.
+    fn differences(&self) -> Result<Vec<SimilarityRow>, TableError> {
+        let participant = self.required("participant")?;
+        let (first, second) = (self.required("first")?, self.required("second")?);
+        let rating = self.required("rating")?;
+        let one = |row: &(u64, csv::StringRecord)| {
+            Ok(SimilarityRow {
+                participant: row.1[participant].to_owned(),
+                first: row.1[first].to_owned(),
+                second: row.1[second].to_owned(),
+                rating: self.number(row, ("rating", rating), (0.0, f64::MAX))?,
+            })
+        };
+        self.records.iter().map(one).collect()
     }
 
     /// The ratings, and which conditions are hidden reference and mid anchor.

@@ -2,7 +2,7 @@
 
 use crate::analyze::Analysis;
 use crate::analyze::psychophysics::PartAnalysis;
-use crate::analyze::psychophysics::results::{Identified, Preferences};
+use crate::analyze::psychophysics::results::{Identified, Preferences, Similarities};
 use crate::analyze::results::{Correlation, Field, Key, Number as _};
 use std::collections::BTreeMap;
 
@@ -94,6 +94,9 @@ pub(super) fn of_part(part: &PartAnalysis) -> Vec<Number> {
     }
     if let Some(found) = &over.identification {
         numbers.of_identification(found);
+    }
+    if let Some(found) = &over.similarity {
+        numbers.of_similarity(found);
     }
     for (name, group) in &over.sdt_group {
         let id = format!("sdt_group/{}/above_chance", name.part());
@@ -190,6 +193,35 @@ impl Numbers {
         self.each(&format!("{id}/pair"), &found.pairs, &["d"], CLOSED);
         self.each(&format!("{id}/pair"), &found.pairs, &["similarity"], FITTED);
         self.each(&format!("{id}/label"), &found.labels, &["bias"], FITTED);
+    }
+
+    /// What R computes without random starts.
+    fn of_similarity(&mut self, found: &Similarities) {
+        let id = "similarity";
+        self.add(id, found, &["n", "mean", "n_participants"], CLOSED);
+        let agreed = ["mean_correlation", "kendall_w"];
+        self.add(
+            &format!("{id}/agreement"),
+            &found.agreement,
+            &agreed,
+            CLOSED,
+        );
+        self.add(&format!("{id}/order"), &found.order, &["rms"], CLOSED);
+        let identical = ["n", "mean", "share"];
+        self.add(
+            &format!("{id}/identical"),
+            &found.identical,
+            &identical,
+            CLOSED,
+        );
+        self.each(
+            &format!("{id}/dimensions"),
+            &found.dimensions,
+            &["classical"],
+            CLOSED,
+        );
+        let pair = ["n", "mean", "sd", "rescaled"];
+        self.each(&format!("{id}/pair"), &found.pairs, &pair, CLOSED);
     }
 
     fn of_preferences(&mut self, pairs: &Preferences) {

@@ -1,6 +1,6 @@
 //! Number of trials, duration, and doubtful designs of studies with parts.
 
-use super::{Spans, answers_s, counted_out, pace};
+use super::{Spans, answers_s, counted_out, maps, pace};
 use crate::procedure::{Rule, Staircase};
 use crate::protocol::{
     DeviceKind, Identification, IntervalOrder, Magnitude, Method, Mushra, Part, Protocol, Question,
@@ -58,6 +58,9 @@ pub(super) fn trials(protocol: &Protocol, part: &Part) -> u32 {
         Task::Pairs(own) => all(own.pairs.len(), own.repetitions),
         Task::Discrimination { tracks: ids } => tracks(protocol, ids).map(track_trials).sum(),
         Task::Search(own) => own.rule.trials,
+        Task::Similarity(own) => {
+            all(own.pairs().pairs.len(), own.repetitions).saturating_add(own.practice)
+        }
     }
 }
 
@@ -67,7 +70,7 @@ pub(super) fn seconds(protocol: &Protocol, part: &Part, reference_s: f64) -> f64
     let intervals = match &part.task {
         Task::Rating(_) | Task::Identification(_) => 1,
         Task::Magnitude(_) | Task::Mushra(_) => 1 + usize::from(part.task.reference().is_some()),
-        Task::Pairs(_) | Task::Search(_) => 2,
+        Task::Pairs(_) | Task::Search(_) | Task::Similarity(_) => 2,
         Task::Discrimination { tracks: ids } => tracks(protocol, ids)
             .map(|track| track.method.sequences()[0].len())
             .max()
@@ -80,7 +83,8 @@ pub(super) fn seconds(protocol: &Protocol, part: &Part, reference_s: f64) -> f64
         | Task::Identification(_)
         | Task::Pairs(_)
         | Task::Discrimination { .. }
-        | Task::Search(_) => pace::COMPARE_S,
+        | Task::Search(_)
+        | Task::Similarity(_) => pace::COMPARE_S,
     };
     let felt_s = part.exposure.max_s.map_or(free_s, |max| max.min(free_s));
     let load_s = match protocol.device.kind {
@@ -116,6 +120,7 @@ pub(super) fn warnings(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Faul
             few_pairs(protocol, part),
         ];
         let doubts = doubts.into_iter().flatten();
+        let doubts = doubts.chain(maps::doubts(protocol, part));
         faults.extend(doubts.map(|fault| fault.at(place.clone())));
     }
     for (i, track) in protocol.tracks.iter().enumerate() {
@@ -139,6 +144,7 @@ fn presented(protocol: &Protocol, model: &ModelId) -> bool {
     });
     let by_part = protocol.parts.iter().any(|part| match &part.task {
         Task::Pairs(own) => own.pairs.iter().any(|pair| pair.contains(model)),
+        Task::Similarity(own) => own.models.contains(model),
         task => {
             let own = task.presentations();
             own.is_some_and(|own| own.models.contains(model) || own.practice.contains(model))
@@ -153,6 +159,8 @@ fn presented(protocol: &Protocol, model: &ModelId) -> bool {
 pub fn is_about_realizations(protocol: &Protocol) -> bool {
     let about = |part: &Part| match &part.task {
         Task::Discrimination { .. } | Task::Identification(_) | Task::Search(_) => false,
+        // A map has what distinguishes the realizations as its axes, whatever that is.
+        Task::Similarity(_) => false,
         Task::Magnitude(own) => {
             let models = &own.presentations.models;
             models.iter().all(|m| protocol.level_of(m).is_none())

@@ -177,6 +177,11 @@ pub(super) fn agree(
                     let own = all.iter().filter(|m| models.contains(m) || is_level(m));
                     (all.clone(), own.count())
                 }
+                Task::Similarity(task) => {
+                    let mut own = task.clone();
+                    own.keep(|m| models.contains(m) || is_level(m));
+                    (task.models.clone(), own.different.len())
+                }
                 Task::Discrimination { .. } | Task::Search(_) => continue,
             };
             if left == 0 {

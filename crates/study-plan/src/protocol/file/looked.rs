@@ -1,10 +1,13 @@
 //! What the ids in parts and tracks stand for; every unknown one is reported.
 
 use super::agree::{Sections, at, unknown};
-use super::parts::{RawLabel, RawPairs};
+use super::pairs::RawPairs;
+use super::parts::RawLabel;
+use super::similarity::RawSimilarity;
 use super::spaces::PartialSpace;
-use crate::protocol::pairs::neighbors;
-use crate::protocol::{Criterion, DeviceKind, FamilyRules, Label, Presentations, Role};
+use crate::protocol::pairs::{every, neighbors};
+use crate::protocol::similarity::unconnected;
+use crate::protocol::{Criterion, DeviceKind, FamilyRules, Label, Presentations, Role, Similarity};
 use study_base::diagnostic::Fault;
 use study_base::diagnostic::table::Document;
 use study_base::text::{ModelId, PartId, QuestionId};
@@ -264,6 +267,52 @@ impl Looked<'_> {
         })
     }
 
+    /// What a part of similarity compares. Fewer than two realizations, and pairs that do not connect all of them, are
+    /// reported.
+    pub(super) fn similarity(
+        &self,
+        raw: &RawSimilarity,
+        families: Option<&[FamilyRules]>,
+        path: &str,
+    ) -> Option<Similarity> {
+        let different = match &raw.family {
+            Some((family, levels)) => {
+                let family = self.family(family, families?, path)?;
+                every(&self.levels(family, levels.as_deref(), path)?)
+            }
+            None => self.pairs(raw.models.as_deref(), &raw.pairs, path)?,
+        };
+        if different.is_empty() {
+            let fault = Fault::error("a pair needs two levels");
+            self.fault(
+                path,
+                "levels",
+                fault.hint("name two of the ladder, or more"),
+            );
+            return None;
+        }
+        let mut models: Vec<ModelId> = Vec::new();
+        for model in different.iter().flatten() {
+            if !models.contains(model) {
+                models.push(model.clone());
+            }
+        }
+        if let Some([one, other]) = unconnected(&models, &different) {
+            let what =
+                format!("no pairs connect `{one}` and `{other}`: they have no place in one map");
+            let hint = "add pairs, so that every realization can be reached from every other one";
+            self.fault(path, "pairs", Fault::error(what).hint(hint));
+        }
+        Some(Similarity {
+            models,
+            different,
+            order: raw.order.clone(),
+            repetitions: raw.repetitions,
+            identical: raw.identical,
+            practice: raw.practice,
+        })
+    }
+
     pub(super) fn pairs(
         &self,
         models: Option<&[ModelId]>,
@@ -308,11 +357,7 @@ impl Looked<'_> {
             return None;
         }
         Some(match pairs {
-            RawPairs::All => {
-                let from = |i: usize| models[i + 1..].iter().map(move |b| (i, b));
-                let all = (0..models.len()).flat_map(from);
-                all.map(|(i, b)| [models[i].clone(), b.clone()]).collect()
-            }
+            RawPairs::All => every(&models),
             RawPairs::Adjacent => neighbors(&models),
             RawPairs::Versus(one) => {
                 if !models.contains(one) {

@@ -1,5 +1,7 @@
 //! `[[parts]]`: trials of one kind each.
 
+use super::pairs::{RawPairs, which};
+use super::similarity::{RawSimilarity, SIMILARITY};
 use super::spaces::RULES;
 use super::standard::{RawStandard, standard};
 use crate::procedure::SearchRule;
@@ -8,7 +10,6 @@ use crate::protocol::section::{Section, Variant, shapes};
 use crate::protocol::{Criterion, Drawn, Exposure, Feedback, IntervalOrder, Order, Presentations};
 use std::collections::BTreeMap;
 use study_base::diagnostic::Fault;
-use study_base::diagnostic::table::Value;
 use study_base::text::{ModelId, PartId, QuestionId, Untrusted};
 
 pub(super) static PARTS: Variants = Variants {
@@ -94,7 +95,7 @@ const SEARCH: &[Key] = keys! {
 };
 
 /// The kinds of trial. A new one is declared here and in [`crate::protocol::Task`].
-pub(super) const KINDS: [Variant<RawTask>; 7] = [
+pub(super) const KINDS: [Variant<RawTask>; 8] = [
     Variant::new(
         "rating",
         "One realization is felt and rated.",
@@ -223,6 +224,12 @@ pub(super) const KINDS: [Variant<RawTask>; 7] = [
         SEARCH,
         search,
     ),
+    Variant::new(
+        "similarity",
+        "Two realizations are felt one after the other, and how different they are is rated from 0 to 100. Needs the format `study-protocol/3`.",
+        SIMILARITY,
+        similarity,
+    ),
 ];
 
 /// A part as it was read; its ids are not looked up yet.
@@ -291,6 +298,7 @@ pub(super) enum RawTask {
         rule: SearchRule,
         gap_s: f64,
     },
+    Similarity(RawSimilarity),
 }
 
 /// A label, and of what it is the right answer.
@@ -299,15 +307,6 @@ pub(super) struct RawLabel {
     pub(super) text: String,
     pub(super) models: Vec<ModelId>,
     pub(super) levels: Option<Vec<f64>>,
-}
-
-/// Which pairs are compared.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum RawPairs {
-    All,
-    Adjacent,
-    Versus(ModelId),
-    List(Vec<[ModelId; 2]>),
 }
 
 pub(super) fn read(root: &mut Section<'_, '_>) -> Vec<RawPart> {
@@ -497,10 +496,7 @@ fn criterion(mut section: Section<'_, '_>) -> Option<Criterion> {
 fn pairs(section: &mut Section<'_, '_>) -> Option<RawTask> {
     let prompt = section.text("prompt");
     let models = section.ids("models");
-    let pairs = match section.value("pairs") {
-        None => Some(RawPairs::All),
-        Some(value) => which(&value),
-    };
+    let pairs = which(section);
     let repetitions = section.whole("repetitions");
     let order = section.word("order");
     let (tie, interval_order) = (section.flag("tie"), section.word("interval_order"));
@@ -515,41 +511,6 @@ fn pairs(section: &mut Section<'_, '_>) -> Option<RawTask> {
         interval_order: interval_order?,
         gap_s: gap_s?,
     })
-}
-
-/// Reads `pairs`.
-fn which(value: &Value<'_, '_>) -> Option<RawPairs> {
-    let expected = Kind::Pairs.describe();
-    let refuse = |given: &str| {
-        let given = Untrusted(given);
-        value.refuse(format_args!("has to be {expected}, not `{given}`"))
-    };
-    if value.is_array() {
-        let list = value.array()?;
-        if list.is_empty() {
-            return value.refuse("is empty");
-        }
-        let mut pairs = Vec::new();
-        for pair in list {
-            let ids: Vec<ModelId> = (pair.array()?.iter())
-                .filter_map(crate::protocol::section::parsed)
-                .collect();
-            match <[ModelId; 2]>::try_from(ids) {
-                Ok(ids) if ids[0] != ids[1] => pairs.push(ids),
-                _ => return pair.refuse("has to be two different ids of realizations"),
-            }
-        }
-        return Some(RawPairs::List(pairs));
-    }
-    let text = value.text()?;
-    match text.as_str() {
-        "all" => Some(RawPairs::All),
-        "adjacent" => Some(RawPairs::Adjacent),
-        other => match other.strip_prefix("versus:").map(ModelId::new) {
-            Some(Ok(id)) => Some(RawPairs::Versus(id)),
-            _ => refuse(other),
-        },
-    }
 }
 
 fn discrimination(section: &mut Section<'_, '_>) -> Option<RawTask> {
@@ -577,4 +538,8 @@ fn search(section: &mut Section<'_, '_>) -> Option<RawTask> {
         rule: rule?,
         gap_s: gap_s?,
     })
+}
+
+fn similarity(section: &mut Section<'_, '_>) -> Option<RawTask> {
+    super::similarity::similarity(section).map(RawTask::Similarity)
 }

@@ -4,7 +4,8 @@
 use super::agree::{Sections, at, collision, unknown};
 use super::families::PartialFamily;
 use super::looked::Looked;
-use super::parts::{RawPairs, RawPart, RawTask};
+use super::pairs::RawPairs;
+use super::parts::{RawPart, RawTask};
 use super::questions::PartialQuestion;
 use super::spaces::PartialSpace;
 use super::standard::RawStandard;
@@ -104,6 +105,16 @@ impl Raw {
                         prompt,
                         one_of(options),
                     ))
+                }
+                RawTask::Similarity(own) => {
+                    let [same, different] = own.ends.clone();
+                    let scale = QuestionKind::Slider(kinds::Slider {
+                        from: 0.0,
+                        to: 100.0,
+                        step: 1.0,
+                        labels: [("0".to_owned(), same), ("100".to_owned(), different)].into(),
+                    });
+                    Some(PartialQuestion::made(&part.path, id, &own.prompt, scale))
                 }
                 RawTask::Search { prompt, .. } => Some(PartialQuestion::made(
                     &part.path,
@@ -265,6 +276,9 @@ impl Raw {
                     ..
                 }) => family == id,
                 Some(RawTask::Identification { family, .. }) => family.as_ref() == Some(id),
+                Some(RawTask::Similarity(own)) => {
+                    own.family.as_ref().is_some_and(|own| own.0 == *id)
+                }
                 _ => false,
             };
             if !self.tracks.iter().any(of) && !self.parts.iter().any(felt) {
@@ -434,6 +448,13 @@ impl Raw {
                 looked.space(space, &self.spaces, path);
                 let (space, rule) = (space.clone(), *rule);
                 (Task::Search(SearchTask { space, rule }), *gap_s)
+            }
+            RawTask::Similarity(own) => {
+                asks.push(QuestionId::new(id.as_str()).ok()?);
+                (
+                    Task::Similarity(looked.similarity(own, families, path)?),
+                    own.gap_s,
+                )
             }
         };
         if !matches!(task, Task::Rating(_)) {

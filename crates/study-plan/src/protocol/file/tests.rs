@@ -578,4 +578,5 @@ mod parts;
 mod questionnaires;
 mod random;
 mod relative;
+mod similarity;
 mod standard;
