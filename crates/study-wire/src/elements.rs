@@ -200,6 +200,19 @@ impl<R: Real> SpringState<R> {
         }
     }
 
+    /// With z.
+    pub fn deflected(z: R) -> Self {
+        Self {
+            z: Sum::of(z),
+            ..Self::ZERO
+        }
+    }
+
+    /// What the force of the spring is multiplied by.
+    pub fn z(&self) -> R {
+        self.z.value
+    }
+
     /// For steps of `dt_s` seconds.
     pub fn tune(&mut self, spring: &Spring, dt_s: f64) {
         let (lost, gain) = match *spring {
@@ -255,6 +268,15 @@ impl<R: Real> State<R> {
         Self::with(of, motion.x_mm, |spring| {
             SpringState::settled(spring, x_mm, v_mm_s)
         })
+    }
+
+    /// With z of each spring.
+    pub fn deflected(x_mm: R, z: [R; MAX_SPRINGS]) -> Self {
+        Self {
+            x_mm,
+            dt_s: R::ZERO,
+            springs: z.map(SpringState::deflected),
+        }
     }
 
     fn with(of: &ElementsView<'_, R>, x_mm: R, spring: impl Fn(&Spring) -> SpringState<R>) -> Self {

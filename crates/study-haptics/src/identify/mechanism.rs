@@ -18,6 +18,7 @@ mod start;
 #[cfg(test)]
 mod tests;
 
+use super::elements::start_of;
 use super::method::Progress;
 use super::samples::weight_of;
 use super::signal::{LowPass, SignalError, sampling_interval_s};
@@ -362,10 +363,12 @@ pub fn predict(
 }
 
 /// The force of each sample of a recording by elements, N, in steps of at least
-/// [`PREDICTED_HZ`].
+/// [`PREDICTED_HZ`]. The state in which the springs enter the recording is that which its force tells
+/// ([`start_of`]).
 pub(super) fn predict_elements(elements: &Elements, recording: &Recording) -> Vec<f64> {
     let view = elements.view();
-    let mut state = elements::State::settled(&view, motion_between(recording, 0, 0.0));
+    let start = start_of(elements, recording);
+    let mut state = elements::State::deflected(recording.x_mm[0], start);
     (0..recording.len())
         .map(|i| {
             let mut force_n = 0.0;

@@ -1,12 +1,12 @@
 //! Where a recording asks for a latch: a spring that breaks at one position and holds again
 //! below another one.
 
+use super::force_n;
 use super::sums::follow;
 use crate::identify::Training;
 use crate::model::Elements;
 use rayon::prelude::*;
 use study_wire::elements::Spring;
-use study_wire::predict::{Lookup, locate};
 
 /// Distances of the ends of a latch that are tried, in nodes.
 const WIDTHS: [usize; 9] = [1, 2, 3, 4, 6, 8, 12, 16, 24];
@@ -63,21 +63,10 @@ fn refined(errors: &[Vec<[f64; 2]>], from_mm: [f64; 2], spacing_mm: f64) -> [f64
 /// Positions and errors F − F̂ of the samples, a list for each recording.
 fn errors(training: &Training<'_>, elements: &Elements, every: usize) -> Vec<Vec<[f64; 2]>> {
     let mut all = vec![Vec::new(); training.recordings.len()];
-    follow(training, &elements.springs, every, |r, i, z, _| {
+    follow(training, &elements.springs, None, every, |r, i, z, _| {
         let recording = training.recordings[r];
-        let (x, v) = (recording.x_mm[i], recording.v_mm_s[i]);
-        let (left, share) = locate(&elements.x_mm, Lookup::Linear, x);
-        let at = |profile: &[f64]| match profile.get(left + 1) {
-            Some(next) => profile[left] + share * (next - profile[left]),
-            None => profile[left],
-        };
-        let side = usize::from(v < 0.0);
-        let springs = elements.spring_n.iter().zip(z);
-        let force = at(&elements.force_n)
-            + v * at(&elements.damping_n_s_per_mm[side])
-            + elements.mass_kg * recording.a_m_s2[i]
-            + springs.map(|(profile, z)| z * at(profile)).sum::<f64>();
-        all[r].push([x, recording.f_n[i] - force]);
+        let error = recording.f_n[i] - force_n(elements, recording, i, z);
+        all[r].push([recording.x_mm[i], error]);
     });
     all
 }

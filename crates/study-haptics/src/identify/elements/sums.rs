@@ -1,17 +1,20 @@
 //! Sums over the samples of the recordings, from which every choice of springs is solved.
 
 use super::Penalty;
+use super::start::{Starts, entering, follow_one};
 use crate::identify::Training;
 use crate::identify::banded::{Banded, Bound};
 use crate::identify::samples::weight_of;
 use crate::model::Elements;
-use study_wire::elements::{Spring, SpringState};
+use study_wire::elements::Spring;
 use study_wire::predict::{Lookup, locate};
 
 /// Columns per node beside those of the springs: C, and the damping for v > 0 and v < 0.
 const OWN: usize = 3;
 /// Share of a node's information that keeps unknowns at 0 where they are not excited.
 const FLOOR: f64 = 1e-9;
+/// Share of a recording after which it does not matter how springs that relax entered it.
+const FADED: f64 = 0.15;
 
 /// The products of all columns and of the force with each other. A sample lies between two nodes,
 /// so only neighbors have products.
@@ -19,7 +22,7 @@ const FLOOR: f64 = 1e-9;
 pub(super) struct Sums {
     nodes: Vec<f64>,
     springs: Vec<Spring>,
-    /// Products of the columns of a node, and with those of the next one.
+    /// Products of the columns of a node, the later with the earlier, and with those of the next one.
     own: Vec<f64>,
     next: Vec<f64>,
     /// Products with the acceleration and with the force.
@@ -41,39 +44,31 @@ pub(super) struct Solved {
 }
 
 /// Calls `visit` with recording, sample and z of all springs, of every sample whose weight
-/// is not 0, with the weight.
+/// is not 0, with the weight. Without `starts` springs that relax enter without force, and the
+/// first [`FADED`] of a recording is not visited.
 pub(super) fn follow(
     training: &Training<'_>,
     springs: &[Spring],
+    starts: Option<&Starts>,
     every: usize,
     mut visit: impl FnMut(usize, usize, &[f64], f64),
 ) {
-    let mut z = vec![0.0; springs.len()];
     for (r, recording) in training.recordings.iter().enumerate() {
-        let (x, v) = (&recording.x_mm, &recording.v_mm_s);
-        let mut states: Vec<SpringState> = (springs.iter())
-            .map(|spring| SpringState::settled(spring, x[0], v[0]))
-            .collect();
-        let mut tuned_s = f64::NAN;
-        for i in 0..recording.len() {
-            let before = i.saturating_sub(1);
-            let span_s = recording.t_s[i] - recording.t_s[before];
-            // time stamps that are rounded differ in their last digits
-            let same = (span_s / tuned_s - 1.0).abs() < 1e-6;
-            if i > 0 && !same {
-                tuned_s = span_s;
-                for (state, spring) in states.iter_mut().zip(springs) {
-                    state.tune(spring, span_s);
-                }
-            }
-            for ((z, state), spring) in z.iter_mut().zip(&mut states).zip(springs) {
-                *z = state.step(spring, x[i], x[i] - x[before]);
-            }
+        let start = match starts {
+            Some(starts) => starts[r].clone(),
+            None => entering(springs, recording),
+        };
+        let unknown_s = match starts {
+            Some(_) => 0.0,
+            None => FADED * recording.duration_s(),
+        };
+        let first = (recording.t_s).partition_point(|t_s| *t_s < recording.t_s[0] + unknown_s);
+        follow_one(recording, springs, &start, |i, z| {
             let weight = weight_of(training.weights.as_deref(), r, i);
-            if weight != 0.0 && i % every == 0 {
-                visit(r, i, &z, weight);
+            if i >= first && weight != 0.0 && i % every == 0 {
+                visit(r, i, z, weight);
             }
-        }
+        });
     }
 }
 
@@ -82,6 +77,7 @@ impl Sums {
         training: &Training<'_>,
         nodes: &[f64],
         springs: &[Spring],
+        starts: Option<&Starts>,
         every: usize,
     ) -> Self {
         let p = OWN + springs.len();
@@ -99,8 +95,12 @@ impl Sums {
             squares: vec![0.0; p],
         };
         let mut column = vec![0.0; p];
-        follow(training, springs, every, |r, i, z, weight| {
+        follow(training, springs, starts, every, |r, i, z, weight| {
             let recording = training.recordings[r];
+            let outside = !(nodes[0]..=nodes[nodes.len() - 1]).contains(&recording.x_mm[i]);
+            if outside && starts.is_none() {
+                return;
+            }
             let (v, a, f) = (recording.v_mm_s[i], recording.a_m_s2[i], recording.f_n[i]);
             column[0] = 1.0;
             column[1] = v.max(0.0);
@@ -120,9 +120,13 @@ impl Sums {
             for (k, other) in column.iter().enumerate() {
                 let product = weight * one * other;
                 let at = (left * p + j) * p + k;
-                self.own[at] += hats[0] * hats[0] * product;
+                if k <= j {
+                    self.own[at] += hats[0] * hats[0] * product;
+                }
                 if share > 0.0 {
-                    self.own[at + p * p] += hats[1] * hats[1] * product;
+                    if k <= j {
+                        self.own[at + p * p] += hats[1] * hats[1] * product;
+                    }
                     self.next[at] += hats[0] * hats[1] * product;
                 }
             }
@@ -139,7 +143,7 @@ impl Sums {
         self.samples += weight;
     }
 
-    /// The elements of least cost with some of the springs, by their indices; `None` if recordings
+    /// The elements of least cost with some of the springs, by their ascending indices; `None` if recordings
     /// and ridges leave them undetermined.
     pub(super) fn solve(&self, kept: &[usize], penalty: Penalty) -> Option<Solved> {
         let (p, nodes) = (self.squares.len(), self.nodes.len());
