@@ -64,6 +64,10 @@ struct ForceCurve {
     #[arg(long, value_name = "HZ", value_parser = rate, allow_negative_numbers = true)]
     rate: Option<f64>,
 
+    /// Write the names of the files into the recording, as version 0.2 did: it is another recording then if they have other names
+    #[arg(long)]
+    file_names: bool,
+
     /// Accept a target that supplies energy: without this flag it is refused, because most likely the file is wrong
     #[arg(long)]
     active: bool,
@@ -182,6 +186,7 @@ fn force_curve(args: &ForceCurve, console: &mut Console) -> Result<(), Failure> 
         credit: args.credit.as_deref(),
         license: args.license.as_deref(),
         rate_hz: args.rate,
+        file_names: args.file_names,
     };
     let recording = curve::join(&sources, stated);
     write_file(&args.out, |sink| sink.write_all(&recording))?;

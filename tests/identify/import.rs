@@ -76,6 +76,14 @@ fn the_three_layouts_of_a_curve_are_the_same_recording() {
         tidy.header_line("resolution:"),
         Some("x 5.000e-3 mm, F 9.807e-4 N")
     );
+    // the name of the file does not matter, unless it is asked for
+    let [renamed, again] = ["Akko (1).csv", "again.csv"].map(|name| dir.path().join(name));
+    fs::copy(dir.path().join("tidy.csv"), &renamed).unwrap();
+    let other = imported(&renamed, &again, &[]);
+    assert_eq!(other.sha256, tidy.sha256);
+    let named = imported(&renamed, &again, &["--file-names"]);
+    let source = named.header_line("source:").unwrap();
+    assert!(source.starts_with("Akko (1).csv, sha256 "), "{source}");
     // twice as many rows a second are half the time
     let file = dir.path().join("tidy.csv");
     let fast = imported(&file, &out, &["--rate", "20", "--target", "Mine"]);

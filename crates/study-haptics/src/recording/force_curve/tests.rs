@@ -87,6 +87,7 @@ fn curves_become_one_recording_whose_header_says_where_they_are_from() {
     ];
     let stated = Stated {
         credit: Some("A lab"),
+        file_names: true,
         ..Stated::default()
     };
     let bytes = join(&sources, stated);
@@ -110,6 +111,24 @@ fn curves_become_one_recording_whose_header_says_where_they_are_from() {
     assert!(close(&recording.v_mm_s[..3], [10.0, 0.5, -9.0]));
     assert!(close(&recording.v_mm_s[3..], [2000.0, 100.0, -1800.0]));
     assert_eq!(join(&sources, stated), bytes);
+    // another lab, which calls the files otherwise, has the same recording
+    let [here, there] = [["a.csv", "b.csv"], ["1.csv", "2.csv"]].map(|names| {
+        let sources = [
+            source(&first, names[0], "aa"),
+            source(&second, names[1], "bb"),
+        ];
+        let unnamed = Stated {
+            file_names: false,
+            ..stated
+        };
+        join(&sources, unnamed)
+    });
+    assert_eq!(here, there);
+    let recording = recording::read("r", here.as_slice()).unwrap();
+    assert_eq!(
+        recording.header_line("source:"),
+        Some("sha256 aa; columns of displacement and force, 3 rows from 0.000 s")
+    );
 }
 
 #[test]
@@ -122,6 +141,7 @@ fn text_of_the_files_cannot_begin_a_line_of_the_header() {
     }];
     let stated = Stated {
         target: Some("x\nlicense: mine"),
+        file_names: true,
         ..Stated::default()
     };
     let bytes = join(&sources, stated);
