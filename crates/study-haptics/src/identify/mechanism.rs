@@ -145,16 +145,18 @@ impl Fitted {
                 standard_error,
                 origin: Origin::Training,
                 upper_bound: None,
-                identified: is_sure(name, value, standard_error),
+                identified: is_sure(value, standard_error),
             })
             .collect()
     }
 
-    /// A warning for each scalar whose standard error is above half its value, or that is 0.
+    /// A warning for each scalar whose standard error is above half its value, or that is 0, except of a force, which may well be 0.
     pub(super) fn warnings(&self) -> Vec<Warning> {
         let values = self.mechanism.scalars.to_array();
         (PARAMETERS.into_iter().zip(values).zip(self.standard_errors))
-            .filter(|(((name, ..), value), error)| !is_sure(name, *value, *error))
+            .filter(|(((name, ..), value), error)| {
+                *name != "offset force" && !is_sure(*value, *error)
+            })
             .map(
                 |(((parameter, _, excitation), value), error)| Warning::NotDetermined {
                     parameter,
@@ -167,9 +169,9 @@ impl Fitted {
     }
 }
 
-/// Whether a scalar is determined. A force may well be 0.
-fn is_sure(name: &str, value: f64, standard_error: Option<f64>) -> bool {
-    standard_error.is_some_and(|error| error <= UNSURE * value.abs()) || name == "offset force"
+/// Whether a scalar is determined: at least two standard errors, as for every other term.
+fn is_sure(value: f64, standard_error: Option<f64>) -> bool {
+    standard_error.is_some_and(|error| error <= UNSURE * value.abs())
 }
 
 impl Layout {
