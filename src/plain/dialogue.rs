@@ -7,7 +7,7 @@ use study_base::text::{QuestionId, Untrusted, sentence};
 use study_plan::protocol::phrases::{Phrase, Words};
 use study_plan::protocol::{Answer, Given, Question};
 use study_session::outcome::{Author, Choice};
-use study_session::page::{self, Does};
+use study_session::page::{self, Does, NOT_BEGUN};
 use study_session::session::view::{Correctable, DeviceState, Mirror, Telemetry};
 use study_session::session::{Input, Roster, Screen, View};
 
@@ -252,7 +252,7 @@ impl Dialogue {
     fn command(&mut self, command: &str, rest: &str, view: &View) -> Reply {
         let begun = !matches!(view.screen, Screen::Who { .. });
         let text = || match (begun, rest.is_empty()) {
-            (false, _) => say("That is possible once the session has begun."),
+            (false, _) => say(NOT_BEGUN),
             (true, true) => say(&view
                 .words
                 .fill(Phrase::PlainOneLine, &[("command", &command)])),
@@ -300,9 +300,12 @@ impl Dialogue {
                 let reason = text()?;
                 Ok(vec![Input::MarkBad { reason }])
             }
-            "/pause" => Ok(vec![Input::Pause]),
-            "/replay" if view.can_replay => Ok(vec![Input::PlayAgain]),
-            "/replay" => say(view.words.get(Phrase::PlainNoReplay)),
+            "/pause" if begun => Ok(vec![Input::Pause]),
+            "/pause" => say(NOT_BEGUN),
+            "/replay" if view.can_replay || matches!(view.screen, Screen::Stopped { .. }) => {
+                Ok(vec![Input::PlayAgain])
+            }
+            "/replay" => say(page::why_not_again(view)),
             "/back" if self.at > 0 => {
                 self.at -= 1;
                 self.entered.truncate(self.at);
@@ -314,7 +317,10 @@ impl Dialogue {
                 self.repeat();
                 Ok(Vec::new())
             }
-            "/quit" => self.sure(view.words.get(Phrase::PlainLeave), vec![Input::Quit], view),
+            "/quit" => match page::before_leaving(view) {
+                Some(question) => self.sure(question, vec![Input::Quit], view),
+                None => Ok(vec![Input::Quit]),
+            },
             "/help" => Err(COMMANDS
                 .iter()
                 .map(|(c, what)| format!("{c}: {}.", view.words.get(*what)))

@@ -351,6 +351,12 @@ impl Session {
             && !self.device_lost
     }
 
+    /// Whether some trial of the study may be felt again.
+    pub(super) fn has_replays(&self) -> bool {
+        let mut parts = self.protocol.parts.iter();
+        self.protocol.trial.exposure.replays > 0 || parts.any(|part| part.exposure.replays > 0)
+    }
+
     /// Whether more exploration is required after this time and these strokes.
     pub(super) fn too_little(&self, felt_s: f64, strokes: u32) -> bool {
         let open = self.history.open();
