@@ -220,7 +220,7 @@ impl UiState {
             Key::Tab | Key::BackTab | Key::Up | Key::Down => who.on_operator = !who.on_operator,
             Key::Enter if who.participant.is_blank() => {
                 who.on_operator = false;
-                match roster.and_then(Roster::next_id) {
+                match roster.and_then(Roster::proposed) {
                     // The id that is proposed; another Enter goes on with it.
                     Some(id) => who.participant = Editor::line(id.as_str()),
                     None => return self.notify("Type the participant's id first."),
@@ -235,7 +235,7 @@ impl UiState {
             }
             // The id that is proposed.
             Key::Right if !who.on_operator && who.participant.text().is_empty() => {
-                if let Some(id) = roster.and_then(Roster::next_id) {
+                if let Some(id) = roster.and_then(Roster::proposed) {
                     who.participant = Editor::line(id.as_str());
                 }
             }
