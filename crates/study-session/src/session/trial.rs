@@ -425,7 +425,10 @@ impl Session {
                 self.stop(at);
                 self.start_pause(at);
             }
-            Phase::ResumeChoice { .. } | Phase::End => self.notify("nothing can be paused now"),
+            Phase::ResumeChoice { .. } => {
+                self.notify("a pause is possible once the session goes on: choose how");
+            }
+            Phase::End => self.notify("nothing can be paused any more: the session is over"),
             _ => self.start_pause(at),
         }
     }
