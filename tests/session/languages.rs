@@ -166,29 +166,38 @@ fn texts(page: &serde_json::Value, all: &mut Vec<String>) {
 #[test]
 fn nothing_of_a_participants_page_stays_english() {
     let f = KeyCode::F;
-    let dialogs: [&[KeyCode]; 7] = [
+    let dialogs: [&[KeyCode]; 9] = [
         &[],
         &[KeyCode::Enter],
         &[f(1)],
         &[f(6)],
         &[f(6), KeyCode::Enter],
+        &[f(6), f(7)],
         &[f(10)],
         &[f(10), KeyCode::Char('x')],
+        &[f(1), f(6)],
     ];
     for lang in ["ja", "zh-Hans", "ar"] {
         let words = Arc::new(Words::new(Some(lang), &BTreeMap::new()));
         let mut all = pages_of_a_session(&words);
         all.retain(|(name, _)| *name != "rating");
         all.extend(questions_of_a_pilot(&words));
-        for (name, view) in all {
+        for (name, mut view) in all {
             for keys in dialogs {
                 let full = page(&view, keys);
                 assert_eq!(latin(&full), [""; 0], "{lang} {name} {keys:?}\n{full}");
             }
+            view.can_replay = false;
+            for has_replays in [false, true] {
+                view.has_replays = has_replays;
+                let full = page(&view, &[f(7)]);
+                assert_eq!(latin(&full), [""; 0], "{lang} {name}\n{full}");
+            }
             let mut dialogue = Dialogue::new(true, false);
             let mut plain = dialogue.follow(&view).lines;
             for typed in [
-                "", "?", "99", "/help", "/back", "/decline", "/says", "/what", "/quit", "x",
+                "", "?", "99", "/help", "/back", "/decline", "/says", "/what", "/replay", "/quit",
+                "x",
             ] {
                 plain.extend(dialogue.line(typed, &view).1);
             }

@@ -17,6 +17,7 @@ mod exposure;
 mod flow;
 mod front;
 mod groups;
+mod idle_keys;
 #[path = "../support/json_schema.rs"]
 mod json_schema;
 mod kill;

@@ -135,6 +135,7 @@ pub(crate) fn view(screen: Screen) -> View {
     };
     View {
         can_replay: false,
+        has_replays: false,
         can_go_back: false,
         remarks: vec!["the motor hums".to_owned()],
         force: true,

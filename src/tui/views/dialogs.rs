@@ -22,6 +22,8 @@ pub struct DialogView<'a> {
     pub dialog: &'a Dialog,
     /// Whether Esc also stops a loaded or playing device.
     pub armed: bool,
+    /// What is asked before the program is left.
+    pub leave: &'a str,
     /// What is in memory only because saving has failed.
     pub unsaved: &'a [String],
     /// The fixed sentences that a participant reads.
@@ -356,10 +358,7 @@ impl Widget for &DialogView<'_> {
             Dialog::Confirm(confirm) => {
                 let back = self.words.get(Phrase::Back);
                 let (words, yes) = match confirm {
-                    Confirm::Quit => (
-                        self.words.get(Phrase::PlainLeave),
-                        self.words.get(Phrase::Quit),
-                    ),
+                    Confirm::Quit => (self.leave, self.words.get(Phrase::Quit)),
                     Confirm::DropOut => (
                         "Does the participant drop out? This ends their part in the study.",
                         "drop out",

@@ -44,6 +44,17 @@ fn a_pause_stops_the_playback_first() {
     }
 }
 
+#[test]
+fn a_session_that_is_over_is_not_paused_and_says_so() {
+    let mut rig = Rig::new(plain());
+    rig.until("End");
+    let before = rig.journal.len();
+    rig.send(Input::Pause);
+    let why = rig.view().notice.unwrap();
+    assert!(why.contains("the session is over"), "{why}");
+    assert_eq!(rig.journal.len(), before);
+}
+
 /// Between Enter and the confirmation of the device.
 #[test]
 fn a_pause_while_the_device_stops_is_kept() {

@@ -160,7 +160,8 @@ phrases! {
     PlainNoCommand "plain-no-command" "{command} is no command. Type /help for a list. An answer that begins with a slash needs two.";
     PlainLeave "plain-leave" "Leave the session? It can be resumed later.";
     PlainUnpause "plain-unpause" "Press Enter to continue, or type /quit.";
-    PlainNoReplay "plain-no-replay" "This cannot be presented again.";
+    PlainNoReplay "plain-no-replay" "This cannot be presented again now. A trial can be, before its first answer, as often as the study allows.";
+    NeverReplay "never-replay" "In this study nothing is presented again on request.";
     PlainNoBack "plain-no-back" "There is no question before this one.";
     CommandStop "command-stop" "stops the device at once";
     CommandRemark "command-remark" "keeps a remark of the experimenter";
@@ -198,6 +199,7 @@ phrases! {
     AlreadyAnswer "already-answer" "That is already the answer.";
     NewAnswerFirst "new-answer-first" "Enter the new answer first, or press Esc.";
     ReasonFirst "reason-first" "Type a reason first, or press Esc.";
+    FinishFirst "finish-first" "Finish this first, or press Esc.";
     NothingToCorrect "nothing-to-correct" "There is no earlier answer to correct.";
     WhichCorrect "which-correct" "Type the number of the answer to correct. Enter alone: none.";
     WhichOfList "which-of-list" "Type a number of the list.";

@@ -29,6 +29,7 @@ fn view(screen: Screen) -> View {
         armed: false,
         unsaved: Vec::new(),
         can_replay: false,
+        has_replays: false,
         can_go_back: false,
         force: true,
         has_reference: false,

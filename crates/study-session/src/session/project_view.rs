@@ -36,6 +36,7 @@ impl Session {
                 None => Vec::new(),
             },
             can_replay: self.can_replay(),
+            has_replays: self.has_replays(),
             can_go_back: self.can_go_back(),
             remarks: self.remarks.iter().rev().take(3).cloned().collect(),
             force: self.presents_force(),

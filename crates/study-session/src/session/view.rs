@@ -38,6 +38,8 @@ pub struct View {
     /// Whether all intervals of the trial can be felt again:
     /// [`PlayAgain`](super::Input::PlayAgain).
     pub can_replay: bool,
+    /// Whether that is possible at some trial of the study.
+    pub has_replays: bool,
     /// Whether there is an earlier page of questions: [`Back`](super::Input::Back).
     pub can_go_back: bool,
     /// Whether what is presented is a force; else a program of the laboratory presents

@@ -1,6 +1,7 @@
 //! Verifying a results folder: every file is read again and compared.
 
 mod clocks;
+mod not_checked;
 mod practice;
 mod searches;
 mod tables;
