@@ -373,6 +373,7 @@ fn write(dir: &Path, files: &Files) -> Result<(), Failure> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use study_plan::protocol::check;
 
     #[test]
     fn a_folder_name_becomes_a_study_id() {
@@ -394,6 +395,31 @@ mod tests {
         assert_eq!(twice, format!("{}-replication-2", "x".repeat(50)));
         assert!(once.len() == 64 && twice.len() == 64);
         assert_eq!(next(&format!("{}-y", "x".repeat(51)), 1, 2).0.len(), 63);
+    }
+
+    /// Nobody rates what was not felt, in any study that this program writes or ships.
+    #[test]
+    fn new_and_shipped_studies_have_a_least_exposure() {
+        use clap::ValueEnum as _;
+        let new = TrialKind::value_variants()
+            .iter()
+            .map(|kind| kind.files().0);
+        let mut texts: Vec<String> = new.map(str::to_owned).collect();
+        for folder in subfolders(&Path::new(env!("CARGO_MANIFEST_DIR")).join("protocols")).unwrap()
+        {
+            texts.push(fs::read_to_string(folder.join(load::FILE_NAME)).unwrap());
+        }
+        assert!(texts.len() > 20, "{}", texts.len());
+        for text in texts {
+            let parsed = file::parse(load::FILE_NAME, &text);
+            let shown = parsed.findings.render(false);
+            let protocol = parsed.protocol.unwrap_or_else(|| panic!("{shown}"));
+            let found = check::warnings(&protocol, &parsed.spans, &[]);
+            let unfelt = found
+                .iter()
+                .find(|fault| fault.message.contains("before anything was felt"));
+            assert!(unfelt.is_none(), "{}: {unfelt:?}", protocol.study.id);
+        }
     }
 
     #[test]

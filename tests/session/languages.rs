@@ -166,10 +166,11 @@ fn texts(page: &serde_json::Value, all: &mut Vec<String>) {
 #[test]
 fn nothing_of_a_participants_page_stays_english() {
     let f = KeyCode::F;
-    let dialogs: [&[KeyCode]; 9] = [
+    let dialogs: [&[KeyCode]; 10] = [
         &[],
         &[KeyCode::Enter],
         &[f(1)],
+        &[f(2)],
         &[f(6)],
         &[f(6), KeyCode::Enter],
         &[f(6), f(7)],
@@ -301,8 +302,8 @@ fn the_first_line_has_room_for_the_banner_and_the_progress() {
     }
 }
 
-/// What is said of answers is in the language of the study, also when they are corrected; a
-/// break says nothing of a device, which may be none.
+/// What is said of answers is in the language of the study, also when they are corrected, by keys
+/// and in lines; a break says nothing of a device, which may be none.
 #[test]
 fn corrections_and_breaks_are_in_every_language() {
     let english = Words::default();
@@ -336,6 +337,31 @@ fn corrections_and_breaks_are_in_every_language() {
                 assert!(
                     shown.contains(words.get(Phrase::CorrectTitle)),
                     "{lang}\n{shown}"
+                );
+            }
+        }
+        // In lines as well.
+        let mut dialogue = Dialogue::new(true, false);
+        dialogue.follow(&view);
+        for typed in ["/correct", "99", "1", "2", ""] {
+            let said = dialogue.line(typed, &view).1.join("\n");
+            for phrase in [
+                Phrase::WhichCorrect,
+                Phrase::WhichOfList,
+                Phrase::NewAnswer,
+                Phrase::PlainWhy,
+                Phrase::PlainDeclineIt,
+                Phrase::Slip,
+            ] {
+                assert!(
+                    !said.contains(english.get(phrase)),
+                    "{lang} {typed}\n{said}"
+                );
+            }
+            if typed == "/correct" {
+                assert!(
+                    said.contains(words.get(Phrase::WhichCorrect)),
+                    "{lang}\n{said}"
                 );
             }
         }

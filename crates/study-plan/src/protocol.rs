@@ -226,8 +226,8 @@ pub struct SessionRules {
     pub entry: Entry,
     /// Longest interruption, h, after which a session resumes without a question.
     pub resume_within_h: f64,
-    /// Longest pause between feeling and answering, s; after a longer one the trial is felt
-    /// again. Absent from the fingerprints of protocols that do not say it.
+    /// Longest pause between feeling and answering, or between two intervals, s; after a longer
+    /// one the trial is felt again. Absent from the fingerprints of protocols that do not say it.
     #[serde(skip_serializing_if = "is_usual_pause")]
     pub longest_pause_s: f64,
 }

@@ -209,6 +209,7 @@ phrases! {
     FormSetup "form-setup" "set-up";
     FormIntake "form-intake" "intake";
     FormOutro "form-outro" "closing questions";
+    Remark "remark" "remark";
 }
 
 impl Phrase {

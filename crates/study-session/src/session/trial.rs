@@ -109,13 +109,14 @@ impl Session {
         (gap_s > 0.0).then_some((ended, gap_s * late))
     }
 
-    /// Starts the next interval at the end of the gap.
+    /// Starts the next interval at the end of the gap, unless that took too long.
     pub(super) fn end_gap(&mut self, at: Moment) {
         if let Phase::Gap {
             ended,
             start_after_s,
         } = self.phase
             && at.seconds_since(&ended) >= start_after_s
+            && !self.are_apart(ended, at)
         {
             self.start_playback(at);
         }
