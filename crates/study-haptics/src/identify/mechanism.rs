@@ -363,11 +363,15 @@ pub fn predict(
 }
 
 /// The force of each sample of a recording by elements, N, in steps of at least
-/// [`PREDICTED_HZ`]. The state in which the springs enter the recording is that which its force tells
-/// ([`start_of`]).
-pub(super) fn predict_elements(elements: &Elements, recording: &Recording) -> Vec<f64> {
+/// [`PREDICTED_HZ`]. The state in which the springs enter the recording is that which the force of
+/// some of its samples tells ([`start_of`]).
+pub(super) fn predict_elements(
+    elements: &Elements,
+    recording: &Recording,
+    tells: impl Fn(usize) -> bool,
+) -> Vec<f64> {
     let view = elements.view();
-    let start = start_of(elements, recording);
+    let start = start_of(elements, recording, tells);
     let mut state = elements::State::deflected(recording.x_mm[0], start);
     (0..recording.len())
         .map(|i| {
