@@ -90,6 +90,30 @@ m <- nrow(ranks); n <- ncol(ranks)
 ties <- sum(apply(people, 1, function(x) { t <- table(x); sum(t^3 - t) }))
 show("Kendall's W", (12 * sum((colSums(ranks) - m * (n + 1) / 2)^2)) / (m^2 * (n^3 - n) - m * ties))
 
+# What they have in common, if one did not rate the last three pairs and another not the first two.
+some <- people
+some[1, 8:10] <- NA
+some[2, 1:2] <- NA
+in_common <- function(x) {
+  factors <- rep(1, nrow(x))
+  for (round in 1:1000) {
+    common <- colMeans(x / factors, na.rm = TRUE)
+    factors <- rowSums(x, na.rm = TRUE) / rowSums(sweep(!is.na(x), 2, common, "*"))
+  }
+  colMeans(x / factors, na.rm = TRUE)
+}
+common <- in_common(some / rowMeans(some, na.rm = TRUE))
+show("in common, by the third pair", common / common[3])
+
+# The interval of a correlation of .8 by three resamples of three participants.
+interval <- function(r, resamples) {
+  n <- 3
+  half <- qt(.975, n - 1) * sqrt(n / (n - 1)) * sd(atanh(resamples))
+  tanh(atanh(r) + c(-half, half))
+}
+show("interval, resamples .78 to .82", interval(.8, c(.78, .8, .82)))
+show("interval, resamples .7 to .9", interval(.8, c(.7, .8, .9)))
+
 # Asymmetry: three participants and three pairs, all 2^9 choices of signs.
 differences <- rbind(c(4, 1, -1), c(3, -2, 2), c(5, 0, 1))
 rms <- function(d) sqrt(mean(colMeans(d)^2))
