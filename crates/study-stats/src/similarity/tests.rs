@@ -103,6 +103,24 @@ fn ordinal_stress_agrees_with_vegan() {
     }
 }
 
+/// Rothkopf (1957), J. Exp. Psychol. 53: how often two of 36 Morse codes were called the same. `cmdscale` and `vegan::monoMDS`, in the same
+/// file; `MASS::isoMDS` stops at a stress of 0.1969.
+#[test]
+fn the_morse_codes_of_rothkopf_agree_with_r() {
+    let same: Vec<f64> = include_str!("../../tests/reference/morse.txt")
+        .split_whitespace()
+        .map(|percent| percent.parse().unwrap())
+        .collect();
+    assert_eq!(same.len(), 36 * 36);
+    let apart = |a: usize, b: usize| 1.0 - (same[36 * a + b] + same[36 * b + a]) / 200.0;
+    let morse = Dissimilarities::from_fn(36, |a, b| Some(apart(a, b)));
+    let share = classical(&morse, 2).unwrap().share;
+    close(share, 0.276_551_254_981, 1e-11);
+    for (k, stress) in [(2, 0.190_624_164_6), (3, 0.129_443_511_9)] {
+        close(fine(&morse, k, Scale::Ordinal, 0), stress, 1e-6);
+    }
+}
+
 /// scikit-learn 1.9.1 and SciPy 1.17.1, tests/reference/similarity.py; the `smacof` paper prints 0.131.
 #[test]
 fn ratio_stress_agrees_with_scikit_learn_and_scipy() {
