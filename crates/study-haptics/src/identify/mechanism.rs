@@ -47,6 +47,8 @@ const CORNER_HZ: f64 = 30.0;
 pub const PREDICTED_HZ: f64 = 8000.0;
 /// The same while starts are compared.
 const STARTED_HZ: f64 = 4000.0;
+/// Share of a sampling interval in which nothing relaxes.
+const AT_ONCE: f64 = 1e-9;
 /// Of each recording as much is used while starts are compared that together they last so
 /// long, s.
 const STARTED_S: f64 = 20.0;
@@ -377,6 +379,8 @@ pub(super) fn predict_elements(
         .map(|i| {
             let mut force_n = 0.0;
             for (motion, span_s) in substeps(recording, i, PREDICTED_HZ) {
+                // the state is that of the first sample, so that nothing relaxes before it
+                let span_s = if i == 0 { AT_ONCE * span_s } else { span_s };
                 force_n = state.step(&view, motion, span_s);
             }
             force_n + view.mass_kg * recording.a_m_s2[i]
