@@ -432,8 +432,8 @@ fn maps_are_on_principal_axes() {
     assert!(found.point(3)[0] > 0.0);
 }
 
-/// How often there is said to be a structure, and a second dimension, and how often the number of dimensions is found. The table is in
-/// docs/calibration.md (`--ignored --nocapture`).
+/// How often there is said to be a structure, and a second dimension, and how often the number of dimensions is found: participants ×
+/// objects, dimensions, structure, second dimension, number (`--ignored --nocapture`).
 #[test]
 #[ignore = "minutes without optimization"]
 fn tests_keep_their_level() {
