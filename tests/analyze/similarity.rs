@@ -203,6 +203,16 @@ fn similarity_without_a_map_says_why() {
             "there is one participant",
         ),
         (
+            of(&two, &pairs(&five[..2], &apart)),
+            "agreement/kendall_w",
+            "one pair was rated",
+        ),
+        (
+            of(&two, &pairs(&five, &|_, _| 50)),
+            "dimensions/1/predicted",
+            "the pairs of the others do not connect all realizations, or each participant's ratings are all equal",
+        ),
+        (
             of(&two[..1], &pairs(&five, &apart)),
             "dimensions/1/predicted",
             "there are no other participants",

@@ -310,6 +310,7 @@ fn agreed(all: &[Dissimilarities], none: &'static str) -> Agreed {
     };
     let complete = match found.complete {
         0 | 1 => "fewer than two participants rated every pair",
+        _ if all.iter().all(|own| own.known().len() < 2) => "one pair was rated",
         _ => "each participant's ratings are all equal",
     };
     Agreed {
