@@ -232,7 +232,7 @@ fn agreement(part: &PartAnalysis) -> Option<String> {
         _ => String::new(),
     };
     Some(format!(
-        "Agreement: the ratings of two participants correlate by {} on average{w}.{order}",
+        "Agreement: the mean correlation of the ratings of two participants is {}{w}.{order}",
         apa::two(correlation)
     ))
 }
@@ -255,18 +255,22 @@ fn dimensions(part: &PartAnalysis) -> Option<String> {
     let each: Vec<String> = (found.dimensions.iter())
         .filter_map(|(k, own)| {
             let predicted = apa::two(own.predicted.number()?);
-            Some(format!("{} {predicted}", k.as_str()))
+            Some(format!("{predicted} with {}", k.as_str()))
         })
         .collect();
     let shown = counted(chosen as usize, "dimension", "dimensions");
     let stress = apa::two(found.map_stress.number()?);
+    let how = match found.map_in_proportion.is_set() {
+        true => "; in proportion to the differences, because their order alone fits without stress",
+        false => "",
+    };
     Some(match each.is_empty() {
         true => format!(
-            "The map has {shown} (stress {stress}): without other participants no number of dimensions predicts better."
+            "The map has {shown} (stress {stress}{how}): without other participants no number of dimensions predicts better."
         ),
         false => format!(
-            "The map has {shown} (stress {stress}): the fewest that predict the ratings of a participant who was left out as well as \
-             any, within one standard error. Correlations by number of dimensions: {}.",
+            "The map has {shown} (stress {stress}{how}): the fewest that predict the ratings of a participant who was left out as well as \
+             any, within one standard error. Correlation by the number of dimensions: {}.",
             each.join(", ")
         ),
     })
@@ -413,9 +417,9 @@ pub(super) fn methods(part: &PartAnalysis) -> String {
     }
     if over.similarity.is_some() {
         text.push(
-            "Each participant's ratings of a pair were averaged over both orders and divided by the mean over that participant's \
-             pairs; their mean over participants was scaled by majorization of Kruskal's (1964) stress 1 on the order of the \
-             dissimilarities, from the classical map and from random starts. Stress was compared with that after each participant's \
+            "Each participant's ratings of a pair were averaged over both orders and brought to the same mean by a factor of the \
+             participant's; their mean over participants was scaled by majorization of Kruskal's (1964) stress 1 on the order of the \
+             dissimilarities, or in proportion to them where their order fits without stress, from the classical map and from random starts. Stress was compared with that after each participant's \
              ratings were dealt to the pairs at random. The number of dimensions is the smallest whose maps of all others predict the ratings of \
              a participant as well as any, within one standard error. Standard errors of positions are by resampling participants; \
              properties of the realizations were laid on the map by Procrustes' rotation and tested over the orders of the realizations."

@@ -619,7 +619,8 @@ for (part in kept("identification")) {
 #' ## Similarity
 #'
 #' Each participant's ratings of a pair are averaged, over both orders, and divided by the mean of
-#' that participant's pairs; their mean over participants is scaled. What is computed here again are these
+#' that participant's pairs, and where some did not rate every pair by a factor of the participant's; their mean
+#' over participants is scaled. What is computed here again are these
 #' means, the agreement of the participants (mean correlation; Kendall's W), the asymmetry of the two orders, and
 #' the share of classical scaling (`cmdscale`). Ordinal maps have random starts and are in `values.json` only.
 
@@ -655,13 +656,23 @@ for (part in kept("similarity")) {
   other <- as_table(order_mean(ends[2, ], ends[1, ]))
   both <- ifelse(is.na(one), other, ifelse(is.na(other), one, (one + other) / 2))
   own_mean <- rowMeans(both, na.rm = TRUE)
-  points <- mean(own_mean)
   known <- both[own_mean > 0, , drop = FALSE]
   unit <- known / rowMeans(known, na.rm = TRUE)
+  # What they have in common: each participant has a factor, over the pairs that they rated.
+  over_own <- function(x, values) as.vector((!is.na(x)) %*% ifelse(is.finite(values), values, 0))
+  factors <- rep(1, nrow(unit))
   mean_unit <- colMeans(unit, na.rm = TRUE)
+  for (round in seq_len(1000)) {
+    found <- rowSums(unit, na.rm = TRUE) / over_own(unit, mean_unit)
+    moved <- max(0, abs(found / factors - 1))
+    factors <- found
+    mean_unit <- colMeans(unit / factors, na.rm = TRUE)
+    if (moved < 1e-12) break
+  }
+  points <- mean(rowSums(both, na.rm = TRUE) / over_own(both, mean_unit))
   print(round(colMeans(both, na.rm = TRUE), 2))
   put("similarity/n", nrow(rated))
-  put("similarity/mean", points)
+  put("similarity/mean", mean(own_mean))
   put("similarity/n_participants", nrow(unit))
   for (i in seq_along(pair)) {
     id <- paste0("similarity/pair/", pair[i], "/")
@@ -675,7 +686,8 @@ for (part in kept("similarity")) {
   if (nrow(unit) > 1) {
     correlations <- suppressWarnings(cor(t(unit), use = "pairwise.complete.obs"))
     put("similarity/agreement/mean_correlation", mean(correlations[lower.tri(correlations)], na.rm = TRUE))
-    whole <- unit[stats::complete.cases(unit), , drop = FALSE]
+    asked <- unit[, colSums(!is.na(unit)) > 0, drop = FALSE]
+    whole <- asked[stats::complete.cases(asked), , drop = FALSE]
     if (nrow(whole) > 1) {
       ranks <- t(apply(round(whole, 10), 1, rank))
       m <- nrow(ranks)
@@ -693,7 +705,7 @@ for (part in kept("similarity")) {
     own <- tapply(same$value, same$who, mean)
     put("similarity/identical/n", nrow(same))
     put("similarity/identical/mean", mean(own))
-    put("similarity/identical/share", mean(own) / mean(own_mean[names(own)]))
+    put("similarity/identical/share", mean(own) / mean(own_mean[names(own)], na.rm = TRUE))
   }
   if (length(items) > 3 && length(items) <= 30 && all(is.finite(mean_unit))) {
     full <- matrix(0, length(items), length(items))

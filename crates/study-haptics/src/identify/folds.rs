@@ -8,7 +8,8 @@
 //! the travel.
 //!
 //! A prediction runs over the whole recording, because its state depends on the motion before, and
-//! counts where samples were left out inside the range of the others.
+//! counts where samples were left out inside the range of the others. Their force does not tell in
+//! which state springs enter the recording either.
 
 use super::vaf;
 use crate::model::Realization;
@@ -110,9 +111,10 @@ impl<'r> Folds<'r> {
             let [low, high] = realization.trained.x_mm;
             let mut all = (Vec::new(), Vec::new());
             for (recording, of) in self.recordings.iter().zip(&self.of) {
-                for (i, error) in vaf::errors(&realization, recording).iter().enumerate() {
+                let predicted = vaf::predict_told(&realization, recording, |i| of[i] != fold);
+                for (i, predicted_n) in predicted.enumerate() {
                     if of[i] == fold && (low..=high).contains(&recording.x_mm[i]) {
-                        all.0.push(*error);
+                        all.0.push(predicted_n - recording.f_n[i]);
                         all.1.push(recording.f_n[i]);
                     }
                 }

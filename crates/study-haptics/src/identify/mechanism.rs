@@ -47,6 +47,8 @@ const CORNER_HZ: f64 = 30.0;
 pub const PREDICTED_HZ: f64 = 8000.0;
 /// The same while starts are compared.
 const STARTED_HZ: f64 = 4000.0;
+/// Share of a sampling interval in which nothing relaxes.
+const AT_ONCE: f64 = 1e-9;
 /// Of each recording as much is used while starts are compared that together they last so
 /// long, s.
 const STARTED_S: f64 = 20.0;
@@ -365,16 +367,22 @@ pub fn predict(
 }
 
 /// The force of each sample of a recording by elements, N, in steps of at least
-/// [`PREDICTED_HZ`]. The state in which the springs enter the recording is that which its force tells
-/// ([`start_of`]).
-pub(super) fn predict_elements(elements: &Elements, recording: &Recording) -> Vec<f64> {
+/// [`PREDICTED_HZ`]. The state in which the springs enter the recording is that which the force of
+/// some of its samples tells ([`start_of`]).
+pub(super) fn predict_elements(
+    elements: &Elements,
+    recording: &Recording,
+    tells: impl Fn(usize) -> bool,
+) -> Vec<f64> {
     let view = elements.view();
-    let start = start_of(elements, recording);
+    let start = start_of(elements, recording, tells);
     let mut state = elements::State::deflected(recording.x_mm[0], start);
     (0..recording.len())
         .map(|i| {
             let mut force_n = 0.0;
             for (motion, span_s) in substeps(recording, i, PREDICTED_HZ) {
+                // the state is that of the first sample, so that nothing relaxes before it
+                let span_s = if i == 0 { AT_ONCE * span_s } else { span_s };
                 force_n = state.step(&view, motion, span_s);
             }
             force_n + view.mass_kg * recording.a_m_s2[i]

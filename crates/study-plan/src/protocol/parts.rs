@@ -470,6 +470,14 @@ impl Protocol {
         Track::new(&track.rule, &self.ladder(track), &mut stream)
     }
 
+    /// Whether the answers to a question are numbers but no ratings of a realization: estimates of magnitude, or how different two are.
+    pub fn has_other_numbers(&self, question: &QuestionId) -> bool {
+        self.parts.iter().any(|part| {
+            matches!(part.task, Task::Magnitude(_) | Task::Similarity(_))
+                && part.asks.first() == Some(question)
+        })
+    }
+
     /// Whether the number of trials of a session depends on the answers.
     pub fn is_adaptive(&self) -> bool {
         self.tracks.iter().any(|track| match &track.rule {
