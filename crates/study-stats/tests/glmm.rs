@@ -10,6 +10,7 @@
 use study_stats::glmm::{
     Family, GlmmData, GlmmError, GlmmFit, Integral, Observation, glmm, ratio_test,
 };
+use study_stats::random::{RandomSource, SplitMix64};
 
 macro_rules! designs {
     ($($name:literal),*) => {
@@ -139,4 +140,72 @@ fn quadrature_agrees_with_r() {
         }
     }
     assert_eq!(compared, 3);
+}
+
+/// Numbers in [0, 1).
+struct Uniform(SplitMix64);
+
+impl Uniform {
+    fn next(&mut self) -> f64 {
+        self.0.below(1 << 53) as f64 / (1u64 << 53) as f64
+    }
+
+    fn normal(&mut self) -> f64 {
+        let radius = (-2.0 * (1.0 - self.next()).ln()).sqrt();
+        radius * (std::f64::consts::TAU * self.next()).cos()
+    }
+
+    /// A count with this mean, and the hits of ten with this logit.
+    fn counts(&mut self, eta: f64) -> [f64; 2] {
+        let (mean, share) = (eta.exp(), 1.0 / (1.0 + (-eta).exp()));
+        let (mut count, mut time) = (0.0, 0.0);
+        loop {
+            time -= (1.0 - self.next()).ln();
+            if time > mean {
+                break;
+            }
+            count += 1.0;
+        }
+        let hits = (0..10).filter(|_| self.next() < share).count();
+        [count, hits as f64]
+    }
+}
+
+/// Studies of five subjects, in which standard deviations are often 0 or nearly so: every model
+/// is found. Without an effect, likelihood ratios find one a little too often.
+#[test]
+fn every_model_of_few_subjects_is_found() {
+    let mut random = Uniform(SplitMix64::new(390));
+    let mut rejected = [0, 0];
+    let studies = 250;
+    for _ in 0..studies {
+        let subjects: Vec<f64> = (0..5).map(|_| 0.5 * random.normal()).collect();
+        let cells: Vec<f64> = (0..20).map(|_| 0.3 * random.normal()).collect();
+        let mut all = [Vec::new(), Vec::new()];
+        for trial in 0..60 {
+            let (s, c) = (trial / 12, trial / 3 % 4);
+            let eta = 0.7 + subjects[s] + cells[4 * s + c];
+            let (f, g) = ([1.0, 1.0, -1.0, -1.0][c], [1.0, -1.0, 1.0, -1.0][c]);
+            let counts = random.counts(eta);
+            for ((own, y), trials) in all.iter_mut().zip(counts).zip([1.0, 10.0]) {
+                own.push(Observation {
+                    y,
+                    trials,
+                    x: vec![1.0, f, g, f * g],
+                    levels: vec![s, 4 * s + c],
+                });
+            }
+        }
+        let families = [Family::Poisson, Family::Binomial];
+        for ((own, family), rejected) in all.iter().zip(families).zip(&mut rejected) {
+            let data = GlmmData::new(family, own).unwrap();
+            let fit = glmm(&data, Integral::Laplace).unwrap();
+            let test = ratio_test(&data, &fit, &[1], Integral::Laplace).unwrap();
+            *rejected += u32::from(test.p.unwrap() <= 0.05);
+        }
+    }
+    for rejected in rejected {
+        let rate = f64::from(rejected) / f64::from(studies);
+        assert!((0.03..0.13).contains(&rate), "{rate}");
+    }
 }
