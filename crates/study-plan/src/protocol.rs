@@ -50,7 +50,9 @@ pub use factors::{Crossing, Factor};
 pub use groups::{Assign, Assigned, GroupRules, Groups, SessionPlan};
 pub use identification::{Criterion, Drawn, Feedback, Identification, Label};
 pub use kinds::QuestionKind;
-pub use outcomes::{Answers, BetterEnd, Clock, Measure, OutcomeRules, Telemetry, Transform};
+pub use outcomes::{
+    Answers, BetterEnd, Clock, Measure, OutcomeFamily, OutcomeRules, Telemetry, Transform,
+};
 pub use pairs::{IntervalOrder, Pairs};
 pub use parts::{
     Compared, Exposure, FamilyRules, FitRules, Interval, Method, Part, Task, TrackRules, Vary,

@@ -242,6 +242,55 @@ if (enough) {
   value["lmm_vaf_crossed/sigma2"] <- of("Residual")
 }
 
+#' ## Generalized mixed models of measured outcomes
+#'
+#' Counts (Poisson) and successes in trials (binomial), with random intercepts of participants and
+#' of their cells; each effect is tested by the ratio of the likelihoods with and without it, with
+#' contrasts that sum to zero. The modes are found more precisely than by default.
+
+precise <- glmerControl(optimizer = "bobyqa", optCtrl = list(rhobeg = 0.2, rhoend = 1e-8, maxfun = 1e5),
+                        tolPwrss = 1e-12, check.conv.singular = "ignore", check.conv.grad = "ignore",
+                        check.conv.hess = "ignore", calc.derivs = FALSE)
+generalized <- function(id) {
+  d <- tested[!is.na(tested[[setting(paste("column of", id))]]), ]
+  d$number <- d[[setting(paste("column of", id))]]
+  of <- as.numeric(setting(paste("trials of", id)))
+  by <- if (length(factors) > 0) d[factors] else d["model"]
+  if (length(factors) > 0 && !is.na(setting("group is a factor"))) {
+    by$group <- factor(participants$group[match(d$participant, participants$participant)])
+    d <- d[!is.na(by$group), ]
+    by <- by[!is.na(by$group), , drop = FALSE]
+  }
+  names_of <- names(by)
+  names(by) <- paste0("f", seq_along(by))
+  by[] <- lapply(by, droplevels)
+  terms <- terms(as.formula(paste("~", paste(names(by), collapse = " * "))))
+  x <- model.matrix(terms, by, contrasts.arg = lapply(by, function(f) "contr.sum"))
+  repeats <- anyDuplicated(d[c("participant", "model")]) > 0
+  cells <- is.na(of) || of > 1 || repeats
+  left <- if (is.na(of)) "number" else "cbind(number, of - number)"
+  right <- paste("0 + x + (1 | participant)", if (cells) "+ (1 | participant:model)")
+  d$of <- of
+  fitted <- function(columns) {
+    d$x <- x[, columns, drop = FALSE]
+    glmer(as.formula(paste(left, "~", right)), data = d, nAGQ = if (cells) 1 else 25,
+          family = if (is.na(of)) poisson else binomial, control = precise)
+  }
+  full <- fitted(seq_len(ncol(x)))
+  print(summary(full))
+  for (k in seq_along(labels <- attr(terms, "term.labels"))) {
+    own <- attr(x, "assign") == k
+    chi2 <- max(0, 2 * as.numeric(logLik(full) - logLik(fitted(which(!own)))))
+    places <- as.integer(sub("f", "", strsplit(labels[k], ":")[[1]]))
+    name <- if (length(factors) > 0) paste0("effect/", paste(names_of[places], collapse = ":")) else "differ"
+    found <- c(chi2 = chi2, df = sum(own), p = pchisq(chi2, sum(own), lower.tail = FALSE))
+    value[paste0("outcomes/", id, "/model/", name, "/", names(found))] <<- found
+  }
+}
+for (id in if (has_ratings) kept("modeled")) {
+  tryCatch(generalized(id), error = function(e) cat(id, ": no model, ", conditionMessage(e), "\n", sep = ""))
+}
+
 #' ## Ordinal mixed model
 #'
 #' The ratings as ordered categories. `clmm` needs the standardized VAF: with the raw one

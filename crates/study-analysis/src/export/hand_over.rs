@@ -13,13 +13,13 @@ use headline::{of_part, of_ratings};
 use std::borrow::Cow;
 use std::collections::BTreeSet;
 use study_base::hex::sha256;
-use study_base::text::PartId;
-use study_plan::protocol::Protocol;
+use study_base::text::{PartId, QuestionId};
 use study_plan::protocol::columns::UsedColumn;
 use study_plan::protocol::parts::{Task, TrackRules};
+use study_plan::protocol::{Measure, OutcomeFamily, OutcomeRules, Protocol, Telemetry};
 use study_session::outcome::RatingRow;
 use study_session::outcome::cell::Cell;
-use study_session::outcome::ratings::Ratings;
+use study_session::outcome::ratings::{Motions, Ratings};
 
 /// The script. Lines that begin with `#'` are the text of the document. No text of a
 /// study is in it: it reads all of them from the tables.
@@ -143,6 +143,10 @@ fn analysis(job: &Job<'_>) -> Option<Analysis> {
         let original = m.duplicate_of.as_ref()?;
         Some((m.id.as_str(), original.as_str()))
     }));
+    let outcomes: Vec<OutcomeRules> = (modeled(protocol).into_iter())
+        .map(|(outcome, _)| outcome.clone())
+        .collect();
+    ratings.set_measured(&job.selected.rows, &outcomes, &Motions::new());
     // All rows are of one kind, whichever it is.
     let include = Include {
         pilot: true,
@@ -150,6 +154,21 @@ fn analysis(job: &Job<'_>) -> Option<Analysis> {
     };
     let rules = Rules::of(protocol, question.id.as_str(), include);
     (!ratings.is_empty()).then(|| analyze(&ratings, &rules))
+}
+
+/// The outcomes of which R fits the generalized mixed model too, with the columns of their numbers.
+fn modeled(protocol: &Protocol) -> Vec<(&OutcomeRules, &str)> {
+    fn column(outcome: &OutcomeRules) -> Option<&str> {
+        match (&outcome.measure, outcome.model?) {
+            // R's glmer does not maximize the likelihood of gamma.
+            (_, OutcomeFamily::Gamma) | (Measure::Clock(_), _) => None,
+            (Measure::Telemetry(what), _) => (*what == Telemetry::Strokes).then_some("strokes"),
+            (Measure::Answers(answers), _) => answers.questions.first().map(QuestionId::as_str),
+        }
+    }
+    (protocol.outcomes.iter())
+        .filter_map(|outcome| Some((outcome, column(outcome)?)))
+        .collect()
 }
 
 /// The analyses of the parts.
@@ -282,6 +301,14 @@ fn settings(
         }
         if !crossing.groups.is_empty() {
             put("group is a factor", "true");
+        }
+    }
+    for (outcome, column) in modeled(protocol) {
+        let id = &outcome.id;
+        put(&format!("modeled {id}"), "true");
+        put(&format!("column of {id}"), column);
+        if let Some(of) = outcome.of {
+            put(&format!("trials of {id}"), &of.to_string());
         }
     }
     for part in parts.iter().filter_map(|own| protocol.part(&own.part)) {

@@ -5,6 +5,7 @@ use crate::analyze::psychophysics::PartAnalysis;
 use crate::analyze::psychophysics::results::{Identified, Preferences, Similarities};
 use crate::analyze::results::{Correlation, Field, Key, Number as _};
 use std::collections::BTreeMap;
+use study_plan::protocol::OutcomeFamily;
 
 /// Most realizations with a VAF of which R goes through every permutation.
 const MAX_PERMUTED: usize = 8;
@@ -19,6 +20,8 @@ const LINEAR: &str = "2e-5";
 /// Of a likelihood that both maximize by Newton's method.
 const FITTED: &str = "1e-6";
 const ORDINAL: &str = "2e-3";
+/// Of a generalized mixed model, whose maximum R's optimizers miss by a little.
+const GENERALIZED: &str = "1e-3";
 
 /// Of the analysis of ratings.
 pub(super) fn of_ratings(analysis: &Analysis) -> Vec<Number> {
@@ -60,6 +63,18 @@ pub(super) fn of_ratings(analysis: &Analysis) -> Vec<Number> {
     ];
     let crossed = &results.ordinal.clmm_vaf_crossed;
     numbers.add("clmm_vaf_crossed", crossed, &ordinal, ORDINAL);
+    for outcome in &analysis.outcomes {
+        // R's glmer does not maximize the likelihood of gamma.
+        if outcome.rules.model == Some(OutcomeFamily::Gamma) {
+            continue;
+        }
+        let id = outcome.rules.id.as_str();
+        if let Some(model) = results.outcomes.get(id).and_then(|own| own.model.as_ref()) {
+            let (id, ratio) = (format!("outcomes/{id}/model"), ["chi2", "df", "p"]);
+            numbers.add(&format!("{id}/differ"), &model.differ, &ratio, GENERALIZED);
+            numbers.each(&format!("{id}/effect"), &model.effects, &ratio, GENERALIZED);
+        }
+    }
     numbers.0
 }
 
