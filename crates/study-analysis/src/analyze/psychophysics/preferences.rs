@@ -412,6 +412,7 @@ fn reason(error: &NoAbilities, items: &[&str]) -> String {
         NoAbilities::NoPairs
         | NoAbilities::OneOrder
         | NoAbilities::AllTied
+        | NoAbilities::TooManySets
         | NoAbilities::NotFound => error.to_string(),
     }
 }
