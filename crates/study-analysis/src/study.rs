@@ -439,12 +439,14 @@ fn analyzed(ratings: &Ratings, rules: &Rules, progress: Option<&Progress>) -> An
 }
 
 /// Whether the primary question is analyzed as a rating: numbers other than estimates of
-/// magnitude and ratings of two realizations, or the share of an answer.
+/// magnitude, ranks and ratings of two realizations, or the share of an answer.
 pub fn is_rated(protocol: &Protocol) -> bool {
     let primary = &protocol.analysis.primary;
     let estimated = (protocol.parts.iter()).any(|part| {
-        matches!(part.task, Task::Magnitude(_) | Task::Similarity(_))
-            && part.asks.first() == Some(primary)
+        matches!(
+            part.task,
+            Task::Magnitude(_) | Task::Similarity(_) | Task::Ranking(_)
+        ) && part.asks.first() == Some(primary)
     });
     !estimated && question(protocol, None).is_ok()
 }

@@ -61,6 +61,7 @@ pub(super) fn trials(protocol: &Protocol, part: &Part) -> u32 {
         Task::Similarity(own) => {
             all(own.pairs().pairs.len(), own.repetitions).saturating_add(own.practice)
         }
+        Task::Ranking(own) => own.repetitions.saturating_add(own.practice),
     }
 }
 
@@ -71,6 +72,7 @@ pub(super) fn seconds(protocol: &Protocol, part: &Part, reference_s: f64) -> f64
         Task::Rating(_) | Task::Identification(_) => 1,
         Task::Magnitude(_) | Task::Mushra(_) => 1 + usize::from(part.task.reference().is_some()),
         Task::Pairs(_) | Task::Search(_) | Task::Similarity(_) => 2,
+        Task::Ranking(own) => own.models.len(),
         Task::Discrimination { tracks: ids } => tracks(protocol, ids)
             .map(|track| track.method.sequences()[0].len())
             .max()
@@ -84,7 +86,8 @@ pub(super) fn seconds(protocol: &Protocol, part: &Part, reference_s: f64) -> f64
         | Task::Pairs(_)
         | Task::Discrimination { .. }
         | Task::Search(_)
-        | Task::Similarity(_) => pace::COMPARE_S,
+        | Task::Similarity(_)
+        | Task::Ranking(_) => pace::COMPARE_S,
     };
     let felt_s = part.exposure.max_s.map_or(free_s, |max| max.min(free_s));
     let load_s = match protocol.device.kind {
@@ -145,6 +148,7 @@ fn presented(protocol: &Protocol, model: &ModelId) -> bool {
     let by_part = protocol.parts.iter().any(|part| match &part.task {
         Task::Pairs(own) => own.pairs.iter().any(|pair| pair.contains(model)),
         Task::Similarity(own) => own.models.contains(model),
+        Task::Ranking(own) => own.models.contains(model),
         task => {
             let own = task.presentations();
             own.is_some_and(|own| own.models.contains(model) || own.practice.contains(model))
@@ -165,7 +169,7 @@ pub fn is_about_realizations(protocol: &Protocol) -> bool {
             let models = &own.presentations.models;
             models.iter().all(|m| protocol.level_of(m).is_none())
         }
-        Task::Rating(_) | Task::Mushra(_) | Task::Pairs(_) => true,
+        Task::Rating(_) | Task::Mushra(_) | Task::Pairs(_) | Task::Ranking(_) => true,
     };
     let tested = protocol.models.iter().any(|m| m.role == Role::Test);
     let compares = protocol.parts.is_empty() || (protocol.parts.iter().any(about) && tested);

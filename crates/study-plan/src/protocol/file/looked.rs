@@ -6,8 +6,11 @@ use super::parts::RawLabel;
 use super::similarity::RawSimilarity;
 use super::spaces::PartialSpace;
 use crate::protocol::pairs::{every, neighbors};
+use crate::protocol::ranking::MOST_RANKED;
 use crate::protocol::similarity::unconnected;
-use crate::protocol::{Criterion, DeviceKind, FamilyRules, Label, Presentations, Role, Similarity};
+use crate::protocol::{
+    Criterion, DeviceKind, FamilyRules, Label, Presentations, Ranking, Role, Similarity,
+};
 use study_base::diagnostic::Fault;
 use study_base::diagnostic::table::Document;
 use study_base::text::{ModelId, PartId, QuestionId};
@@ -311,6 +314,20 @@ impl Looked<'_> {
             identical: raw.identical,
             practice: raw.practice,
         })
+    }
+
+    /// What a part of ranking presents. Fewer than two realizations, and too many to remember, are reported.
+    pub(super) fn ranking(&self, raw: &Ranking, path: &str) -> Option<Ranking> {
+        let place = format!("{path}.models");
+        self.models(&raw.models, &place);
+        let n = raw.models.len();
+        if !(2..=MOST_RANKED).contains(&n) {
+            let what = format!("a ranking has 2 to {MOST_RANKED} realizations, not {n}");
+            let hint = "a part of kind \"pairs\" compares more of them, two at a time";
+            self.fault_at(&place, Fault::error(what).hint(hint));
+            return None;
+        }
+        Some(raw.clone())
     }
 
     pub(super) fn pairs(
