@@ -483,7 +483,10 @@ fn trials(p: &Protocol, part: &Part) -> String {
         ),
         Task::Ranking(own) => format!(
             "rankings of {}, all felt one after another, {}, order {}, {}",
-            counted(own.models.len(), "realization", "realizations"),
+            match own.models.iter().all(|m| p.level_of(m).is_some()) {
+                true => counted(own.models.len(), "level", "levels"),
+                false => counted(own.models.len(), "realization", "realizations"),
+            },
             counted(own.repetitions as usize, "trial", "trials"),
             order(&own.order),
             match own.ties {

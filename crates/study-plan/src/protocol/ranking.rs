@@ -10,7 +10,7 @@ pub const MOST_RANKED: usize = 9;
 /// What each trial of a part presents, one after another, and how it is ranked.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Ranking {
-    /// The realizations, all of which are felt in each trial: 2 to [`MOST_RANKED`].
+    /// The realizations, or levels of a family, all of which are felt in each trial: 2 to [`MOST_RANKED`].
     pub models: Vec<ModelId>,
     /// How their order in a trial is made; never shuffled over trials or from a file.
     pub order: Order,

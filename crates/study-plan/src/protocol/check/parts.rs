@@ -169,7 +169,8 @@ pub fn is_about_realizations(protocol: &Protocol) -> bool {
             let models = &own.presentations.models;
             models.iter().all(|m| protocol.level_of(m).is_none())
         }
-        Task::Rating(_) | Task::Mushra(_) | Task::Pairs(_) | Task::Ranking(_) => true,
+        Task::Ranking(own) => own.models.iter().all(|m| protocol.level_of(m).is_none()),
+        Task::Rating(_) | Task::Mushra(_) | Task::Pairs(_) => true,
     };
     let tested = protocol.models.iter().any(|m| m.role == Role::Test);
     let compares = protocol.parts.is_empty() || (protocol.parts.iter().any(about) && tested);

@@ -182,6 +182,7 @@ pub(super) fn agree(
                     own.keep(|m| models.contains(m) || is_level(m));
                     (task.models.clone(), own.different.len())
                 }
+                Task::Ranking(task) if task.models.iter().all(is_level) => continue,
                 Task::Ranking(task) => {
                     let own = task.models.iter().filter(|m| models.contains(m)).count();
                     if (1..task.models.len()).contains(&own) {

@@ -3,6 +3,7 @@
 use super::agree::{Sections, at, unknown};
 use super::pairs::RawPairs;
 use super::parts::RawLabel;
+use super::ranking::{RawRanking, RawSet};
 use super::similarity::RawSimilarity;
 use super::spaces::PartialSpace;
 use crate::protocol::pairs::{every, neighbors};
@@ -317,17 +318,36 @@ impl Looked<'_> {
     }
 
     /// What a part of ranking presents. Fewer than two realizations, and too many to remember, are reported.
-    pub(super) fn ranking(&self, raw: &Ranking, path: &str) -> Option<Ranking> {
-        let place = format!("{path}.models");
-        self.models(&raw.models, &place);
-        let n = raw.models.len();
+    pub(super) fn ranking(
+        &self,
+        raw: &RawRanking,
+        families: Option<&[FamilyRules]>,
+        path: &str,
+    ) -> Option<Ranking> {
+        let (key, models) = match &raw.felt {
+            RawSet::Models(models) => {
+                self.models(models, &format!("{path}.models"));
+                ("models", models.clone())
+            }
+            RawSet::Levels(family, levels) => {
+                let family = self.family(family, families?, path)?;
+                ("levels", self.levels(family, Some(levels.as_slice()), path)?)
+            }
+        };
+        let n = models.len();
         if !(2..=MOST_RANKED).contains(&n) {
             let what = format!("a ranking has 2 to {MOST_RANKED} realizations, not {n}");
             let hint = "a part of kind \"pairs\" compares more of them, two at a time";
-            self.fault_at(&place, Fault::error(what).hint(hint));
+            self.fault(path, key, Fault::error(what).hint(hint));
             return None;
         }
-        Some(raw.clone())
+        Some(Ranking {
+            models,
+            order: raw.order.clone(),
+            repetitions: raw.repetitions,
+            ties: raw.ties,
+            practice: raw.practice,
+        })
     }
 
     pub(super) fn pairs(

@@ -260,7 +260,7 @@ impl RawPart {
             return false;
         };
         let intervals = match &self.task {
-            Some(RawTask::Ranking(own)) => own.ranking.models.len(),
+            Some(RawTask::Ranking(own)) => own.felt.len(),
             _ => 1,
         };
         (1..=intervals).any(|interval| question(part, interval) == *id)

@@ -287,6 +287,7 @@ impl Raw {
                 Some(RawTask::Similarity(own)) => {
                     own.family.as_ref().is_some_and(|own| own.0 == *id)
                 }
+                Some(RawTask::Ranking(own)) => own.felt.is_of(id),
                 _ => false,
             };
             if !self.tracks.iter().any(of) && !self.parts.iter().any(felt) {
@@ -465,7 +466,7 @@ impl Raw {
                 )
             }
             RawTask::Ranking(own) => {
-                let ranking = looked.ranking(&own.ranking, path)?;
+                let ranking = looked.ranking(own, families, path)?;
                 asks.extend((1..=ranking.models.len()).map(|interval| question(&id, interval)));
                 (Task::Ranking(ranking), own.gap_s)
             }

@@ -203,6 +203,42 @@ fn a_wrong_ranking_says_what_is_wrong() {
     assert!(faults(&taken).contains("order-3"));
 }
 
+/// Levels of a family are ranked as realizations are; a group has them all.
+#[test]
+fn levels_are_ranked() {
+    let levels = RANKED.replace(
+        "models = [\"a\", \"b\", \"c\", \"d\"]\nexp",
+        "family = \"detent\"\nlevels = [2.0, 0.5]\nexp",
+    ) + "\n[[families]]\nid = \"detent\"\nfrom = \"a.toml\"\nvary = \"detent\"\nlevels = [0.5, 1.0, 2.0]\n";
+    let protocol = read(&levels);
+    let Task::Ranking(own) = &protocol.parts[0].task else {
+        panic!()
+    };
+    let ids: Vec<&str> = own.models.iter().map(|m| m.as_str()).collect();
+    assert_eq!(ids, ["detent.3", "detent.1"]);
+    assert_eq!(protocol.questions.len(), 2);
+    for (from, to, said) in [
+        ("[2.0, 0.5]", "[2.0]", "2 to 9 realizations, not 1"),
+        ("[2.0, 0.5]", "[2.0, 0.6]", "0.6"),
+        ("\nlevels = [2.0, 0.5]", "", "has a family without `levels`"),
+        ("family = \"detent\"\n", "", "has `levels` without a family"),
+        (
+            "levels = [2.0, 0.5]",
+            "models = [\"a\", \"b\"]",
+            "has `models` and a family",
+        ),
+    ] {
+        assert_eq!(levels.matches(from).count(), 1, "{from}");
+        let found = faults(&levels.replace(from, to));
+        assert!(found.contains(said), "{said}:\n{found}");
+    }
+    let groups =
+        "\n[groups]\n[[groups.list]]\nid = \"x\"\nmodels = [\"a\"]\n[[groups.list]]\nid = \"y\"\n";
+    let protocol = read(&format!("{levels}{groups}"));
+    let of_x = protocol.of(&protocol.assignments()[0]);
+    assert_eq!(of_x.parts, protocol.parts);
+}
+
 /// A group has all realizations of a ranking, or another part.
 #[test]
 fn a_group_ranks_all_realizations() {
