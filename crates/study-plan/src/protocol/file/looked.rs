@@ -331,7 +331,10 @@ impl Looked<'_> {
             }
             RawSet::Levels(family, levels) => {
                 let family = self.family(family, families?, path)?;
-                ("levels", self.levels(family, Some(levels.as_slice()), path)?)
+                (
+                    "levels",
+                    self.levels(family, Some(levels.as_slice()), path)?,
+                )
             }
         };
         let n = models.len();

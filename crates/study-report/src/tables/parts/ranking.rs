@@ -38,11 +38,13 @@ pub(super) fn realizations(results: &PartResults) -> Table {
             two,
             |i| &i.1.mean_rank,
         )
-        .field(column("SD", "sd"), two, |i| &i.1.sd)
+        .field(column("SD", "sd").droppable(1), two, |i| &i.1.sd)
         .field(column("first", "first"), two, |i| &i.1.first)
         .field(column("worth", "worth"), two, |i| &i.1.worth)
         .field(column("log worth", "log_worth"), two, |i| &i.1.log_worth)
-        .field(column("SE", "log_worth_se"), two, |i| &i.1.log_worth_se)
+        .field(column("SE", "log_worth_se").droppable(1), two, |i| {
+            &i.1.log_worth_se
+        })
         .ends(column("95 %", "log_worth_ci95"), two, &|i| {
             i.1.log_worth_ci95.ends()
         })
@@ -77,7 +79,7 @@ pub(super) fn pairs(results: &PartResults) -> Table {
             &p.1.worths.difference
         })
         .field(column("SE", "se"), two, |p| &p.1.worths.se)
-        .field(column("clustered", "se_clustered"), two, |p| {
+        .field(column("clustered", "se_clustered").droppable(1), two, |p| {
             &p.1.worths.se_clustered
         })
         .field(column("p (Holm)", "p_holm"), bare_p, |p| &p.1.worths.p_holm)
