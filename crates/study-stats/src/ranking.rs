@@ -251,6 +251,18 @@ pub struct Concordance {
     pub smallest_p: f64,
 }
 
+/// The smallest p of W that participants can have who rank so many items without ties: that of equal orders.
+///
+/// ```
+/// # use study_stats::ranking::smallest_p;
+/// assert!((smallest_p(3, 2) - 1.0 / 6.0).abs() < 1e-15);
+/// ```
+pub fn smallest_p(items: usize, participants: usize) -> f64 {
+    let orders: f64 = (1..=items).map(|i| i as f64).product();
+    let others = participants.saturating_sub(1);
+    orders.powi(-i32::try_from(others).unwrap_or(i32::MAX))
+}
+
 /// Kendall's W of rows with the ranks of a participant each, of which only the order counts. If items do not differ,
 /// all orders of the ranks of a participant are equally likely. `None` with fewer than two participants or items.
 ///
@@ -266,8 +278,7 @@ pub fn concordance<R: AsRef<[f64]>>(
 ) -> Option<Concordance> {
     let friedman = friedman(rows)?;
     let items = friedman.mean_ranks.len();
-    let orders: f64 = (1..=items).map(|i| i as f64).product();
-    let smallest = orders.powi(1 - i32::try_from(rows.len()).unwrap_or(i32::MAX));
+    let smallest = smallest_p(items, rows.len());
     let exact = friedman.exact_p.is_some();
     let mut drawn = || {
         let mut ranks: Vec<Vec<usize>> = (rows.iter())

@@ -6,8 +6,11 @@ use crate::protocol::{
     DeviceKind, Identification, IntervalOrder, Magnitude, Method, Mushra, Part, Protocol, Question,
     Role, Task, TrackRules,
 };
+use study_base::apa;
 use study_base::diagnostic::Fault;
 use study_base::text::{ModelId, PartId, counted};
+use study_stats::level::rejects;
+use study_stats::ranking::smallest_p;
 
 /// Fewest levels of a magnitude estimation that need no warning.
 const MAGNITUDE_LEVELS: usize = 5;
@@ -121,6 +124,7 @@ pub(super) fn warnings(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Faul
             counted_out::practice(part),
             one_order(part),
             few_pairs(protocol, part),
+            few_rankers(protocol, part),
         ];
         let doubts = doubts.into_iter().flatten();
         let doubts = doubts.chain(maps::doubts(protocol, part));
@@ -262,6 +266,24 @@ fn few_pairs(protocol: &Protocol, part: &Part) -> Option<Fault> {
             counted(space.axes.len(), "axis", "axes")
         ))
         .hint("docs/search.md shows how near the best point a search comes")
+    })
+}
+
+/// So few participants and realizations that no agreement is beyond chance. One participant agrees with nobody.
+fn few_rankers(protocol: &Protocol, part: &Part) -> Option<Fault> {
+    let Task::Ranking(own) = &part.task else {
+        return None;
+    };
+    let people = protocol.design.participants as usize;
+    let least = smallest_p(own.models.len(), people);
+    (people > 1 && !rejects(least, protocol.analysis.alpha())).then(|| {
+        let what = format!(
+            "the part `{}` has {people} participants who rank {} realizations: even if all rank alike, p {}",
+            part.id,
+            own.models.len(),
+            apa::p(least)
+        );
+        Fault::warning(what).hint("add participants or realizations")
     })
 }
 

@@ -254,3 +254,32 @@ fn a_group_ranks_all_realizations() {
     );
     read(&groups("[\"a\", \"b\", \"c\", \"d\"]"));
 }
+
+/// Two participants with three realizations have one of six orders in common by chance.
+#[test]
+fn so_few_that_no_agreement_shows_are_warned_of() {
+    let warned = |participants: &str, models: &str| -> Vec<String> {
+        let text = RANKED
+            .replace("participants = 8", participants)
+            .replace("[\"a\", \"b\", \"c\", \"d\"]", models);
+        let parsed = parse("p", &text);
+        let protocol = parsed.protocol.unwrap();
+        let faults = crate::protocol::check::warnings(&protocol, &parsed.spans, &[]);
+        let own = faults.into_iter().map(|f| f.message);
+        own.filter(|m| m.contains("`order`")).collect()
+    };
+    let three = "[\"a\", \"b\", \"c\"]";
+    assert_eq!(
+        warned("participants = 2", three),
+        [
+            "the part `order` has 2 participants who rank 3 realizations: even if all rank alike, p = .167"
+        ]
+    );
+    let none: [&str; 0] = [];
+    assert_eq!(warned("participants = 3", three), none);
+    // One in 24.
+    assert_eq!(
+        warned("participants = 2", "[\"a\", \"b\", \"c\", \"d\"]"),
+        none
+    );
+}
