@@ -48,6 +48,9 @@ const WITH_ANCHORS: [(&str, &str); 5] = [
     MODELS[2],
 ];
 
+/// Realizations that are ranked.
+const RANKED: [(&str, &str); 4] = [WITH_ANCHORS[1], MODELS[0], MODELS[1], MODELS[2]];
+
 /// Two factors with two levels each.
 const CROSSED: [(&str, &str); 4] = [
     (
@@ -95,6 +98,8 @@ enum TrialKind {
     Identification,
     /// How different two realizations are, for a map
     Similarity,
+    /// Ranks of several realizations
+    Ranking,
     /// Yes or no, with catch trials
     #[value(name = "yesno")]
     YesNo,
@@ -117,6 +122,7 @@ impl TrialKind {
             Self::Mushra => (include_str!("new/mushra.toml"), &WITH_ANCHORS),
             Self::Identification => (include_str!("new/identification.toml"), &CROSSED),
             Self::Similarity => (include_str!("new/similarity.toml"), &[STATIC]),
+            Self::Ranking => (include_str!("new/ranking.toml"), &RANKED),
             Self::YesNo => (include_str!("new/yesno.toml"), &[STATIC]),
             Self::Abx => (include_str!("new/abx.toml"), &[MODELS[0], MODELS[2]]),
         }

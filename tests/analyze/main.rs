@@ -24,6 +24,7 @@ mod posterior;
 mod properties;
 mod psychophysics;
 mod questionnaires;
+mod ranking;
 mod rendering;
 mod report_answers;
 mod report_figures;

@@ -275,6 +275,15 @@ fn tracks_and_estimates_are_declared() {
                 "Power was not computed:",
             ],
         ),
+        (
+            "ranking",
+            &[
+                "rankings of 4 realizations, all felt one after another, 2 trials, order williams, no ties",
+                "Part `order`: Do participants rank the realizations alike? Decided by: permutation test of the ranks within participants",
+                "Part `order`: Is one realization ranked above each other one? Decided by: t test, participants as clusters, Holm's correction over 6 pairs",
+                "Power was not computed:",
+            ],
+        ),
     ] {
         let folder = tempfile::tempdir().unwrap();
         let at = folder.path();

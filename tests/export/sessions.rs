@@ -229,6 +229,15 @@ fn the_headline_of_groups_and_sessions_is_that_of_the_analysis() {
                 "similarity/pair/detent.1|detent.2/rescaled",
             ],
         ),
+        (
+            "ranking",
+            "",
+            &[
+                "ranking/agreement/w",
+                "ranking/realization/spring/mean_rank",
+                "ranking/pair/lambda-0.9991|spring/above",
+            ],
+        ),
     ] {
         let home = tempfile::tempdir().unwrap();
         let folder = match kind {

@@ -29,6 +29,7 @@ mod mirror;
 mod parts_by_keys;
 mod plain;
 mod programs;
+mod ranking_by_keys;
 mod rehearsed;
 mod releases;
 mod screen;

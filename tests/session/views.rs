@@ -140,6 +140,7 @@ pub(crate) fn view(screen: Screen) -> View {
         remarks: vec!["the motor hums".to_owned()],
         force: true,
         has_reference: false,
+        numbered: false,
         progress: before.then_some(Progress {
             practice: false,
             current: 7,

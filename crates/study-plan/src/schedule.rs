@@ -22,6 +22,7 @@ pub mod constraints;
 mod inclusion;
 pub mod orders;
 mod pairs;
+mod ranking;
 mod requeue;
 mod search;
 mod sequence;
@@ -32,8 +33,7 @@ pub use crate::protocol::{Seat, Trial};
 pub use requeue::{Felt, Requeued, breaks_constraint, requeue};
 
 use crate::protocol::{
-    Drawn, FileOrders, Identification, Magnitude, Mushra, PartsOrder, Protocol, Similarity,
-    Stimuli, Task,
+    Drawn, FileOrders, Identification, Magnitude, Mushra, PartsOrder, Protocol, Stimuli, Task,
 };
 use constraints::Violation;
 use pairs::PairOrders;
@@ -240,8 +240,8 @@ struct PartOrders {
     seed: u64,
     /// Felt before each realization.
     reference: Option<ModelId>,
-    /// Whose practice has pairs that are drawn.
-    similarity: Option<Similarity>,
+    /// What it is about, if its practice is drawn from that.
+    drawn: Option<Task>,
     kind: Kind,
 }
 
@@ -251,6 +251,7 @@ enum Kind {
     Pairs(PairOrders),
     Tracks(TrackOrders),
     Search(SearchOrders),
+    Ranking(Sequence),
 }
 
 /// A trial of a part before it is numbered.
@@ -280,7 +281,7 @@ impl Planner {
                 rounds: None,
                 seed,
                 reference: None,
-                similarity: None,
+                drawn: None,
                 kind: Kind::Rating(Sequence::of_models(
                     seed,
                     None,
@@ -322,6 +323,13 @@ impl Planner {
                 Task::Similarity(own) => {
                     Kind::Pairs(PairOrders::new(seed, &part.id, &own.pairs(), &design)?)
                 }
+                Task::Ranking(own) => Kind::Ranking(Sequence::of_models(
+                    seed,
+                    id,
+                    &design,
+                    own.models.clone(),
+                    None,
+                )?),
             };
             Ok(PartOrders {
                 part: id.cloned(),
@@ -331,10 +339,8 @@ impl Planner {
                     .map(|criterion| (criterion.rounds, criterion.draw)),
                 seed,
                 reference: part.task.reference().cloned(),
-                similarity: match &part.task {
-                    Task::Similarity(own) => Some(own.clone()),
-                    _ => None,
-                },
+                drawn: Some(part.task.clone())
+                    .filter(|task| matches!(task, Task::Similarity(_) | Task::Ranking(_))),
                 kind,
             })
         };
@@ -397,7 +403,7 @@ impl Planner {
     /// constraint.
     pub fn verify(&self, participants: u32) -> Result<(), ScheduleError> {
         self.parts.iter().try_for_each(|part| match &part.kind {
-            Kind::Rating(sequence) => sequence.verify(participants),
+            Kind::Rating(sequence) | Kind::Ranking(sequence) => sequence.verify(participants),
             Kind::Pairs(_) | Kind::Tracks(_) | Kind::Search(_) => Ok(()),
         })
     }
@@ -411,6 +417,7 @@ impl PartOrders {
             Kind::Pairs(pairs) => pairs.plan(seat)?,
             Kind::Tracks(tracks) => tracks.plan(seat),
             Kind::Search(search) => search.plan(seat),
+            Kind::Ranking(sequence) => ranking::ranked(sequence, seat)?,
         };
         let last = |of: fn(&Trial) -> u32, practice: bool| {
             let same = trials.iter().filter(|t| t.practice == practice);
@@ -450,8 +457,14 @@ impl PartOrders {
 impl PartOrders {
     /// What the practice trials present, in their order for a seat.
     fn practiced(&self, seat: Seat) -> Vec<Stimuli> {
-        if let (Some(own), Some(part)) = (&self.similarity, &self.part) {
-            return similarity::practiced(self.seed, part, own, seat);
+        match (&self.drawn, &self.part) {
+            (Some(Task::Similarity(own)), Some(part)) => {
+                return similarity::practiced(self.seed, part, own, seat);
+            }
+            (Some(Task::Ranking(own)), Some(part)) => {
+                return ranking::practiced(self.seed, part, own, seat);
+            }
+            _ => {}
         }
         let models = self.practiced_models(seat);
         let rated = models

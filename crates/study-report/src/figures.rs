@@ -15,6 +15,7 @@ mod means;
 mod outcomes;
 mod pairs;
 mod parts;
+mod rankings;
 mod rendering;
 mod similarity;
 mod strips;

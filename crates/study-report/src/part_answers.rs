@@ -51,12 +51,18 @@ fn answer(part: &PartAnalysis, f: &PartFinding) -> Option<Answer> {
     if f.question == PartQuestion::Dimensions {
         answer.main.extend(dimensions(part));
     }
+    if f.question == PartQuestion::RankedAlike {
+        answer.main.extend(ranks(part));
+    }
     if f.question == PartQuestion::Sessions {
         answer.main.extend(retest(part));
     }
     if matches!(
         f.question,
-        PartQuestion::Preferred | PartQuestion::Thresholds | PartQuestion::Magnitudes
+        PartQuestion::Preferred
+            | PartQuestion::Thresholds
+            | PartQuestion::Magnitudes
+            | PartQuestion::RankedFirst
     ) {
         answer.main.extend(different(part));
     }
@@ -125,12 +131,17 @@ pub(super) fn results(part: &PartAnalysis) -> String {
     text.extend(information(part));
     text.extend(agreement(part));
     text.extend(identical(part));
+    text.extend(ranks(part));
     let tested = part.findings.iter().filter(|f| f.test.is_some());
     text.extend(tested.filter_map(|f| wording::of_part(part, f).paper()));
     text.extend(dimensions(part));
     text.extend(retest(part));
     let pairs = part.findings.iter().any(|f| {
-        let of_conditions = [PartQuestion::Thresholds, PartQuestion::Magnitudes];
+        let of_conditions = [
+            PartQuestion::Thresholds,
+            PartQuestion::Magnitudes,
+            PartQuestion::RankedFirst,
+        ];
         f.is_yes() && of_conditions.contains(&f.question)
     });
     text.extend(different(part).filter(|_| pairs));
@@ -235,6 +246,19 @@ fn agreement(part: &PartAnalysis) -> Option<String> {
         "Agreement: the mean correlation of the ratings of two participants is {}{w}.{order}",
         apa::two(correlation)
     ))
+}
+
+/// The mean ranks, the first first, as many as a sentence lists.
+fn ranks(part: &PartAnalysis) -> Option<String> {
+    let found = part.results.over.ranking.as_ref()?;
+    let mut means: Vec<(&str, f64)> = (found.items.iter())
+        .filter_map(|(name, item)| Some((name.as_str(), item.mean_rank.number()?)))
+        .collect();
+    means.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let listed: Vec<String> = (means.iter().take(MAX_LISTED))
+        .map(|(name, mean)| format!("{name} {}", apa::two(*mean)))
+        .collect();
+    (!listed.is_empty()).then(|| format!("Mean ranks: {}.", listed.join(", ")))
 }
 
 /// How different something is from itself.
@@ -423,6 +447,15 @@ pub(super) fn methods(part: &PartAnalysis) -> String {
              ratings were dealt to the pairs at random. The number of dimensions is the smallest whose maps of all others predict the ratings of \
              a participant as well as any, within one standard error. Standard errors of positions are by resampling participants; \
              properties of the realizations were laid on the map by Procrustes' rotation and tested over the orders of the realizations."
+                .to_owned(),
+        );
+    }
+    if over.ranking.is_some() {
+        text.push(
+            "Whether participants rank alike was tested by Kendall's (1939) W of their mean ranks, corrected for ties, over the orders of each \
+             participant's ranks. Worths are those of the model of Plackett (1975) and Luce (1959) with ties of any order (Turner et al., \
+             2020), by maximum likelihood; their differences were tested by t with participants as clusters and Holm's correction, \
+             and a realization is above each other one if all of its differences are significant."
                 .to_owned(),
         );
     }

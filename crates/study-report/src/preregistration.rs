@@ -481,6 +481,19 @@ fn trials(p: &Protocol, part: &Part) -> String {
             counted(own.repetitions as usize, "trial", "trials"),
             order(&own.order)
         ),
+        Task::Ranking(own) => format!(
+            "rankings of {}, all felt one after another, {}, order {}, {}",
+            match own.models.iter().all(|m| p.level_of(m).is_some()) {
+                true => counted(own.models.len(), "level", "levels"),
+                false => counted(own.models.len(), "realization", "realizations"),
+            },
+            counted(own.repetitions as usize, "trial", "trials"),
+            order(&own.order),
+            match own.ties {
+                true => "several can have the same rank",
+                false => "no ties",
+            }
+        ),
         Task::Search(own) => format!(
             "search in the space `{}`, {}, {}; it decides nothing",
             own.space,

@@ -23,6 +23,7 @@
 //! | At which level is a stimulus felt? | [`psychometric`] |
 //! | How well are two stimuli told apart? | [`detection`] |
 //! | Which is preferred, in pairs? | [`pairs`] |
+//! | Which is preferred, in rankings, and do participants agree? | [`ranking`] |
 //! | Which is preferred in a space of stimuli, and which pair tells most? | [`preference_gp`] |
 //! | How do estimated magnitudes grow? | [`magnitude`] |
 //! | How well are several stimuli identified, and which are confused? | [`identification`] |
@@ -85,6 +86,7 @@ mod quadrature;
 pub mod questionnaire;
 pub mod random;
 pub mod rank;
+pub mod ranking;
 pub mod regression;
 pub mod sequential;
 pub mod similarity;

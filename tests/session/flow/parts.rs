@@ -327,6 +327,7 @@ fn the_pages_of_a_trial_are_the_same_whatever_it_presents() {
         magnitudes(),
         identification("feedback = \"never\""),
         similarity("identical = true"),
+        ranking("ties = true\nrepetitions = 3"),
         track("2ifc", STAIRCASE, "easy = 0.3"),
         track("3ifc", STAIRCASE, "easy = 0.3"),
         track("abx", QUEST, ""),

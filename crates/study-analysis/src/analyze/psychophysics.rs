@@ -1,8 +1,9 @@
 //! Statistics of thresholds and comparisons: tracks, psychometric functions, detection,
-//! paired preferences, magnitude estimation, MUSHRA, identification, similarity. Each function takes what was
+//! paired preferences, magnitude estimation, MUSHRA, identification, similarity, ranking. Each function takes what was
 //! answered and returns statistics as records; `docs/statistics-psychophysics.md`
 //! defines them.
 
+mod abilities;
 mod again;
 mod counting;
 pub(crate) mod decided;
@@ -14,6 +15,7 @@ mod fits;
 mod identification;
 mod marginal;
 mod of_identification;
+mod of_ranking;
 mod of_scales;
 mod of_similarity;
 mod over_participants;
@@ -21,6 +23,7 @@ mod part_data;
 mod population;
 mod preferences;
 mod questionnaires;
+mod ranking;
 pub mod results;
 mod scales;
 pub mod search;
@@ -41,6 +44,7 @@ pub use over_participants::Measured;
 pub use part_data::{LevelData, PartAnalysis, PartData, StudyData};
 pub(crate) use part_data::{asked, sessions_of};
 pub use preferences::{Choice, Preference, preferences};
+pub use ranking::{RankingRow, ranking};
 pub use scales::{MagnitudeRow, MushraRoles, MushraRow, magnitude, mushra};
 pub use similarity::{Properties, SimilarityRow, similarity};
 pub use study::parts;

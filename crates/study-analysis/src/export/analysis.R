@@ -766,6 +766,130 @@ for (part in kept("similarity")) {
   }
 }
 
+#' ## Rankings
+#'
+#' Ranks are those of one ranking, ties in the middle; the mean ranks of each participant have Kendall's W. Worths are those of
+#' the model of Plackett and Luce with ties (Turner and others 2020), as a log-linear model: each ranking is a sequence of choices of
+#' the set with the smallest rank from those that are left, and the logarithm of a set's weight is the mean of those of its
+#' worths and, of a tie, a constant for its size. The logarithms of the worths sum to zero.
+
+for (part in kept("ranking")) {
+  put <- of_part(part)
+  answers <- ratings[ratings$included & ratings$part == part, ]
+  first <- setting(paste("ranking", part))
+  felt <- read_table("intervals")
+  key <- function(data) paste(data$participant, data$session, data$trial, data$attempt, sep = "\r")
+  felt <- felt[key(felt) %in% key(answers), ]
+  if (nrow(felt) == 0) next
+  items <- sorted(as.character(felt$model))
+  # Rankings by items.
+  ranks <- matrix(NA, nrow(answers), length(items), dimnames = list(NULL, items))
+  for (interval in seq_len(max(felt$interval))) {
+    column <- if (interval == 1) first else paste0(first, "-", interval)
+    own <- felt[felt$interval == interval, ]
+    model <- as.character(own$model)[match(key(answers), key(own))]
+    for (i in which(!is.na(model))) ranks[i, model[i]] <- answers[[column]][i]
+  }
+  keep <- rowSums(!is.na(ranks)) > 1
+  ranks <- ranks[keep, , drop = FALSE]
+  who <- as.character(answers$participant)[keep]
+  if (nrow(ranks) == 0) next
+  people <- sorted(who)
+  put("ranking/n", nrow(ranks))
+  put("ranking/n_participants", length(people))
+  whole <- stats::complete.cases(ranks)
+  means <- t(sapply(intersect(people, who[whole]), function(one) {
+    colMeans(t(apply(ranks[whole & who == one, , drop = FALSE], 1, rank)))
+  }))
+  put("ranking/agreement/n", nrow(means))
+  if (nrow(means) > 1 && length(items) > 1) {
+    again_ranked <- t(apply(round(means, 10), 1, rank))
+    m <- nrow(again_ranked)
+    k <- ncol(again_ranked)
+    ties <- sum(apply(again_ranked, 1, function(x) sum(table(x)^3 - table(x))))
+    spread <- sum((colSums(again_ranked) - m * (k + 1) / 2)^2)
+    put("ranking/agreement/df", k - 1)
+    if (m * (k^3 - k) > ties) {
+      w <- 12 * spread / (m^2 * (k^3 - k) - m * ties)
+      put("ranking/agreement/w", w)
+      put("ranking/agreement/chi2", m * (k - 1) * w)
+      put("ranking/agreement/p_chi2", pchisq(m * (k - 1) * w, k - 1, lower.tail = FALSE))
+    }
+  }
+  best <- apply(ranks, 1, min, na.rm = TRUE)
+  for (item in items) {
+    id <- paste0("ranking/realization/", item, "/")
+    here <- !is.na(ranks[, item])
+    put(paste0(id, "n"), sum(here))
+    if (nrow(means) > 0) put(paste0(id, "mean_rank"), mean(means[, item]))
+    if (nrow(means) > 1) put(paste0(id, "sd"), sd(means[, item]))
+    if (any(here)) put(paste0(id, "first"), mean(ranks[here, item] == best[here]))
+  }
+  for (i in seq_along(items)) for (j in seq_along(items)) if (j > i) {
+    id <- paste0("ranking/pair/", items[i], "|", items[j], "/")
+    both <- !is.na(ranks[, i]) & !is.na(ranks[, j])
+    put(paste0(id, "n"), sum(both))
+    if (any(both)) {
+      put(paste0(id, "above"), mean(ranks[both, i] < ranks[both, j]))
+      put(paste0(id, "tied"), mean(ranks[both, i] == ranks[both, j]))
+    }
+  }
+  choices <- unlist(lapply(seq_len(nrow(ranks)), function(row) {
+    own <- ranks[row, ]
+    places <- sort(unique(own[!is.na(own)]))
+    lapply(places, function(place) list(taken = which(own == place), left = which(own >= place)))
+  }), recursive = FALSE)
+  choices <- Filter(function(choice) length(choice$left) > 1, choices)
+  sizes <- setdiff(sort(unique(lengths(lapply(choices, function(choice) choice$taken)))), 1)
+  outcomes <- do.call(rbind, lapply(seq_along(choices), function(at) {
+    left <- choices[[at]]$left
+    sets <- unlist(lapply(intersect(c(1, sizes), seq_along(left)), function(size) {
+      combn(length(left), size, function(some) list(unname(left[some])))
+    }), recursive = FALSE)
+    weights <- t(sapply(sets, function(set) {
+      own <- tabulate(set, length(items)) / length(set)
+      c(own[-length(items)] - own[length(items)], (sizes == length(set)) + 0)
+    }))
+    # With one column the sets are the columns.
+    if (ncol(weights) != length(items) - 1 + length(sizes)) weights <- t(weights)
+    taken <- sapply(sets, function(set) setequal(set, choices[[at]]$taken))
+    cbind(weights, taken + 0, at)
+  }))
+  own <- seq_len(length(items) - 1 + length(sizes))
+  stratum <- model.matrix(~ factor(outcomes[, ncol(outcomes)]) - 1)
+  fit <- tryCatch(
+    glm.fit(cbind(outcomes[, own, drop = FALSE], stratum), outcomes[, length(own) + 1], family = poisson(),
+            control = list(epsilon = 1e-14, maxit = 100)),
+    warning = function(why) NULL, error = function(why) NULL)
+  if (is.null(fit) || !fit$converged) {
+    cat("part ", part, ": the worths have no estimate\n", sep = "")
+    next
+  }
+  covariance <- chol2inv(fit$qr$qr[seq_along(fit$coefficients), , drop = FALSE])
+  covariance <- covariance[order(fit$qr$pivot), order(fit$qr$pivot)][own, own, drop = FALSE]
+  estimate <- fit$coefficients[own]
+  contrast <- cbind(rbind(diag(length(items) - 1), -1), matrix(0, length(items), length(sizes)))
+  worth <- as.vector(contrast %*% estimate)
+  spread <- contrast %*% covariance %*% t(contrast)
+  print(data.frame(item = items, log_worth = worth, se = sqrt(diag(spread))))
+  for (i in seq_along(items)) {
+    id <- paste0("ranking/realization/", items[i], "/")
+    put(paste0(id, "worth"), exp(worth[i]) / sum(exp(worth)))
+    put(paste0(id, "log_worth"), worth[i])
+    put(paste0(id, "log_worth_se"), sqrt(spread[i, i]))
+    for (j in seq_along(items)) if (j > i) {
+      group <- paste0("ranking/pair/", items[i], "|", items[j])
+      put(paste0(group, "/difference"), worth[i] - worth[j])
+      put(paste0(group, "/se"), sqrt(spread[i, i] + spread[j, j] - 2 * spread[i, j]))
+    }
+  }
+  for (size in seq_along(sizes)) {
+    at <- length(items) - 1 + size
+    put(paste0("ranking/ties/", sizes[size], "/log_delta"), estimate[[at]])
+    put(paste0("ranking/ties/", sizes[size], "/log_delta_se"), sqrt(covariance[at, at]))
+  }
+}
+
 #' ## Pairs
 #'
 #' Abilities by maximum likelihood, as a log-linear model of the counts: the weight of the

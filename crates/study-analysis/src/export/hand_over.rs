@@ -322,6 +322,7 @@ fn settings(
             Task::Discrimination { .. } => "tracks",
             Task::Search(_) => "search",
             Task::Similarity(_) => "similarity",
+            Task::Ranking(_) => "ranking",
         };
         put(&format!("{kind} {}", part.id), question);
         for session in sessions_of(protocol, part).into_iter().flatten() {
@@ -360,7 +361,11 @@ fn settings(
                     put(&format!("label {} {model}", part.id), label);
                 }
             }
-            Task::Rating(_) | Task::Mushra(_) | Task::Search(_) | Task::Similarity(_) => {}
+            Task::Rating(_)
+            | Task::Mushra(_)
+            | Task::Search(_)
+            | Task::Similarity(_)
+            | Task::Ranking(_) => {}
         }
     }
     for (path, sum) in sums {

@@ -8,7 +8,9 @@ use study_base::text::{ModelId, PartId, ParticipantId, QuestionId};
 use study_plan::protocol::pairs::Pairs;
 use study_plan::protocol::parts::{Part, Task, TrackRules};
 use study_plan::protocol::presentations::Presentations;
-use study_plan::protocol::{Answer, GroupRules, ModelEntry, Protocol, Role, Scale, Similarity};
+use study_plan::protocol::{
+    Answer, GroupRules, ModelEntry, Protocol, Ranking, Role, Scale, Similarity,
+};
 use study_session::outcome::ratings::{Ratings, Realization, Row, Subject};
 use study_session::outcome::{IntervalRow, RatingRow};
 
@@ -188,6 +190,7 @@ impl Made<'_> {
             // It has no test.
             Task::Search(_) => {}
             Task::Similarity(own) => self.similarity(part, own, who),
+            Task::Ranking(own) => self.ranking(part, own, who),
         }
     }
 
@@ -272,34 +275,57 @@ impl Made<'_> {
                 let Some(question) = part.asks.first() else {
                     return;
                 };
-                let row = self.row(part, who, answer, question);
-                let trial = row.trial;
+                let trial = self.row(part, who, answer, question).trial;
                 for (interval, model) in (1..).zip([first, 1 - first]) {
-                    self.intervals.push(IntervalRow {
-                        study: String::new(),
-                        participant: who.participant.clone(),
-                        session: who.session,
-                        part: Some(part.id.clone()),
-                        trial,
-                        attempt: 1,
-                        interval,
-                        model: Some(pair[model].clone()),
-                        level: None,
-                        level_proposed: None,
-                        track: None,
-                        track_trial: None,
-                        target: None,
-                        catch: None,
-                        gap_s: None,
-                        replays: 0,
-                        exploration_s: None,
-                        strokes: None,
-                        fidelity: None,
-                        host_late_ms: None,
-                    });
+                    self.felt(part, who, (trial, interval), &pair[model]);
                 }
             }
         }
+    }
+
+    /// Ranks in an order that is drawn, without ties.
+    fn ranking(&mut self, part: &Part, own: &Ranking, who: Who<'_>) {
+        for _ in 0..own.repetitions {
+            let mut ranks: Vec<usize> = (1..=own.models.len()).collect();
+            self.draws.shuffle(&mut ranks);
+            let mut answers = (own.asked(&part.asks).iter())
+                .zip(ranks)
+                .map(|(question, rank)| (question.clone(), Answer::Rating(rank as i64)));
+            let Some((question, answer)) = answers.next() else {
+                return;
+            };
+            let row = self.row(part, who, answer, &question);
+            row.answers.extend(answers);
+            let trial = row.trial;
+            for (interval, model) in (1..).zip(&own.models) {
+                self.felt(part, who, (trial, interval), model);
+            }
+        }
+    }
+
+    fn felt(&mut self, part: &Part, who: Who<'_>, (trial, interval): (u32, u32), model: &ModelId) {
+        self.intervals.push(IntervalRow {
+            study: String::new(),
+            participant: who.participant.clone(),
+            session: who.session,
+            part: Some(part.id.clone()),
+            trial,
+            attempt: 1,
+            interval,
+            model: Some(model.clone()),
+            level: None,
+            level_proposed: None,
+            track: None,
+            track_trial: None,
+            target: None,
+            catch: None,
+            gap_s: None,
+            replays: 0,
+            exploration_s: None,
+            strokes: None,
+            fidelity: None,
+            host_late_ms: None,
+        });
     }
 
     /// The share of correct answers rises along the ladder.

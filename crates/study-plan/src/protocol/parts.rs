@@ -7,7 +7,9 @@
 
 use super::keys::words;
 use super::presentations::{Magnitude, Mushra, Presentations};
-use super::{Answer, Identification, Pairs, Protocol, Relative, SearchTask, Seat, Similarity};
+use super::{
+    Answer, Identification, Pairs, Protocol, Ranking, Relative, SearchTask, Seat, Similarity,
+};
 use crate::procedure::{Ladder, ProcedureError, Rule, Track};
 use serde::{Deserialize, Serialize};
 use study_base::rng::Stream;
@@ -54,6 +56,8 @@ pub enum Task {
     Search(SearchTask),
     /// Two realizations are felt, and how different they are is rated.
     Similarity(Similarity),
+    /// Several realizations are felt, and each is given a rank.
+    Ranking(Ranking),
 }
 
 impl Task {
@@ -67,7 +71,8 @@ impl Task {
             Self::Pairs(_)
             | Self::Discrimination { .. }
             | Self::Search(_)
-            | Self::Similarity(_) => None,
+            | Self::Similarity(_)
+            | Self::Ranking(_) => None,
         }
     }
 
@@ -81,7 +86,8 @@ impl Task {
             | Self::Pairs(_)
             | Self::Discrimination { .. }
             | Self::Search(_)
-            | Self::Similarity(_) => None,
+            | Self::Similarity(_)
+            | Self::Ranking(_) => None,
         }
     }
 
@@ -470,11 +476,12 @@ impl Protocol {
         Track::new(&track.rule, &self.ladder(track), &mut stream)
     }
 
-    /// Whether the answers to a question are numbers but no ratings of a realization: estimates of magnitude, or how different two are.
+    /// Whether the answers to a question are numbers but no ratings of a realization: estimates of magnitude, how different two are, or ranks.
     pub fn has_other_numbers(&self, question: &QuestionId) -> bool {
-        self.parts.iter().any(|part| {
-            matches!(part.task, Task::Magnitude(_) | Task::Similarity(_))
-                && part.asks.first() == Some(question)
+        self.parts.iter().any(|part| match part.task {
+            Task::Magnitude(_) | Task::Similarity(_) => part.asks.first() == Some(question),
+            Task::Ranking(_) => part.asks.contains(question),
+            _ => false,
         })
     }
 

@@ -104,6 +104,7 @@ phrases! {
     First "first" "first";
     Second "second" "second";
     Third "third" "third";
+    NumberedInterval "numbered-interval" "number {n}";
     ReferenceInterval "reference-interval" "reference";
     ToRate "to-rate" "rate this one";
     Tie "tie" "no difference";
@@ -121,6 +122,7 @@ phrases! {
     TypeAnswerFirst "type-answer-first" "Type an answer first.";
     NumberLike "number-like" "Type a number, such as 12.5.";
     OffScale "off-scale" "The scale goes from {from} to {to}.";
+    RankTaken "rank-taken" "{rank} is given already. Choose another rank, or go back and change the earlier one.";
     Range "range" "Type a number from {from} to {to}.";
     RangeFrom "range-from" "Type a number from {from} up.";
     RangeTo "range-to" "Type a number up to {to}.";

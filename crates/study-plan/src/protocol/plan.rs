@@ -68,6 +68,11 @@ pub enum Stimuli {
         /// Whether the point with the higher number comes first.
         swapped: bool,
     },
+    /// Several realizations that are ranked, in this order.
+    Set {
+        /// The realizations.
+        set: Vec<ModelId>,
+    },
 }
 
 impl Stimuli {
@@ -86,7 +91,10 @@ impl Trial {
     pub fn model(&self) -> Option<&ModelId> {
         match &self.stimuli {
             Stimuli::One { model } | Stimuli::Rated { model, .. } => Some(model),
-            Stimuli::Pair { .. } | Stimuli::Track { .. } | Stimuli::Search { .. } => None,
+            Stimuli::Pair { .. }
+            | Stimuli::Track { .. }
+            | Stimuli::Search { .. }
+            | Stimuli::Set { .. } => None,
         }
     }
 
@@ -97,7 +105,8 @@ impl Trial {
             Stimuli::One { .. }
             | Stimuli::Rated { .. }
             | Stimuli::Pair { .. }
-            | Stimuli::Search { .. } => None,
+            | Stimuli::Search { .. }
+            | Stimuli::Set { .. } => None,
         }
     }
 

@@ -33,6 +33,7 @@ fn view(screen: Screen) -> View {
         can_go_back: false,
         force: true,
         has_reference: false,
+        numbered: false,
         remarks: Vec::new(),
         can_advance: true,
         words: Arc::new(Words::default()),

@@ -41,6 +41,7 @@ impl Session {
             remarks: self.remarks.iter().rev().take(3).cloned().collect(),
             force: self.presents_force(),
             has_reference: self.has_reference(),
+            numbered: self.is_numbered(),
             can_advance: can_advance(&screen),
             words: self.words.clone(),
             screen,
@@ -182,6 +183,12 @@ impl Session {
     fn has_reference(&self) -> bool {
         let open = self.history.open();
         open.is_some_and(|open| matches!(open.trial.stimuli, Stimuli::Rated { .. }))
+    }
+
+    /// Whether the intervals of the trial under way have numbers for names, by which they are asked about.
+    fn is_numbered(&self) -> bool {
+        let open = self.history.open();
+        open.is_some_and(|open| matches!(open.trial.stimuli, Stimuli::Set { .. }))
     }
 
     /// The interval under way and their number, if there are several.

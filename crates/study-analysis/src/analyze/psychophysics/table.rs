@@ -2,6 +2,7 @@
 
 use super::identification::{LabelRow, identification, labels_of};
 use super::preferences::{Choice, Preference, in_both_orders, preferences};
+use super::ranking::{RankingRow, ranking};
 use super::results::PartResults;
 use super::scales::{MagnitudeRow, MushraRoles, MushraRow, magnitude, mushra};
 use super::similarity::{Properties, SimilarityRow, similarity};
@@ -27,16 +28,19 @@ pub enum TableKind {
     Identification,
     /// Similarity: `participant,first,second,rating`.
     Similarity,
+    /// Rankings: `participant[,ranking],realization,rank`.
+    Ranking,
 }
 
 impl TableKind {
     /// The kinds that are no trials, with their names.
-    const OTHERS: [(Self, &str); 5] = [
+    const OTHERS: [(Self, &str); 6] = [
         (Self::Pairs, "pairs"),
         (Self::Magnitude, "magnitude"),
         (Self::Mushra, "mushra"),
         (Self::Identification, "identification"),
         (Self::Similarity, "similarity"),
+        (Self::Ranking, "ranking"),
     ];
 
     /// The kind of a name.
@@ -145,6 +149,10 @@ pub fn analyze_table(
             let (ratings, streams) = (rows.differences()?, (settings.seed, "table"));
             results.over.similarity = Some(similarity(&ratings, &Properties::new(), streams));
         }
+        TableKind::Ranking => {
+            let streams = (settings.seed, "table");
+            results.over.ranking = Some(ranking(&rows.ranks()?, streams));
+        }
     }
     Ok((results, rows.records.len()))
 }
@@ -162,6 +170,7 @@ pub fn read_table(name: &str, input: impl BufRead, kind: TableKind) -> Result<()
         TableKind::Mushra => rows.ratings().map(|_| ()),
         TableKind::Identification => rows.labels().map(|_| ()),
         TableKind::Similarity => rows.differences().map(|_| ()),
+        TableKind::Ranking => rows.ranks().map(|_| ()),
     }
 }
 
@@ -248,6 +257,7 @@ impl<'a> Rows<'a> {
                 ("identification", "participant[,realization],target,answer")
             }
             TableKind::Similarity => ("similarity", "participant,first,second,rating"),
+            TableKind::Ranking => ("rankings", "participant[,ranking],realization,rank"),
         };
         found.ok_or_else(|| TableError::Column {
             name: self.name.to_owned(),
@@ -473,6 +483,22 @@ impl<'a> Rows<'a> {
                 first: row.1[first].to_owned(),
                 second: row.1[second].to_owned(),
                 rating: self.number(row, ("rating", rating), (0.0, f64::MAX))?,
+            })
+        };
+        self.records.iter().map(one).collect()
+    }
+
+    /// Ranks; without a column `ranking` each participant has one.
+    fn ranks(&self) -> Result<Vec<RankingRow>, TableError> {
+        let participant = self.required("participant")?;
+        let (realization, rank) = (self.required("realization")?, self.required("rank")?);
+        let ranking = self.column("ranking");
+        let one = |row: &(u64, csv::StringRecord)| {
+            Ok(RankingRow {
+                participant: row.1[participant].to_owned(),
+                ranking: ranking.map_or("", |at| &row.1[at]).to_owned(),
+                realization: row.1[realization].to_owned(),
+                rank: self.number(row, ("rank", rank), (f64::MIN, f64::MAX))?,
             })
         };
         self.records.iter().map(one).collect()

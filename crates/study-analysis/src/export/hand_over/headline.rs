@@ -2,7 +2,7 @@
 
 use crate::analyze::Analysis;
 use crate::analyze::psychophysics::PartAnalysis;
-use crate::analyze::psychophysics::results::{Identified, Preferences, Similarities};
+use crate::analyze::psychophysics::results::{Identified, Preferences, Rankings, Similarities};
 use crate::analyze::results::{Correlation, Field, Key, Number as _};
 use std::collections::BTreeMap;
 use study_plan::protocol::OutcomeFamily;
@@ -112,6 +112,9 @@ pub(super) fn of_part(part: &PartAnalysis) -> Vec<Number> {
     }
     if let Some(found) = &over.similarity {
         numbers.of_similarity(found);
+    }
+    if let Some(found) = &over.ranking {
+        numbers.of_rankings(found);
     }
     for (name, group) in &over.sdt_group {
         let id = format!("sdt_group/{}/above_chance", name.part());
@@ -237,6 +240,24 @@ impl Numbers {
         );
         let pair = ["n", "mean", "sd", "rescaled"];
         self.each(&format!("{id}/pair"), &found.pairs, &pair, CLOSED);
+    }
+
+    fn of_rankings(&mut self, found: &Rankings) {
+        let id = "ranking";
+        self.add(id, found, &["n", "n_participants"], CLOSED);
+        let agreed = ["n", "w", "chi2", "df", "p_chi2"];
+        let agreement = format!("{id}/agreement");
+        self.add(&agreement, &found.agreement, &agreed, CLOSED);
+        let of_item = format!("{id}/realization");
+        let described = ["n", "mean_rank", "sd", "first"];
+        self.each(&of_item, &found.items, &described, CLOSED);
+        let fitted = ["worth", "log_worth", "log_worth_se"];
+        self.each(&of_item, &found.items, &fitted, FITTED);
+        let tie = ["log_delta", "log_delta_se"];
+        self.each(&format!("{id}/ties"), &found.ties, &tie, FITTED);
+        let of_pair = format!("{id}/pair");
+        self.each(&of_pair, &found.pairs, &["n", "above", "tied"], CLOSED);
+        self.each(&of_pair, &found.pairs, &["difference", "se"], FITTED);
     }
 
     fn of_preferences(&mut self, pairs: &Preferences) {

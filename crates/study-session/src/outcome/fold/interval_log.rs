@@ -37,7 +37,8 @@ fn row(
         Stimuli::One { .. }
         | Stimuli::Rated { .. }
         | Stimuli::Pair { .. }
-        | Stimuli::Search { .. } => None,
+        | Stimuli::Search { .. }
+        | Stimuli::Set { .. } => None,
     };
     let playback = presentation.ended.map(|(_, ended)| ended.playback);
     IntervalRow {

@@ -194,7 +194,10 @@ fn correct(
     match &trial.stimuli {
         Stimuli::Track { intervals, .. } => track?.is_correct(intervals, answer),
         Stimuli::One { model } => part?.task.identification()?.is_correct(model, answer),
-        Stimuli::Rated { .. } | Stimuli::Pair { .. } | Stimuli::Search { .. } => None,
+        Stimuli::Rated { .. }
+        | Stimuli::Pair { .. }
+        | Stimuli::Search { .. }
+        | Stimuli::Set { .. } => None,
     }
 }
 
