@@ -102,7 +102,8 @@ pub struct Weighed {
     pub shares: Option<Vec<f64>>,
     /// The interval of each share; all of them hold together with 95 %.
     pub shares_ci95: Vec<(f64, f64)>,
-    /// 95 % interval of the sum of the weights if they may be below 0: nothing is known to be weighed unless it is above 0.
+    /// 95 % interval of the sum of equal weights that may be below 0: the sum of the errors is known to be weighed if the
+    /// interval is above 0.
     pub sensitivity_ci95: (f64, f64),
     /// The penalty that was chosen.
     pub penalty: Penalty,
@@ -222,7 +223,7 @@ pub fn weigh(
         let own = shares.as_ref().map(|shares| shares[i]);
         (low.min(own.unwrap_or(low)), high.max(own.unwrap_or(high)))
     };
-    let (low, high) = free.sum();
+    let (low, high) = free.equal_sum();
     Ok(Weighed {
         weights: weights.iter().map(|w| w / data.scale).collect(),
         shares_ci95: (0..weights.len()).map(ci95).collect(),
@@ -359,6 +360,8 @@ impl Data {
 struct Free {
     weights: Vec<f64>,
     covariance: SymmetricMatrix,
+    /// The sum of equal weights, and its variance.
+    equal: (f64, f64),
     /// Units less 1.
     df: f64,
 }
@@ -366,11 +369,16 @@ struct Free {
 impl Free {
     /// `None` if numbers overflow.
     fn of(data: &Data, random: &mut impl RandomSource) -> Option<Self> {
-        let fit = |counts: &[f64]| {
-            let penalties = [LEAST, SIZE];
-            maximum(&data.rows, counts, penalties, f64::NEG_INFINITY)
+        let k = data.rows.first()?.len();
+        let sum = |row: &Vec<f64>| vec![row.iter().sum::<f64>()];
+        let sums: Vec<Vec<f64>> = data.rows.iter().map(sum).collect();
+        let fit = |counts: &[f64]| -> Option<(Vec<f64>, f64)> {
+            let least = f64::NEG_INFINITY;
+            let weights = maximum(&data.rows, counts, [LEAST, SIZE], least)?;
+            let equal = maximum(&sums, counts, [0.0, SIZE * k as f64], least)?;
+            Some((weights, k as f64 * equal.first()?))
         };
-        let weights = fit(&data.all())?;
+        let (weights, equal) = fit(&data.all())?;
         let n = data.units.len();
         let mut found = Vec::new();
         for _ in 0..RESAMPLES {
@@ -383,17 +391,22 @@ impl Free {
         }
         let df = n as f64 - 1.0;
         let drawn = found.len() as f64;
-        let mean = |i: usize| found.iter().map(|w| w[i]).sum::<f64>() / drawn;
-        let means: Vec<f64> = (0..weights.len()).map(mean).collect();
-        let mut covariance = SymmetricMatrix::zero(weights.len());
-        for own in &found {
+        // Resamples of n units vary less by (n − 1)/n.
+        let each = (df + 1.0) / (df * (drawn - 1.0));
+        let mean = |i: usize| found.iter().map(|(w, _)| w[i]).sum::<f64>() / drawn;
+        let means: Vec<f64> = (0..k).map(mean).collect();
+        let equal_mean = found.iter().map(|(_, sum)| sum).sum::<f64>() / drawn;
+        let mut covariance = SymmetricMatrix::zero(k);
+        let mut variance = 0.0;
+        for (own, sum) in &found {
             let apart: Vec<f64> = own.iter().zip(&means).map(|(w, mean)| w - mean).collect();
-            // Resamples of n units vary less by (n − 1)/n.
-            covariance.add_outer((df + 1.0) / (df * (drawn - 1.0)), &apart);
+            covariance.add_outer(each, &apart);
+            variance += each * (sum - equal_mean).powi(2);
         }
         Some(Self {
             weights,
             covariance,
+            equal: (equal, variance),
             df,
         })
     }
@@ -405,16 +418,9 @@ impl Free {
             .sum()
     }
 
-    /// The sum of the weights and its variance.
-    fn total(&self) -> (f64, f64) {
-        let sum = self.weights.iter().sum();
-        let variance = (0..self.weights.len()).map(|i| self.with_sum(i)).sum();
-        (sum, variance)
-    }
-
-    /// 95 % interval of the sum.
-    fn sum(&self) -> (f64, f64) {
-        let (sum, variance) = self.total();
+    /// 95 % interval of the sum of equal weights.
+    fn equal_sum(&self) -> (f64, f64) {
+        let (sum, variance) = self.equal;
         let t = t_quantile(0.975, self.df).unwrap_or(f64::INFINITY);
         let half = t * variance.max(0.0).sqrt();
         (sum - half, sum + half)
@@ -422,7 +428,8 @@ impl Free {
 
     /// The interval of a share, within 0 and 1.
     fn share(&self, i: usize) -> (f64, f64) {
-        let (sum, of_sum) = self.total();
+        let sum: f64 = self.weights.iter().sum();
+        let of_sum: f64 = (0..self.weights.len()).map(|j| self.with_sum(j)).sum();
         let (own, of_own, both) = (self.weights[i], self.covariance.get(i, i), self.with_sum(i));
         let level = 1.0 - 0.025 / self.weights.len() as f64;
         let t = t_quantile(level, self.df).unwrap_or(f64::INFINITY);

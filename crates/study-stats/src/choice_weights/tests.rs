@@ -91,6 +91,7 @@ fn an_interval_ends_where_a_share_is_told_from_the_estimate() {
     let free = Free {
         weights: vec![1.0, 1.5],
         covariance,
+        equal: (2.0, 0.25),
         df: 9.0,
     };
     let t = t_quantile(0.9875, 9.0).unwrap();
@@ -107,7 +108,8 @@ fn an_interval_ends_where_a_share_is_told_from_the_estimate() {
         ..free
     };
     assert_eq!(weak.share(0), (0.0, 1.0));
-    assert!(weak.sum().0 < 0.0);
+    let half = 0.5 * t_quantile(0.975, 9.0).unwrap();
+    assert_eq!(weak.equal_sum(), (2.0 - half, 2.0 + half));
 }
 
 /// If every choice is predicted, weights stay finite; with one participant choices are the units.
