@@ -166,11 +166,16 @@ impl<'r> Reference<'r> {
     /// The perceptual VAF of a realization. `None` if its prediction is not finite, or if the recorded force has nothing of
     /// what is weighed.
     pub fn vaf(&self, realization: &Realization, weights: &Weights) -> Option<f64> {
-        let all = weights.all();
-        let weighed = |parts: Parts| -> f64 { parts.iter().zip(all).map(|(p, w)| p * w).sum() };
-        let force = weighed(self.force);
-        let errors = weighed(self.errors(realization)?);
+        let [errors, force] = self.weighed(&vaf::errors(realization, self.recording), weights)?;
         (force > 0.0).then(|| 1.0 - errors / force)
+    }
+
+    /// The weighted sums of squares, N², of the errors of all samples and of the recorded force, of which the quotient is what
+    /// perceptual VAF misses. `None` if an error is not finite.
+    pub fn weighed(&self, errors: &[f64], weights: &Weights) -> Option<[f64; 2]> {
+        let all = weights.all();
+        let sum = |parts: Parts| -> f64 { parts.iter().zip(all).map(|(p, w)| p * w).sum() };
+        Some([self.parts(errors)?, self.force].map(|parts| self.squares * sum(parts)))
     }
 
     /// The mean of a signal in each bin that has samples.
