@@ -60,7 +60,7 @@ fn methods_are_compared_by_what_is_weighed() {
     let dir = tempfile::tempdir().unwrap();
     files(dir.path());
     let compared = |more: &[&str]| -> String {
-        let (code, out, err) = study(dir.path(), &[&["t.csv"], more].concat());
+        let (code, out, err) = study(dir.path(), &[&["t.csv"][..], more].concat());
         assert_eq!(code, 0, "{out}{err}");
         out
     };

@@ -8,22 +8,27 @@
 //! The weights have the largest logarithm of the likelihood less ½ λ Σ (w_k − w̄)² less ½ ε Σ w_k², after all errors were
 //! divided by the root of the mean over the choices of Σ_k (e_jk − e_ik)². With λ = ∞ all weights are equal, so that the
 //! sum of the errors is all that counts ([`Penalty::Equal`]); ε = 0.001 keeps weights finite if every choice is
-//! predicted. The function is concave and has one maximum, which is found by Newton's method with bounds.
+//! predicted. Where few components count, those with small weights are left out by α Σ w_k/w⁰_k in place of the first
+//! penalty, with the weights w⁰ of λ = 0.01 (Zou 2006): w_k is 0 if w⁰_k is less than about √α standard errors, and hardly
+//! smaller than w⁰_k if it is many. The functions are concave and have one maximum, which is found by Newton's method with
+//! bounds.
 //!
-//! λ is chosen by cross-validation over participants, and what is predicted of choices that were left out is compared
+//! The penalty is chosen by cross-validation over participants, and what is predicted of choices that were left out is compared
 //! with the prediction by equal weights (`left_out`). The interval of a share is Fieller's (1954): every s for which
 //! w_k − s Σ w is not told from 0, by t with Bonferroni's correction for the number of components. It is from 0 to 1 if
 //! the sum of the weights is not told from 0. Its covariance is that of the weights, with the least λ and without the bound
 //! at 0, over a bootstrap of participants: it says what the choices alone tell.
 
+mod free;
 mod left_out;
+mod maximum;
 
 pub use left_out::LeftOut;
 
-use super::distribution::t_quantile;
 use super::matrix::{Cholesky, SymmetricMatrix};
-use super::preference_gp::probit::of_answer;
 use super::random::RandomSource;
+use free::Free;
+use maximum::{Terms, maximum};
 use std::collections::BTreeMap;
 use thiserror::Error;
 
@@ -40,15 +45,10 @@ pub const RESAMPLES: u32 = 1000;
 const LAMBDAS: [f64; 6] = [1e3, 1e2, 1e1, 1.0, 1e-1, LEAST];
 /// The least λ.
 const LEAST: f64 = 1e-2;
+/// α from which one is chosen besides, the strongest first.
+const ALPHAS: [f64; 3] = [8.0, 4.0, 2.0];
 /// ε, the penalty on the size of weights.
 const SIZE: f64 = 1e-3;
-
-const MOST_STEPS: usize = 100;
-const MOST_SWEEPS: usize = 10_000;
-/// A search ends when no weight changes by more than this, or this part of the largest.
-const NEAR: f64 = 1e-9;
-/// Rounding errors of the objective, as a part of it.
-const SLACK: f64 = 1e-12;
 
 /// An answer: of two stimuli, one was preferred.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,13 +61,15 @@ pub struct Chosen {
     pub participant: usize,
 }
 
-/// How much weights that differ are penalized.
+/// How weights are penalized.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Penalty {
     /// λ = ∞: all weights are equal.
     Equal,
     /// This λ, at least 0.
     Unequal(f64),
+    /// This α, at least 0.
+    Sparse(f64),
 }
 
 /// Why nothing is known of weights.
@@ -340,202 +342,39 @@ impl Data {
         self.counts((0..self.units.len()).map(|unit| (unit, 1.0)))
     }
 
+    /// The sum of each row.
+    fn sums(&self) -> Vec<Vec<f64>> {
+        let sum = |row: &Vec<f64>| vec![row.iter().sum::<f64>()];
+        self.rows.iter().map(sum).collect()
+    }
+
     /// The weights of scaled errors; `None` if numbers overflow.
     fn fit(&self, counts: &[f64], penalty: Penalty) -> Option<Vec<f64>> {
         let k = self.rows.first()?.len();
         match penalty {
-            Penalty::Unequal(lambda) => maximum(&self.rows, counts, [lambda, SIZE], 0.0),
+            Penalty::Unequal(lambda) => maximum(&self.rows, counts, &Terms::of(k, lambda), 0.0),
+            Penalty::Sparse(alpha) => {
+                let first = self.fit(counts, Penalty::Unequal(LEAST))?;
+                let kept: Vec<usize> = (0..k).filter(|i| first[*i] > 0.0).collect();
+                let mut weights = vec![0.0; k];
+                if kept.is_empty() {
+                    return Some(weights);
+                }
+                let of_kept = |row: &Vec<f64>| kept.iter().map(|i| row[*i]).collect();
+                let rows: Vec<Vec<f64>> = self.rows.iter().map(of_kept).collect();
+                let slopes = kept.iter().map(|i| alpha / first[*i]).collect();
+                let found = maximum(&rows, counts, &Terms::with(slopes), 0.0)?;
+                for (i, weight) in kept.into_iter().zip(found) {
+                    weights[i] = weight;
+                }
+                Some(weights)
+            }
             Penalty::Equal => {
-                let sum = |row: &Vec<f64>| vec![row.iter().sum::<f64>()];
-                let sums: Vec<Vec<f64>> = self.rows.iter().map(sum).collect();
-                let found = maximum(&sums, counts, [0.0, SIZE * k as f64], 0.0)?;
+                let found = maximum(&self.sums(), counts, &Terms::of_equal(k), 0.0)?;
                 Some(vec![*found.first()?; k])
             }
         }
     }
-}
-
-/// Weights of scaled errors that may be below 0, with their covariance over resamples.
-#[derive(Debug)]
-struct Free {
-    weights: Vec<f64>,
-    covariance: SymmetricMatrix,
-    /// The sum of equal weights, and its variance.
-    equal: (f64, f64),
-    /// Units less 1.
-    df: f64,
-}
-
-impl Free {
-    /// `None` if numbers overflow.
-    fn of(data: &Data, random: &mut impl RandomSource) -> Option<Self> {
-        let k = data.rows.first()?.len();
-        let sum = |row: &Vec<f64>| vec![row.iter().sum::<f64>()];
-        let sums: Vec<Vec<f64>> = data.rows.iter().map(sum).collect();
-        let fit = |counts: &[f64]| -> Option<(Vec<f64>, f64)> {
-            let least = f64::NEG_INFINITY;
-            let weights = maximum(&data.rows, counts, [LEAST, SIZE], least)?;
-            let equal = maximum(&sums, counts, [0.0, SIZE * k as f64], least)?;
-            Some((weights, k as f64 * equal.first()?))
-        };
-        let (weights, equal) = fit(&data.all())?;
-        let n = data.units.len();
-        let mut found = Vec::new();
-        for _ in 0..RESAMPLES {
-            let mut times = vec![0.0; n];
-            for _ in 0..n {
-                // Below the number of units, which is a usize.
-                times[random.below(n as u64) as usize] += 1.0;
-            }
-            found.push(fit(&data.counts(times.into_iter().enumerate()))?);
-        }
-        let df = n as f64 - 1.0;
-        let drawn = found.len() as f64;
-        // Resamples of n units vary less by (n − 1)/n.
-        let each = (df + 1.0) / (df * (drawn - 1.0));
-        let mean = |i: usize| found.iter().map(|(w, _)| w[i]).sum::<f64>() / drawn;
-        let means: Vec<f64> = (0..k).map(mean).collect();
-        let equal_mean = found.iter().map(|(_, sum)| sum).sum::<f64>() / drawn;
-        let mut covariance = SymmetricMatrix::zero(k);
-        let mut variance = 0.0;
-        for (own, sum) in &found {
-            let apart: Vec<f64> = own.iter().zip(&means).map(|(w, mean)| w - mean).collect();
-            covariance.add_outer(each, &apart);
-            variance += each * (sum - equal_mean).powi(2);
-        }
-        Some(Self {
-            weights,
-            covariance,
-            equal: (equal, variance),
-            df,
-        })
-    }
-
-    /// The covariance of a weight with the sum of all.
-    fn with_sum(&self, i: usize) -> f64 {
-        (0..self.weights.len())
-            .map(|j| self.covariance.get(i, j))
-            .sum()
-    }
-
-    /// 95 % interval of the sum of equal weights.
-    fn equal_sum(&self) -> (f64, f64) {
-        let (sum, variance) = self.equal;
-        let t = t_quantile(0.975, self.df).unwrap_or(f64::INFINITY);
-        let half = t * variance.max(0.0).sqrt();
-        (sum - half, sum + half)
-    }
-
-    /// The interval of a share, within 0 and 1.
-    fn share(&self, i: usize) -> (f64, f64) {
-        let sum: f64 = self.weights.iter().sum();
-        let of_sum: f64 = (0..self.weights.len()).map(|j| self.with_sum(j)).sum();
-        let (own, of_own, both) = (self.weights[i], self.covariance.get(i, i), self.with_sum(i));
-        let level = 1.0 - 0.025 / self.weights.len() as f64;
-        let t = t_quantile(level, self.df).unwrap_or(f64::INFINITY);
-        let square = t * t;
-        // a s² − 2 b s + c ≤ 0
-        let a = sum * sum - square * of_sum;
-        let b = own * sum - square * both;
-        let c = own * own - square * of_own;
-        if !(a > 0.0 && sum > 0.0) {
-            return (0.0, 1.0);
-        }
-        let root = (b * b - a * c).max(0.0).sqrt();
-        let end = |sign: f64| ((b + sign * root) / a).clamp(0.0, 1.0);
-        (end(-1.0), end(1.0))
-    }
-}
-
-/// Minus the logarithm of the likelihood, with the penalty, and its derivatives.
-struct Objective {
-    value: f64,
-    gradient: Vec<f64>,
-    curvature: SymmetricMatrix,
-}
-
-impl Objective {
-    fn at(w: &[f64], rows: &[Vec<f64>], counts: &[f64], [lambda, size]: [f64; 2]) -> Self {
-        let k = w.len();
-        let mean = w.iter().sum::<f64>() / k as f64;
-        let apart = |w: &f64| lambda * (w - mean).powi(2) + size * w * w;
-        let mut found = Self {
-            value: 0.5 * w.iter().map(apart).sum::<f64>(),
-            gradient: w.iter().map(|w| lambda * (w - mean) + size * w).collect(),
-            curvature: SymmetricMatrix::from_fn(k, |i, j| {
-                let same = f64::from(u8::from(i == j));
-                lambda * (same - 1.0 / k as f64) + size * same
-            }),
-        };
-        for (row, n) in rows.iter().zip(counts).filter(|(_, n)| **n > 0.0) {
-            let (log, slope, curvature) = of_answer(advantage(row, w));
-            found.value -= n * log;
-            for (g, d) in found.gradient.iter_mut().zip(row) {
-                *g -= n * slope * d;
-            }
-            found.curvature.add_outer(n * curvature, row);
-        }
-        found
-    }
-
-    /// The step to the smallest value of the quadratic around `w` over weights of at least `least`, by coordinate descent.
-    fn step(&self, w: &[f64], least: f64) -> Vec<f64> {
-        let mut step = vec![0.0; w.len()];
-        for _ in 0..MOST_SWEEPS {
-            let (mut change, mut size) = (0.0f64, 0.0f64);
-            for (i, own) in w.iter().enumerate() {
-                let others: f64 = (step.iter().enumerate())
-                    .map(|(j, s)| self.curvature.get(i, j) * s)
-                    .sum();
-                let slope = self.gradient[i] + others;
-                let to = (step[i] - slope / self.curvature.get(i, i)).max(least - own);
-                change = change.max((to - step[i]).abs());
-                size = size.max((own + to).abs());
-                step[i] = to;
-            }
-            if change <= 0.01 * NEAR * size.max(1.0) {
-                break;
-            }
-        }
-        step
-    }
-}
-
-/// u of the preferred stimulus less that of the other one.
-fn advantage(row: &[f64], w: &[f64]) -> f64 {
-    row.iter().zip(w).map(|(d, w)| d * w).sum()
-}
-
-/// The weights of at least `least` with the largest penalized likelihood, by Newton's method with step halving. `None` if
-/// numbers overflow.
-fn maximum(rows: &[Vec<f64>], counts: &[f64], penalties: [f64; 2], least: f64) -> Option<Vec<f64>> {
-    let mut w = vec![0.0; rows.first()?.len()];
-    let mut now = Objective::at(&w, rows, counts, penalties);
-    for _ in 0..MOST_STEPS {
-        let step = now.step(&w, least);
-        let mut share = 1.0;
-        let (to, new) = loop {
-            let moved = w.iter().zip(&step).map(|(w, s)| (w + share * s).max(least));
-            let to: Vec<f64> = moved.collect();
-            let new = Objective::at(&to, rows, counts, penalties);
-            if new.value <= now.value + SLACK * now.value.abs() {
-                break (to, new);
-            }
-            share *= 0.5;
-            // Also if a number is not finite.
-            if share < 1e-9 {
-                return None;
-            }
-        };
-        // Of the full step, which a shortened one does not make small.
-        let change = step.iter().fold(0.0f64, |most, s| most.max(s.abs()));
-        let size = to.iter().fold(1.0f64, |most, w| most.max(w.abs()));
-        (w, now) = (to, new);
-        if change <= NEAR * size {
-            return Some(w);
-        }
-    }
-    None
 }
 
 #[cfg(test)]

@@ -65,10 +65,12 @@ fn cases() -> Vec<Case> {
     cases
 }
 
-fn penalty(lambda: f64) -> Penalty {
-    match lambda.is_infinite() {
-        true => Penalty::Equal,
-        false => Penalty::Unequal(lambda),
+/// λ, infinite or not, or −α.
+fn penalty(number: f64) -> Penalty {
+    match number {
+        f64::INFINITY => Penalty::Equal,
+        ..0.0 => Penalty::Sparse(-number),
+        _ => Penalty::Unequal(number),
     }
 }
 
@@ -83,7 +85,7 @@ fn near(what: &str, found: f64, expected: f64, tolerance: f64) {
 #[test]
 fn weights_are_those_of_a_generic_optimizer() {
     for case in cases() {
-        assert_eq!(case.rows("fit").count(), 7);
+        assert_eq!(case.rows("fit").count(), 10);
         for row in case.rows("fit") {
             let found = fit(&case.errors, &case.chosen, penalty(row[0])).unwrap();
             assert_eq!(found.len(), row.len() - 1);

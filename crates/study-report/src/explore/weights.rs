@@ -83,7 +83,10 @@ fn weights(out: &mut String, own: &Perceived) {
         "All intervals together hold with 95 %. {}",
         match weighed.penalty {
             Penalty::Equal => "Cross-validation chose equal weights.".to_owned(),
-            Penalty::Unequal(lambda) => format!("Cross-validation chose the penalty {lambda}."),
+            Penalty::Unequal(lambda) =>
+                format!("Cross-validation chose the penalty {lambda} of differences."),
+            Penalty::Sparse(alpha) =>
+                format!("Cross-validation chose the penalty {alpha} of small weights."),
         }
     );
     if !own.mixed.is_empty() {
@@ -281,7 +284,7 @@ component             weight  share  interval
 level with detent     30.000   0.75  0.50 to 1.00
 direction             10.000   0.25  0.00 to 0.50
 fast                       -      -  the compared realizations hardly differ in it
-All intervals together hold with 95 %. Cross-validation chose the penalty 0.1.
+All intervals together hold with 95 %. Cross-validation chose the penalty 0.1 of differences.
 Hardly told from the others in these realizations: direction.
 With fewer than 5 participants all of this is of these participants only.
 

@@ -1,7 +1,8 @@
 //! What weights predict of choices that they were not fitted to, by nested cross-validation: the penalty is chosen
 //! without the choices that are predicted.
 
-use super::{Data, LAMBDAS, Penalty, advantage};
+use super::maximum::advantage;
+use super::{ALPHAS, Data, LAMBDAS, Penalty};
 use crate::describe::{mean, sd};
 use crate::distribution::t_quantile;
 use crate::preference_gp::probit::of_answer;
@@ -68,7 +69,7 @@ impl Tally {
 }
 
 /// The penalty that predicts the choices of some of these units best when it is fitted to those of the others; of equals
-/// the strongest one.
+/// the first one.
 pub(super) fn penalty(data: &Data, among: &[usize]) -> Penalty {
     let folds = among.len().min(INNER_FOLDS);
     if folds < 2 {
@@ -89,7 +90,8 @@ pub(super) fn penalty(data: &Data, among: &[usize]) -> Penalty {
         (0..folds).map(of_fold).sum()
     };
     let mut best = (Penalty::Equal, score(Penalty::Equal));
-    for penalty in LAMBDAS.map(Penalty::Unequal) {
+    let sparse = ALPHAS.map(Penalty::Sparse);
+    for penalty in LAMBDAS.map(Penalty::Unequal).into_iter().chain(sparse) {
         let own = score(penalty);
         if own > best.1 + TIE * best.1.abs() {
             best = (penalty, own);

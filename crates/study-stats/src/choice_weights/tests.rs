@@ -1,4 +1,6 @@
+use super::maximum::advantage;
 use super::*;
+use crate::distribution::t_quantile;
 use crate::random::SplitMix64;
 
 /// Components of the error of 25 stimuli.

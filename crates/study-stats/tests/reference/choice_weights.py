@@ -5,9 +5,9 @@
 simulates choices (fixed seeds) and writes choice_weights.txt: for each case the errors of each stimulus, the choices
 (`preferred>other@participant`), and
 
-* `fit`: λ (`inf` for equal weights) and the weights, by `scipy.optimize.minimize(method="L-BFGS-B")` with bounds,
+* `fit`: λ (`inf` for equal weights, −α of the sparse penalty) and the weights, by `scipy.optimize.minimize(method="L-BFGS-B")` with bounds,
   then `scipy.optimize.root` of the gradient over the weights that are not 0;
-* `penalty`: the λ that is chosen by cross-validation;
+* `penalty`: that which is chosen by cross-validation;
 * `left_out` and `other_stimuli`: choices, score, score of equal weights, share predicted, that of equal weights, gain
   and its interval, by nested cross-validation;
 * `own`: of each component, the part of its squared differences that the others do not have, by `numpy.linalg.lstsq`.
@@ -18,7 +18,7 @@ from scipy.optimize import minimize, root
 from scipy.stats import norm, t
 
 SIZE = 1e-3
-LAMBDAS = [1e3, 1e2, 1e1, 1.0, 1e-1, 1e-2]
+LAMBDAS = [1e3, 1e2, 1e1, 1.0, 1e-1, 1e-2, -8.0, -4.0, -2.0]
 
 
 def hazard(z):
@@ -28,14 +28,24 @@ def hazard(z):
 def fit(x, lam):
     """Weights of scaled differences x, one row for each choice."""
     k = x.shape[1]
+    if lam < 0:
+        first = fit(x, 1e-2)
+        kept = first > 0
+        whole = np.zeros(k)
+        if kept.any():
+            whole[kept] = solve(x[:, kept], SIZE * np.eye(kept.sum()), -lam / first[kept])
+        return whole
     if np.isinf(lam):
-        x = x.sum(1, keepdims=True)
-        penalty = np.array([[SIZE * k]])
-    else:
-        penalty = lam * (np.eye(k) - 1.0 / k) + SIZE * np.eye(k)
+        whole = solve(x.sum(1, keepdims=True), np.array([[SIZE * k]]), np.zeros(1))
+        return np.full(k, whole[0])
+    return solve(x, lam * (np.eye(k) - 1.0 / k) + SIZE * np.eye(k), np.zeros(k))
+
+
+def solve(x, penalty, linear):
+    """The maximum with the penalty ½ w P w + linear w over w of at least 0."""
     z = lambda w: x @ w / np.sqrt(2.0)
-    value = lambda w: -norm.logcdf(z(w)).sum() + 0.5 * w @ penalty @ w
-    slope = lambda w: -(x * (hazard(z(w)) / np.sqrt(2.0))[:, None]).sum(0) + penalty @ w
+    value = lambda w: -norm.logcdf(z(w)).sum() + 0.5 * w @ penalty @ w + linear @ w
+    slope = lambda w: -(x * (hazard(z(w)) / np.sqrt(2.0))[:, None]).sum(0) + penalty @ w + linear
     w = minimize(value, np.full(x.shape[1], 0.1), jac=slope, method="L-BFGS-B",
                  bounds=[(0.0, None)] * x.shape[1],
                  options=dict(ftol=1e-15, gtol=1e-10, maxiter=5000)).x
@@ -52,7 +62,7 @@ def fit(x, lam):
         whole[:] = 0.0
         whole[free] = found.x
     assert (slope(whole)[~free] >= -1e-6).all() and (whole >= 0).all()
-    return np.full(k, whole[0]) if np.isinf(lam) else whole
+    return whole
 
 
 def score(x, w):

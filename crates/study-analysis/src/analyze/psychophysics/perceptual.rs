@@ -76,7 +76,7 @@ impl Perceived {
 /// What weights are good for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
-    /// They predict what was left out better than equal weights.
+    /// They predict what was left out better than equal weights, and than guessing.
     Unequal,
     /// They do not, but the sum of the errors is known to be weighed.
     Equal,
@@ -261,7 +261,10 @@ fn perceived(
 }
 
 fn verdict(weighed: &Weighed) -> Verdict {
-    let is_better = |left_out: &LeftOut| left_out.gain_ci95.is_some_and(|(low, _)| low > 0.0);
+    // Better than equal weights, which may be worse than guessing.
+    let is_better = |left_out: &LeftOut| {
+        left_out.score > 0.5f64.ln() && left_out.gain_ci95.is_some_and(|(low, _)| low > 0.0)
+    };
     let of_people = weighed.left_out.as_ref().is_some_and(is_better);
     let of_stimuli = weighed.other_stimuli.as_ref();
     let of_stimuli = of_stimuli.is_none_or(|left_out| left_out.gain > 0.0);
