@@ -224,3 +224,32 @@ fn perceivers_get_the_weights_that_they_have() {
     let (code, _, err) = study(&["explore", "out", "--reference", "short.csv"], at);
     assert!(code == 1 && err.contains("short.csv: line "), "{err}");
 }
+
+/// The levels of an axis `detent` scale the force in detents and elsewhere alike.
+#[test]
+fn a_search_along_detents_has_one_weight_for_both() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let (code, _, said) = study(&["new", "s", "--kind", "search", "--seed", "7"], at);
+    assert_eq!(code, 0, "{said}");
+    let path = at.join("s/protocol.toml");
+    let text = fs::read_to_string(&path).unwrap();
+    let text = text.replace("grid = 9", "grid = 3");
+    let text = text.replace("trials = 40, start = 8", "trials = 8, start = 4");
+    fs::write(&path, text).unwrap();
+    fs::write(at.join("r.csv"), reference()).unwrap();
+    for arguments in [
+        &["rehearse", "s", "--participants", "2", "--out", "out"][..],
+        &["explore", "out", "--reference", "r.csv"],
+    ] {
+        let (code, out, err) = study(arguments, at);
+        assert_eq!(code, 0, "{out}{err}");
+        if arguments[0] == "explore" {
+            assert!(out.starts_with("Part better: the space switch"), "{out}");
+            let (_, weighed) = out.split_once("\n\nPart better: what is weighed ").unwrap();
+            assert!(weighed.contains("16 choices of 2 participants."), "{out}");
+            assert!(weighed.contains("\nlevel with detent "), "{out}");
+            assert!(weighed.contains("of these participants only"), "{out}");
+        }
+    }
+}
