@@ -18,6 +18,7 @@ mod nist;
 mod odd;
 mod outcomes;
 mod parts;
+mod perceptual;
 mod pool;
 mod possible;
 mod posterior;

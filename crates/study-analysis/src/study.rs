@@ -29,6 +29,7 @@ pub use pool::Pool;
 pub use source::{Site, SiteDevice, Source};
 pub use traces::Trace;
 
+use crate::analyze::psychophysics::perceptual::{Errors, Weighing, weighings};
 use crate::analyze::psychophysics::search::{Exploration, explorations};
 use crate::analyze::psychophysics::{PartAnalysis, StudyData, parts, searchers_of};
 use crate::analyze::{
@@ -245,6 +246,12 @@ impl Study {
     /// What each part that searches found; none of a study without one.
     pub fn explore(&self, include: Include) -> Vec<Exploration> {
         self.with_data(|data| explorations(data, include))
+    }
+
+    /// What the choices of each part with pairs or a search tell of what is weighed in errors; none of a study without
+    /// such a part.
+    pub fn weigh(&self, include: Include, errors: &Errors) -> Vec<Weighing> {
+        self.with_data(|data| weighings(data, include, errors))
     }
 
     fn with_data<T>(&self, what: impl FnOnce(&StudyData<'_>) -> T) -> T {

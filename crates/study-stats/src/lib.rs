@@ -25,6 +25,7 @@
 //! | Which is preferred, in pairs? | [`pairs`] |
 //! | Which is preferred, in rankings, and do participants agree? | [`ranking`] |
 //! | Which is preferred in a space of stimuli, and which pair tells most? | [`preference_gp`] |
+//! | Which components of an error decide what is preferred? | [`choice_weights`] |
 //! | How do estimated magnitudes grow? | [`magnitude`] |
 //! | How well are several stimuli identified, and which are confused? | [`identification`] |
 //! | How different do stimuli seem, and along which dimensions? | [`similarity`] |
@@ -57,6 +58,7 @@ pub mod bayes;
 pub mod between;
 pub mod bootstrap;
 pub mod carry_over;
+pub mod choice_weights;
 pub mod clm;
 pub mod clmm;
 pub mod correlation;

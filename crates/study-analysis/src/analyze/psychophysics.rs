@@ -20,6 +20,7 @@ mod of_scales;
 mod of_similarity;
 mod over_participants;
 mod part_data;
+pub mod perceptual;
 mod population;
 mod preferences;
 mod questionnaires;

@@ -407,7 +407,12 @@ fn with_vaf(found: &Preferences, vaf: &BTreeMap<String, f64>, rules: &Rules) -> 
     correlation
 }
 
-fn preference(part: &Part, row: &RatingRow, intervals: &Intervals<'_>) -> Option<Preference> {
+/// The answer to a pair; `None` if there is none.
+pub(super) fn preference(
+    part: &Part,
+    row: &RatingRow,
+    intervals: &Intervals<'_>,
+) -> Option<Preference> {
     let item = |interval: u32| {
         let felt = intervals.counted(row).iter();
         let model = felt
