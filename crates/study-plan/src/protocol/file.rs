@@ -100,7 +100,7 @@ pub const ROOT: &[Key] = keys! {
     "intake": Kind::Variants(&questions::QUESTIONS), "";
     /// Asked of the participant once, at the end.
     "outro": Kind::Variants(&questions::QUESTIONS), "";
-    /// Standard questionnaires, asked of the participant after `[[outro]]`, with their scores in
+    /// Standard questionnaires, asked of the participant after `[[outro]]` or between the trials, with their scores in
     /// the analysis.
     "questionnaires": Kind::Variants(&questionnaires::QUESTIONNAIRES), "";
     /// What is measured in each trial beside the questions, such as times: described, and compared between the
@@ -130,7 +130,7 @@ const FORMATS: &[Word] = &[
 const OF_FORMAT_2: [&str; 5] = ["parts", "families", "tracks", "groups", "sessions"];
 
 /// Keys that need [`FORMAT_3`], without the places in lists.
-pub const OF_FORMAT_3: [&str; 14] = [
+pub const OF_FORMAT_3: [&str; 15] = [
     "confirms",
     "design.order_version",
     "factors",
@@ -145,6 +145,7 @@ pub const OF_FORMAT_3: [&str; 14] = [
     "device.self_weigh",
     "tracks.relative",
     "tracks.condition",
+    "questionnaires.after",
 ];
 
 /// Largest protocol file that is read, bytes.
@@ -357,8 +358,13 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
     let intake = questions::read(&mut root, "intake");
     let mut outro = questions::read(&mut root, "outro");
     let questionnaires = questionnaires::read(&mut root);
-    outro.extend(questionnaires.iter().flat_map(|q| q.questions()));
-    let outcomes = outcomes::read(&mut root);
+    let items = |between: bool| {
+        let own = (questionnaires.iter()).filter(move |q| q.is_between() == between);
+        own.flat_map(|q| q.questions())
+    };
+    outro.extend(items(false));
+    let between: Vec<PartialQuestion> = items(true).collect();
+    let mut outcomes = outcomes::read(&mut root);
     let analysis = root.section("analysis").and_then(analysis::read);
     let power = root.section("power").and_then(power::read);
 
@@ -373,12 +379,16 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
         setup,
         intake,
         outro,
+        between,
         analysis: analysis.as_ref(),
         has_parts,
         has_faulty_parts,
     };
     named.extend(sections.files());
     named.extend(raw.files());
+    if outcomes::primary_of_part(&sections).is_none() {
+        outcomes.extend(questionnaires.iter().filter_map(|q| q.outcome()));
+    }
     if !broken {
         sections.agree(document);
         questionnaires::agree(&questionnaires, &raw.parts, document);
@@ -390,6 +400,9 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
     {
         let known = groups.as_ref().and_then(Option::as_ref);
         groups::agree(known, sessions, (parts, families), document);
+    }
+    if let (Some(parts), false) = (&resolved.parts, broken) {
+        questionnaires::agree_after(&questionnaires, &sections, parts, document);
     }
     if let (Some(factors), false) = (&factors, broken) {
         let known = groups.as_ref().and_then(Option::as_ref);

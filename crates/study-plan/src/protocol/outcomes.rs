@@ -1,6 +1,7 @@
 //! Measured outcomes: `[[outcomes]]`, what a study measures in each trial beside its questions.
 
 use super::keys::words;
+use super::questionnaires::{Inventory, Scored};
 use serde::Serialize;
 use std::borrow::Cow;
 use study_base::text::QuestionId;
@@ -32,6 +33,8 @@ pub enum Measure {
     Telemetry(Telemetry),
     /// The mean of the answers to some questions of the trial.
     Answers(Answers),
+    /// The score of a questionnaire that is asked after each condition.
+    Questionnaire(Scored),
 }
 
 /// The mean of some answers of a trial, such as the items of a questionnaire, or the one answer.
@@ -100,6 +103,7 @@ impl Measure {
             Self::Clock(_) => "clock",
             Self::Telemetry(_) => "telemetry",
             Self::Answers(_) => "answers",
+            Self::Questionnaire(_) => "questionnaire",
         }
     }
 
@@ -112,6 +116,7 @@ impl Measure {
             Self::Telemetry(Telemetry::Strokes) => "1",
             Self::Telemetry(Telemetry::Energy) => "J",
             Self::Answers(answers) => &answers.unit,
+            Self::Questionnaire(_) => "points",
         }
     }
 
@@ -129,6 +134,10 @@ impl Measure {
             Self::Answers(answers) => match answers.questions.as_slice() {
                 [one] => return format!("answer to {one}").into(),
                 all => return format!("mean of {} answers", all.len()).into(),
+            },
+            Self::Questionnaire(own) => match own.kind {
+                Inventory::Sus => "score of the System Usability Scale",
+                Inventory::NasaTlx => "raw score of the Task Load Index",
             },
         })
     }

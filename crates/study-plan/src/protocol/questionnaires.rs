@@ -1,19 +1,47 @@
-//! Standard questionnaires at the end of a session.
+//! Standard questionnaires, at the end of a session or between its trials.
 
 use super::keys::words;
 use super::kinds::{self, QuestionKind};
+use super::parts::Task;
+use super::plan::Trial;
+use super::{Answer, Order, Protocol, Question};
 use serde::Serialize;
 use std::collections::BTreeMap;
-use study_base::text::{PartId, QuestionId};
+use study_base::text::{ModelId, PartId, QuestionId};
+use study_stats::questionnaire::{raw_tlx, sus};
 
-/// One of `[[questionnaires]]`. Its items are questions of the `[[outro]]`.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+/// One of `[[questionnaires]]`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Questionnaire {
     /// Identifier of the questionnaire.
     pub id: PartId,
     /// Which one it is.
     pub kind: Inventory,
+    /// After what it is asked.
+    pub after: Occasion,
+    /// Its items, if it is asked between the trials; at the end they are questions of the `[[outro]]`.
+    pub questions: Vec<Question>,
 }
+
+words! {
+    /// After what a questionnaire is asked.
+    #[derive(PartialOrd, Ord)]
+    Occasion {
+        /// After the last trial of each realization, in the orders with blocks (`blocked`, `williams`, `latin-square`,
+        /// `fixed`) in each block, unless there is only one realization. Each score belongs to its realization, and is a
+        /// measured outcome.
+        Condition = "condition",
+        /// After each block of trials that rate realizations.
+        Block = "block",
+        /// After each of `[[parts]]`.
+        Part = "part",
+        /// Once, after `[[outro]]`.
+        Session = "session",
+    }
+}
+
+/// The trials that a questionnaire is about: their part, block and realization, as far as these matter.
+pub type Stretch<'a> = (Option<&'a PartId>, Option<u32>, Option<&'a ModelId>);
 
 words! {
     /// A standard questionnaire.
@@ -128,6 +156,15 @@ impl Inventory {
         }
     }
 
+    /// The score of answers to all of its items, in their order; `None` if one is missing or not on its
+    /// scale.
+    pub fn score(self, answers: &[f64]) -> Option<f64> {
+        match self {
+            Self::Sus => sus(answers),
+            Self::NasaTlx => raw_tlx(answers),
+        }
+    }
+
     /// The answers to an item, with labels at both ends of its scale.
     pub fn scale(self, low: &str, high: &str) -> QuestionKind {
         let (low, high) = (low.to_owned(), high.to_owned());
@@ -152,6 +189,87 @@ impl Questionnaire {
     pub fn question(&self, item: &Item) -> QuestionId {
         item_id(&self.id, item)
     }
+
+    /// How often it is asked between the trials of a session, unless trials fail; 0 at the end.
+    pub fn times(&self, protocol: &Protocol) -> u32 {
+        let parts: Vec<Option<&PartId>> = match protocol.parts.is_empty() {
+            true => vec![None],
+            false => protocol.parts.iter().map(|part| Some(&part.id)).collect(),
+        };
+        let of_part = |id: &Option<&PartId>| -> u32 {
+            let design = protocol.design_of(*id);
+            let blocks = match design.order {
+                Order::Shuffled | Order::File(_) => 1,
+                _ => design.repetitions,
+            };
+            let rated = protocol.rated(*id);
+            match self.after {
+                Occasion::Condition if rated == 1 => 1,
+                Occasion::Condition => rated.saturating_mul(blocks),
+                Occasion::Block if rated == 0 => 0,
+                Occasion::Block => blocks,
+                Occasion::Part => 1,
+                Occasion::Session => 0,
+            }
+        };
+        parts.iter().map(of_part).sum()
+    }
+
+    /// The trials to which one belongs, if the questionnaire is asked after them.
+    pub fn stretch<'a>(&self, protocol: &Protocol, trial: &'a Trial) -> Option<Stretch<'a>> {
+        if trial.practice {
+            return None;
+        }
+        let part = trial.part.as_ref();
+        match (self.after, protocol.rated(part)) {
+            (Occasion::Session, _) | (Occasion::Condition | Occasion::Block, 0) => None,
+            (Occasion::Condition, 1) => Some((part, None, Some(trial.model()?))),
+            (Occasion::Condition, _) => Some((part, Some(trial.block), Some(trial.model()?))),
+            (Occasion::Block, _) => Some((part, Some(trial.block), None)),
+            (Occasion::Part, _) => Some((part, None, None)),
+        }
+    }
+}
+
+/// The score of a questionnaire that is asked after each condition.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Scored {
+    /// Identifier of the questionnaire.
+    pub id: PartId,
+    /// Which one it is.
+    pub kind: Inventory,
+}
+
+impl Scored {
+    /// The score of these answers; `None` if one is missing.
+    pub fn of(&self, answers: &BTreeMap<QuestionId, Answer>) -> Option<f64> {
+        let answer = |item| {
+            answers
+                .get(&item_id(&self.id, item))
+                .and_then(Answer::number)
+        };
+        let all: Option<Vec<f64>> = self.kind.items().iter().map(answer).collect();
+        self.kind.score(&all?)
+    }
+}
+
+impl Protocol {
+    /// The items of the questionnaires that are asked between the trials.
+    pub fn between(&self) -> impl Iterator<Item = &Question> {
+        self.questionnaires.iter().flat_map(|own| &own.questions)
+    }
+
+    /// Number of realizations that the trials of a part rate, one a trial, or those of a study without
+    /// parts; 0 of a part of another kind.
+    fn rated(&self, part: Option<&PartId>) -> u32 {
+        let task = part.and_then(|id| self.part(id)).map(|part| &part.task);
+        let rated = match task {
+            None => self.scheduled_models().count(),
+            Some(Task::Rating(own)) => own.models.len(),
+            Some(_) => 0,
+        };
+        u32::try_from(rated).unwrap_or(u32::MAX)
+    }
 }
 
 /// The question of an item: the id of the questionnaire and the name of the item.
@@ -168,9 +286,29 @@ mod tests {
     fn every_item_of_every_questionnaire_has_an_id() {
         for kind in [Inventory::Sus, Inventory::NasaTlx] {
             let id = PartId::new("x".repeat(20)).unwrap();
-            let own = Questionnaire { id, kind };
+            let own = Questionnaire {
+                id,
+                kind,
+                after: Occasion::Session,
+                questions: Vec::new(),
+            };
             let ids: Vec<QuestionId> = kind.items().iter().map(|i| own.question(i)).collect();
             assert!((1..ids.len()).all(|i| !ids[..i].contains(&ids[i])));
         }
+    }
+
+    #[test]
+    fn a_score_needs_every_item() {
+        let own = Scored {
+            id: PartId::new("load").unwrap(),
+            kind: Inventory::NasaTlx,
+        };
+        let ratings = [70.0, 20.0, 55.0, 30.0, 65.0, 15.0];
+        let items = own.kind.items().iter().zip(ratings);
+        let given = items.map(|(item, x)| (item_id(&own.id, item), Answer::Number(x)));
+        let mut answers: BTreeMap<QuestionId, Answer> = given.collect();
+        assert_eq!(own.of(&answers), Some(42.5));
+        answers.remove(&QuestionId::new("load_effort").unwrap());
+        assert_eq!(own.of(&answers), None);
     }
 }

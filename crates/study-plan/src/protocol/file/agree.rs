@@ -27,6 +27,8 @@ pub(super) struct Sections<'a> {
     pub(super) setup: Vec<PartialQuestion>,
     pub(super) intake: Vec<PartialQuestion>,
     pub(super) outro: Vec<PartialQuestion>,
+    /// The items of the questionnaires between the trials.
+    pub(super) between: Vec<PartialQuestion>,
     pub(super) analysis: Option<&'a AnalysisRules>,
     /// Whether there are `[[parts]]`.
     pub(super) has_parts: bool,
@@ -261,7 +263,7 @@ impl Sections<'_> {
             false => is_ratings_column,
         };
         let ratings = "ratings.csv";
-        for question in &self.questions {
+        for question in self.questions.iter().chain(&self.between) {
             column(document, question, &mut taken, fixed_in_ratings, ratings);
         }
         let mut once: Vec<String> = Vec::new();

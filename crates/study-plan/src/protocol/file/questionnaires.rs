@@ -1,11 +1,13 @@
 //! `[[questionnaires]]`.
 
-use super::agree::{at, collision};
+use super::agree::{Sections, at, collision};
+use super::outcomes::PartialOutcome;
 use super::parts::RawPart;
 use super::questions::PartialQuestion;
-use crate::protocol::keys::{Id, Kind, Shape, Variants, keys};
-use crate::protocol::questionnaires::{Inventory, Questionnaire, item_id};
+use crate::protocol::keys::{Id, Kind, Shape, Variants, Words as _, keys};
+use crate::protocol::questionnaires::{Inventory, Occasion, Questionnaire, item_id};
 use crate::protocol::section::{Section, Variant, shapes};
+use crate::protocol::{Order, Part, Role, Task};
 use study_base::diagnostic::Fault;
 use study_base::diagnostic::table::Document;
 use study_base::text::{PartId, counted};
@@ -17,6 +19,8 @@ pub(super) static QUESTIONNAIRES: Variants = Variants {
         /// The name of the questionnaire. Its answers are in columns that begin with this name,
         /// such as `sus_1`.
         "id": Kind::Id(Id::Part), r#""sus""#, required;
+        /// After what it is asked. What is not `session` needs the format `study-protocol/3`.
+        "after": Kind::Word(Occasion::WORDS), r#""condition""#, default(r#""session""#);
         /// The texts at both ends of every scale.
         "labels": Kind::Texts(2), r#"["stimme gar nicht zu", "stimme voll zu"]"#, derived("those of the source, in English");
     },
@@ -59,6 +63,7 @@ pub(super) struct PartialQuestionnaire {
     path: String,
     id: Option<PartId>,
     kind: Option<Inventory>,
+    after: Occasion,
     /// The texts of its items, with the labels of their scales.
     items: Vec<(String, [String; 2])>,
 }
@@ -71,6 +76,7 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Vec<PartialQuestionnaire> {
                 path: section.path().to_owned(),
                 id: section.part_id("id"),
                 kind: read.as_ref().map(|(kind, _)| *kind),
+                after: section.word("after").unwrap_or(Occasion::Session),
                 items: read.map_or_else(Vec::new, |read| items(&mut section, &read)),
             }
         })
@@ -105,7 +111,19 @@ fn items(section: &mut Section<'_, '_>, (kind, system): &Read) -> Vec<(String, [
 }
 
 impl PartialQuestionnaire {
-    /// The items as questions at the end of a session.
+    /// Whether it is asked between the trials, and not at the end.
+    pub(super) fn is_between(&self) -> bool {
+        self.after != Occasion::Session
+    }
+
+    /// The measured outcome that its scores are, if there is one for each condition.
+    pub(super) fn outcome(&self) -> Option<PartialOutcome> {
+        let (id, kind) = (self.id.as_ref()?, self.kind?);
+        let own = || PartialOutcome::of_questionnaire(&self.path, id, kind);
+        (self.after == Occasion::Condition).then(own)
+    }
+
+    /// The items as questions.
     pub(super) fn questions(&self) -> Vec<PartialQuestion> {
         let (Some(id), Some(kind)) = (&self.id, self.kind) else {
             return Vec::new();
@@ -119,9 +137,16 @@ impl PartialQuestionnaire {
     }
 
     pub(super) fn finish(&self) -> Option<Questionnaire> {
+        let questions = match self.is_between() {
+            true => self.questions(),
+            false => Vec::new(),
+        };
+        let questions = questions.into_iter().map(PartialQuestion::finish);
         Some(Questionnaire {
             id: self.id.clone()?,
             kind: self.kind?,
+            after: self.after,
+            questions: questions.collect::<Option<_>>()?,
         })
     }
 }
@@ -136,6 +161,97 @@ pub(super) fn agree(all: &[PartialQuestionnaire], parts: &[RawPart], document: &
         if let Some(other) = others.find(|other| other.collides_with(id)) {
             let fault = collision(id.as_str(), other.as_str());
             document.fault(fault.at(at(document, &own.path, "id")));
+        }
+    }
+}
+
+/// Reports questionnaires after something that the study has not, or that does not end before the rest.
+pub(super) fn agree_after(
+    all: &[PartialQuestionnaire],
+    sections: &Sections<'_>,
+    parts: &[Part],
+    document: &Document<'_>,
+) {
+    let orders = orders(sections, parts);
+    for own in all.iter().filter(|own| own.is_between()) {
+        if let Some(fault) = without_end(own.after, sections.has_parts, &orders) {
+            document.fault(fault.at(at(document, &own.path, "after")));
+        }
+    }
+}
+
+/// The order of the trials that rate realizations, of a part or of the study.
+struct Rated<'a> {
+    part: Option<&'a PartId>,
+    order: &'a Order,
+    repetitions: u32,
+    realizations: usize,
+}
+
+fn orders<'a>(sections: &Sections<'a>, parts: &'a [Part]) -> Vec<Rated<'a>> {
+    let of_part = |part: &'a Part| match &part.task {
+        Task::Rating(own) => Some(Rated {
+            part: Some(&part.id),
+            order: &own.order,
+            repetitions: own.repetitions,
+            realizations: own.models.len(),
+        }),
+        _ => None,
+    };
+    match sections.design {
+        _ if sections.has_parts => parts.iter().filter_map(of_part).collect(),
+        None => Vec::new(),
+        Some(design) => {
+            let scheduled = sections.models.iter().filter(|m| m.role != Role::Practice);
+            vec![Rated {
+                part: None,
+                order: &design.order,
+                repetitions: design.repetitions,
+                realizations: scheduled.count(),
+            }]
+        }
+    }
+}
+
+/// Why nothing can be asked after this; a file of orders is looked at where it is read.
+fn without_end(after: Occasion, has_parts: bool, orders: &[Rated<'_>]) -> Option<Fault> {
+    let said = format!("after = \"{}\"", after.as_str());
+    let of = |rated: &Rated<'_>| match rated.part {
+        Some(part) => format!(" in part `{part}`"),
+        None => String::new(),
+    };
+    let shuffled = |rated: &&Rated<'_>| *rated.order == Order::Shuffled;
+    match after {
+        Occasion::Session => None,
+        Occasion::Part => (!has_parts).then(|| {
+            Fault::error(format!("{said} needs [[parts]], and the study has none"))
+                .hint("after = \"session\" asks it at the end")
+        }),
+        Occasion::Condition | Occasion::Block if has_parts && orders.is_empty() => Some(
+            Fault::error(format!("{said} needs a part of kind `rating`"))
+                .hint("after = \"part\" asks it after each part of any kind"),
+        ),
+        Occasion::Condition => {
+            let mixed = |rated: &&Rated<'_>| rated.repetitions > 1 && rated.realizations > 1;
+            let rated = orders.iter().filter(shuffled).find(mixed)?;
+            let what = format!(
+                "{said} has no meaning{}: order = \"shuffled\" mixes the repetitions of the realizations, so that none is over before the others",
+                of(rated)
+            );
+            Some(Fault::error(what).hint(
+                "order = \"blocked\" (or williams, latin-square, fixed) asks it in each block; a file of orders that has the trials of a realization one after another, or a part for each realization with parts_order = \"williams\", asks it once for each",
+            ))
+        }
+        Occasion::Block => {
+            let file = |rated: &&Rated<'_>| matches!(rated.order, Order::File(_));
+            let rated = orders.iter().find(|r| shuffled(r) || file(r))?;
+            let what = format!(
+                "{said} has no meaning{}: its order has no blocks",
+                of(rated)
+            );
+            Some(Fault::error(what).hint(
+                "the orders blocked, williams, latin-square and fixed have: in each block every realization comes once",
+            ))
         }
     }
 }

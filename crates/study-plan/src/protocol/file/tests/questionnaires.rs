@@ -1,7 +1,9 @@
 //! `[[questionnaires]]`.
 
 use crate::protocol::file::parse;
-use crate::protocol::{Answer, QuestionKind, kinds};
+use crate::protocol::{
+    Answer, BetterEnd, Inventory, Measure, Occasion, QuestionKind, Scored, kinds,
+};
 
 const STUDY: &str = r#"
 format = "study-protocol/1"
@@ -115,4 +117,101 @@ fn a_questionnaire_in_another_language_than_the_study_is_a_warning() {
         warned(&german.replace("id = \"sus\"", &items)),
         expected[1..]
     );
+}
+
+const AFTER_EACH: &str = r#"
+[[questionnaires]]
+id = "load"
+kind = "nasa-tlx"
+after = "condition"
+"#;
+
+fn newer(questionnaires: &str) -> String {
+    with(questionnaires).replace("study-protocol/1", "study-protocol/3")
+}
+
+const ONE: &str = r#"models = [{ id = "a", file = "a.toml" }]"#;
+const TWO: &str = r#"models = [{ id = "a", file = "a.toml" }, { id = "b", file = "b.toml" }]"#;
+const BLOCKED: &str = r#"repetitions = 1, order = "blocked""#;
+
+#[test]
+fn what_is_asked_after_each_condition_is_not_in_the_outro_and_is_an_outcome() {
+    let text = newer(AFTER_EACH)
+        .replace(ONE, TWO)
+        .replace("repetitions = 1", "repetitions = 3");
+    let parsed = parse("p", &text);
+    let shown = parsed.findings.render(false);
+    let protocol = parsed.protocol.unwrap_or_else(|| panic!("{shown}"));
+    assert_eq!(protocol.outro.len(), 1);
+    let ids: Vec<&str> = protocol.between().map(|q| q.id.as_str()).collect();
+    assert_eq!((ids.len(), ids[0]), (6, "load_mental"));
+    let own = &protocol.questionnaires[0];
+    assert_eq!(own.after, Occasion::Condition);
+    // Each of two realizations, in each of three blocks.
+    assert_eq!(own.times(&protocol), 6);
+    let [outcome] = protocol.outcomes.as_slice() else {
+        panic!("{:?}", protocol.outcomes)
+    };
+    assert_eq!(outcome.id.as_str(), "load");
+    assert_eq!(outcome.better, Some(BetterEnd::Lower));
+    let scored = Scored {
+        id: own.id.clone(),
+        kind: Inventory::NasaTlx,
+    };
+    assert_eq!(outcome.measure, Measure::Questionnaire(scored));
+}
+
+#[test]
+fn what_is_asked_after_each_block_is_no_outcome() {
+    let text = newer(AFTER_EACH)
+        .replace("\"condition\"", "\"block\"")
+        .replace("repetitions = 1", "repetitions = 3");
+    let protocol = parse("p", &text).protocol.unwrap();
+    assert!(protocol.outcomes.is_empty());
+    assert_eq!(protocol.questionnaires[0].times(&protocol), 3);
+}
+
+#[test]
+fn nothing_is_asked_after_what_has_no_end() {
+    let after = |word: &str| AFTER_EACH.replace("condition", word);
+    let shuffled = |questionnaires: &str| {
+        newer(questionnaires)
+            .replace(ONE, TWO)
+            .replace(BLOCKED, r#"repetitions = 2, order = "shuffled""#)
+    };
+    for (text, expected) in [
+        (
+            with(AFTER_EACH),
+            "`questionnaires[0].after` needs the format `study-protocol/3`",
+        ),
+        (
+            shuffled(AFTER_EACH),
+            "after = \"condition\" has no meaning: order = \"shuffled\" mixes the repetitions of the realizations",
+        ),
+        (
+            shuffled(AFTER_EACH),
+            "order = \"blocked\" (or williams, latin-square, fixed) asks it in each block",
+        ),
+        (
+            shuffled(&after("block")),
+            "after = \"block\" has no meaning: its order has no blocks",
+        ),
+        (
+            newer(&after("part")),
+            "after = \"part\" needs [[parts]], and the study has none",
+        ),
+        (newer(&after("conditions")), "did you mean"),
+        (
+            newer(&AFTER_EACH.replace("\"load\"", "\"realism\"")),
+            "`realism` is a question and an outcome",
+        ),
+    ] {
+        let parsed = parse("p", &text);
+        assert!(parsed.protocol.is_none(), "{text}");
+        let shown = parsed.findings.render(false);
+        assert!(shown.contains(expected), "{text}\n{shown}");
+    }
+    // Each realization once: each is over after its only trial.
+    let once = shuffled(AFTER_EACH).replace("repetitions = 2", "repetitions = 1");
+    assert!(parse("p", &once).protocol.is_some());
 }
