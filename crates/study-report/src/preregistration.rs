@@ -18,8 +18,8 @@ use study_plan::protocol::pairs::IntervalOrder;
 use study_plan::protocol::parts::{Part, Task, TrackRules};
 use study_plan::protocol::presentations::{Presentations, Standard};
 use study_plan::protocol::{
-    Assign, Drawn, Feedback, Identification, Order, Protocol, Question, Role, Scale, SessionPlan,
-    Unfinished,
+    Assign, Drawn, Feedback, Identification, Occasion, Order, Protocol, Question, Role, Scale,
+    SessionPlan, Unfinished,
 };
 
 /// The document for people.
@@ -316,6 +316,15 @@ fn design(c: &Content<'_>) -> Vec<String> {
     }
     for part in &p.parts {
         lines.push(format!("Part `{}`: {}.", part.id, trials(p, part)));
+    }
+    let between = p.questionnaires.iter();
+    for own in between.filter(|own| own.after != Occasion::Session) {
+        lines.push(format!(
+            "Questionnaire `{}` ({}): {}.",
+            own.id,
+            own.kind.as_str(),
+            own.after.when()
+        ));
     }
     lines.extend(c.tracks.iter().map(|track| text(track)));
     let seed = p.study.seed;

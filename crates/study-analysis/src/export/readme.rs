@@ -118,7 +118,7 @@ pub(super) fn methods(job: &Job<'_>) -> String {
         };
         text += &format!(" Part {}: {task}.", part.id);
     }
-    for question in &protocol.questions {
+    for question in protocol.questions.iter().chain(protocol.between()) {
         let scale = match question.kind.scale() {
             Scale::Levels { from, to, labels } => {
                 let labels: Vec<String> =

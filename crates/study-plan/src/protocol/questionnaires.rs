@@ -40,6 +40,18 @@ words! {
     }
 }
 
+impl Occasion {
+    /// When that is, in a sentence.
+    pub fn when(self) -> &'static str {
+        match self {
+            Self::Condition => "after each realization",
+            Self::Block => "after each block",
+            Self::Part => "after each part",
+            Self::Session => "at the end",
+        }
+    }
+}
+
 /// The trials that a questionnaire is about: their part, block and realization, as far as these matter.
 pub type Stretch<'a> = (Option<&'a PartId>, Option<u32>, Option<&'a ModelId>);
 
