@@ -162,6 +162,53 @@ fn scores_between_the_trials_are_those_of_their_conditions() {
     assert!(outcomes.contains("load"), "{outcomes}");
 }
 
+const ALONE: &str = r#"
+format = "study-protocol/1"
+study = { id = "alone", title = "Usability of a switch", seed = 1 }
+design = { participants = 3 }
+device = { kind = "manual" }
+analysis = { primary = "sus" }
+[[questionnaires]]
+id = "sus"
+kind = "sus"
+"#;
+
+/// Nothing is presented: there are no trials, and the scores are the result.
+#[test]
+fn a_study_can_consist_of_questionnaires() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        let (code, out, err) = study(arguments, folder.path());
+        assert_eq!(code, 0, "{out}{err}");
+        out
+    };
+    fs::create_dir(folder.path().join("q")).unwrap();
+    fs::write(folder.path().join("q/protocol.toml"), ALONE).unwrap();
+    run(&["check", "q"]);
+    assert!(run(&["schedule", "q"]).contains("only asks questionnaires"));
+    run(&["rehearse", "q", "--participants", "3", "--out", "out"]);
+    run(&["verify", "out"]);
+    let document = analyzed(folder.path());
+    assert_eq!(document["format"], "study-parts/1");
+    let part = &document["parts"][0];
+    assert_eq!((&part["task"], &part["trials"]), (&"sus".into(), &3.into()));
+    assert_eq!(part["values"]["questionnaire/n"], 3.0);
+    let out = run(&["analyze", "out"]);
+    assert!(out.contains("sus, 3 scores, 3 participants"), "{out}");
+    run(&[
+        "export",
+        "out/alone",
+        "--to",
+        "csv",
+        "--out",
+        "e",
+        "--include",
+        "simulated",
+    ]);
+    let answers = cells(&folder.path().join("e/participants.csv"), &["sus_1"]);
+    assert_eq!(answers.len(), 3);
+}
+
 #[test]
 fn magnitudes_of_realizations_are_estimated_and_compared() {
     let folder = tempfile::tempdir().unwrap();

@@ -292,6 +292,12 @@ impl Planner {
         {
             orders.iter().try_for_each(together)?;
         }
+        if protocol.only_asks() {
+            return Ok(Self {
+                parts_order,
+                parts: Vec::new(),
+            });
+        }
         if protocol.parts.is_empty() {
             let models = protocol.scheduled_models().map(|m| m.id.clone()).collect();
             let only = PartOrders {

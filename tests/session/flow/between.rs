@@ -4,6 +4,7 @@ use super::part_rig::read;
 use super::rig::Rig;
 use super::studies::{plain, qid, rating, rich};
 use study_base::text::PartId;
+use study_plan::protocol::file::parse;
 use study_plan::protocol::{Answer, Inventory, Occasion, Protocol, Questionnaire};
 use study_session::outcome::{Author, Event, FormId, RatingRow};
 use study_session::session::Input;
@@ -153,6 +154,39 @@ fn an_answer_between_the_trials_can_be_corrected() {
     let rows = rig.session.history().rating_rows(&protocol);
     assert_eq!(rows[0].answers[&qid("load_mental")], Answer::Rating(6));
     assert_eq!(rows[0].answers[&qid("load_effort")], Answer::Rating(4));
+}
+
+#[test]
+fn a_session_without_trials_asks_its_questionnaires() {
+    let alone = r#"
+format = "study-protocol/1"
+study = { id = "s", title = "t", seed = 1 }
+design = { participants = 4 }
+device = { kind = "manual" }
+analysis = { primary = "sus" }
+[[questionnaires]]
+id = "sus"
+kind = "sus"
+"#;
+    let protocol = parse("p", alone).protocol.unwrap();
+    let mut rig = Rig::new(protocol.clone());
+    rig.finish();
+    rig.assert_whole();
+    let journal = rig.journal[..5].to_vec();
+    let mut again = Rig::back(protocol, journal, 10.0);
+    again.identify();
+    again.finish();
+    again.assert_whole();
+    let outro = |event: &Event| {
+        matches!(
+            event,
+            Event::Answered {
+                form: FormId::Outro,
+                ..
+            }
+        )
+    };
+    assert_eq!([rig.count(outro), again.count(outro)], [10, 10]);
 }
 
 /// `rig` itself asserts that nothing is asked twice.

@@ -38,7 +38,9 @@ pub(super) fn methods(job: &Job<'_>) -> String {
         ),
         protocol.design.participants
     );
-    if protocol.parts.is_empty() {
+    if protocol.only_asks() {
+        text += " Nothing was presented.";
+    } else if protocol.parts.is_empty() {
         let felt = protocol.scheduled_models().count();
         text += &format!(
             " Each felt {} {}, in an order that is {}.",

@@ -271,6 +271,11 @@ impl Protocol {
         self.questionnaires.iter().flat_map(|own| &own.questions)
     }
 
+    /// Whether nothing is presented, and only questionnaires are asked.
+    pub fn only_asks(&self) -> bool {
+        self.parts.is_empty() && self.models.is_empty() && !self.questionnaires.is_empty()
+    }
+
     /// Number of realizations that the trials of a part rate, one a trial, or those of a study without
     /// parts; 0 of a part of another kind.
     fn rated(&self, part: Option<&PartId>) -> u32 {

@@ -509,17 +509,32 @@ fn a_practice_trial_before_does_not_enter_a_constraint() {
     );
 }
 
+fn load(after: Occasion) -> Questionnaire {
+    Questionnaire {
+        id: PartId::new("load").unwrap(),
+        kind: Inventory::NasaTlx,
+        after,
+        questions: Vec::new(),
+    }
+}
+
+#[test]
+fn a_study_that_only_asks_has_no_trials() {
+    let mut p = design(0, 1, Order::Fixed);
+    assert_eq!(
+        plan(&p, None, Seat::Row(1)),
+        Err(ScheduleError::NoRealizations)
+    );
+    p.questionnaires.push(load(Occasion::Session));
+    assert_eq!(plan(&p, None, Seat::Row(1)), Ok(Vec::new()));
+}
+
 #[test]
 fn a_file_of_orders_brings_the_trials_together_after_which_something_is_asked() {
     let mut p = design(2, 2, Order::File("orders.csv".to_owned()));
     let mixed = file(&[(1, "BBAA"), (2, "ABBA")]);
     assert!(Planner::new(&p, Some(&mixed)).is_ok());
-    p.questionnaires.push(Questionnaire {
-        id: PartId::new("load").unwrap(),
-        kind: Inventory::NasaTlx,
-        after: Occasion::Condition,
-        questions: Vec::new(),
-    });
+    p.questionnaires.push(load(Occasion::Condition));
     assert_eq!(
         message(&p, Some(&mixed), Seat::Row(1)),
         "the file of orders, row 2, position 4: `A` comes again after others, and a questionnaire is asked after each condition"

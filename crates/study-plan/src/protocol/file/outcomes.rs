@@ -157,6 +157,10 @@ pub(super) fn agree(all: &[PartialOutcome], sections: &Sections<'_>, document: &
     let Some(first) = all.first() else {
         return;
     };
+    if sections.only_asks() {
+        let what = "outcomes are measured in trials, and the study has none";
+        fault(&first.path, "from", Fault::error(what));
+    }
     if let Some(question) = primary_of_part(sections) {
         let name = question.id.as_ref().map_or("", QuestionId::as_str);
         let what = format!(

@@ -111,6 +111,10 @@ fn items(section: &mut Section<'_, '_>, (kind, system): &Read) -> Vec<(String, [
 }
 
 impl PartialQuestionnaire {
+    pub(super) fn id(&self) -> Option<&PartId> {
+        self.id.as_ref()
+    }
+
     /// Whether it is asked between the trials, and not at the end.
     pub(super) fn is_between(&self) -> bool {
         self.after != Occasion::Session
@@ -227,6 +231,14 @@ fn without_end(after: Occasion, has_parts: bool, orders: &[Rated<'_>]) -> Option
             Fault::error(format!("{said} needs [[parts]], and the study has none"))
                 .hint("after = \"session\" asks it at the end")
         }),
+        Occasion::Condition | Occasion::Block if orders.iter().any(|r| r.realizations == 0) => {
+            Some(
+                Fault::error(format!(
+                    "{said} needs realizations, and nothing is presented"
+                ))
+                .hint("after = \"session\" asks it once"),
+            )
+        }
         Occasion::Condition | Occasion::Block if has_parts && orders.is_empty() => Some(
             Fault::error(format!("{said} needs a part of kind `rating`"))
                 .hint("after = \"part\" asks it after each part of any kind"),

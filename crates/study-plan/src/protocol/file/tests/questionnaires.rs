@@ -215,3 +215,48 @@ fn nothing_is_asked_after_what_has_no_end() {
     let once = shuffled(AFTER_EACH).replace("repetitions = 2", "repetitions = 1");
     assert!(parse("p", &once).protocol.is_some());
 }
+
+const ALONE: &str = r#"
+format = "study-protocol/3"
+study = { id = "s", title = "t", seed = 1 }
+design = { participants = 4 }
+device = { kind = "manual" }
+analysis = { primary = "sus" }
+[[questionnaires]]
+id = "sus"
+kind = "sus"
+"#;
+
+#[test]
+fn a_study_can_consist_of_questionnaires() {
+    let parsed = parse("p", ALONE);
+    let shown = parsed.findings.render(false);
+    let protocol = parsed.protocol.unwrap_or_else(|| panic!("{shown}"));
+    assert!(protocol.only_asks());
+    assert_eq!(protocol.outro.len(), 10);
+    let question = "[[questions]]\nid = \"q\"\nkind = \"text\"\nprompt = \"?\"\n";
+    for (text, expected) in [
+        (
+            ALONE.replace("primary = \"sus\"", "primary = \"susi\""),
+            "there is no questionnaire `susi`",
+        ),
+        (
+            ALONE.replace("participants = 4", "participants = 4, repetitions = 3"),
+            "`design.repetitions` has no effect in a study that presents nothing",
+        ),
+        (
+            format!("{ALONE}after = \"condition\"\n"),
+            "after = \"condition\" needs realizations, and nothing is presented",
+        ),
+        (
+            format!("{ALONE}[[outcomes]]\nid = \"time\"\nfrom = \"clock\"\n"),
+            "outcomes are measured in trials, and the study has none",
+        ),
+        (format!("{ALONE}{question}"), "nothing to present"),
+    ] {
+        let parsed = parse("p", &text);
+        assert!(parsed.protocol.is_none(), "{text}");
+        let shown = parsed.findings.render(false);
+        assert!(shown.contains(expected), "{text}\n{shown}");
+    }
+}
