@@ -162,6 +162,52 @@ fn scores_between_the_trials_are_those_of_their_conditions() {
     assert!(outcomes.contains("load"), "{outcomes}");
 }
 
+/// The items and the scales of a questionnaire of the study's own, from the answers of each participant.
+#[test]
+fn a_questionnaire_of_the_studys_own_is_scored() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        let (code, out, err) = study(arguments, folder.path());
+        assert_eq!(code, 0, "{out}{err}");
+        out
+    };
+    let own = ALONE
+        .replace("study-protocol/1", "study-protocol/3")
+        .replace("primary = \"sus\"", "primary = \"touch\"")
+        .replace(
+            "id = \"sus\"\nkind = \"sus\"",
+            r#"id = "touch"
+kind = "own"
+items = ["One.", "Two.", "Three."]
+from = 0
+to = 6
+reverse = [2]
+total = "sum"
+times = 2.0
+scales = [{ id = "outer", items = [1, 3], times = 0.5 }]"#,
+        );
+    fs::create_dir(folder.path().join("q")).unwrap();
+    fs::write(folder.path().join("q/protocol.toml"), own).unwrap();
+    run(&["rehearse", "q", "--participants", "5", "--out", "out"]);
+    run(&["verify", "out"]);
+    let document = analyzed(folder.path());
+    let values = &document["parts"][0]["values"];
+    let table = folder.path().join("out/alone/participants.csv");
+    let columns = ["participant", "touch_1", "touch_2", "touch_3"];
+    let mut outer = 0.0;
+    for row in cells(&table, &columns) {
+        let x: Vec<f64> = row[1..].iter().map(|x| x.parse().unwrap()).collect();
+        let score = 2.0 * (x[0] + 6.0 - x[1] + x[2]);
+        assert_eq!(values[format!("questionnaire/score/{}", row[0])], score);
+        outer += 0.5 * (x[0] + x[2]) / 5.0;
+    }
+    let found = values["questionnaire/scale/outer/mean"].as_f64().unwrap();
+    assert!((found - outer).abs() < 1e-9, "{found} {outer}");
+    run(&["analyze", "out"]);
+    let analysis = folder.path().join("out/alone/analysis");
+    assert!(analysis.join("part_subscales.csv").is_file());
+}
+
 const ALONE: &str = r#"
 format = "study-protocol/1"
 study = { id = "alone", title = "Usability of a switch", seed = 1 }

@@ -38,6 +38,7 @@ pub mod relative;
 pub mod rules;
 pub mod scale;
 pub mod schema;
+pub mod scoring;
 mod section;
 pub mod similarity;
 pub mod spaces;
@@ -62,6 +63,7 @@ pub use questionnaires::{Inventory, Occasion, Questionnaire, Scored};
 pub use relative::Relative;
 pub use rules::Exclusion;
 pub use scale::Scale;
+pub use scoring::{Scoring, Subscale, Total};
 pub use similarity::Similarity;
 pub use spaces::{Axis, SearchTask, SpaceRules};
 

@@ -323,21 +323,28 @@ fn scores(part: &PartAnalysis) -> Option<String> {
 }
 
 /// The name of a questionnaire, and how it is scored.
-fn questionnaire(part: &PartAnalysis) -> Option<(&'static str, String)> {
+fn questionnaire(part: &PartAnalysis) -> Option<(String, String)> {
     let when = part.data.between.unwrap_or(Occasion::Session).when();
     match part.task {
         "sus" => Some((
-            "System Usability Scale",
+            "System Usability Scale".to_owned(),
             format!(
                 "Participants filled in the System Usability Scale (Brooke, 1996) {when}; its score goes from 0 to \
                  100, and more is better."
             ),
         )),
         "nasa-tlx" => Some((
-            "raw NASA Task Load Index",
+            "raw NASA Task Load Index".to_owned(),
             format!(
                 "Participants filled in the NASA Task Load Index (Hart & Staveland, 1988) {when}; its raw score, \
                  without weights (Hart, 2006), is the mean of six ratings from 0 to 100, and more is more load."
+            ),
+        )),
+        "own" => Some((
+            format!("questionnaire {}", part.part),
+            format!(
+                "Participants filled in the questionnaire {} {when}; its items and its scoring are in the protocol.",
+                part.part
             ),
         )),
         _ => None,

@@ -13,6 +13,7 @@ fn asked(mut protocol: Protocol, after: Occasion) -> Protocol {
     protocol.questionnaires.push(Questionnaire {
         id: PartId::new("load").unwrap(),
         kind: Inventory::NasaTlx,
+        own: None,
         after,
         questions: vec![rating("load_mental"), rating("load_effort")],
     });

@@ -13,7 +13,7 @@ pub use ladders::coarse;
 pub use parts::is_about_realizations;
 
 use super::phrases::{self, Phrase};
-use super::{Design, DeviceKind, ModelEntry, Protocol, Question, Questionnaire, Role};
+use super::{Design, DeviceKind, Inventory, ModelEntry, Protocol, Question, Questionnaire, Role};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use study_base::diagnostic::Fault;
@@ -136,7 +136,8 @@ fn untranslated(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
     }
     for (i, own) in protocol.questionnaires.iter().enumerate() {
         let has = |key: &str| spans.contains_key(&format!("questionnaires[{i}].{key}"));
-        if !has("items") || !has("labels") {
+        let is_own = own.kind == Inventory::Own;
+        if !is_own && (!has("items") || !has("labels")) {
             faults.push(
                 Fault::warning(format!(
                     "the questionnaire `{}` is in English, and the study in `{}`",

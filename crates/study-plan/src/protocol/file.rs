@@ -28,6 +28,7 @@ mod power;
 mod questionnaires;
 mod questions;
 mod resolve;
+mod scoring;
 mod similarity;
 mod spaces;
 mod standard;
@@ -131,7 +132,7 @@ const FORMATS: &[Word] = &[
 const OF_FORMAT_2: [&str; 5] = ["parts", "families", "tracks", "groups", "sessions"];
 
 /// Keys that need [`FORMAT_3`], without the places in lists.
-pub const OF_FORMAT_3: [&str; 15] = [
+pub const OF_FORMAT_3: [&str; 16] = [
     "confirms",
     "design.order_version",
     "factors",
@@ -147,6 +148,7 @@ pub const OF_FORMAT_3: [&str; 15] = [
     "tracks.relative",
     "tracks.condition",
     "questionnaires.after",
+    "questionnaires.from",
 ];
 
 /// Largest protocol file that is read, bytes.

@@ -261,8 +261,8 @@ pub fn parts(
         analysis["conditions"] = tracks.iter().map(condition).collect();
     }
     if !questionnaires.is_empty() {
-        let kind = |own: &Questionnaire| json!({ "id": own.id, "kind": own.kind });
-        analysis["questionnaires"] = questionnaires.iter().map(kind).collect();
+        let scored = |own: &Questionnaire| json!(own.scored());
+        analysis["questionnaires"] = questionnaires.iter().map(scored).collect();
     }
     if !outcomes.is_empty() {
         analysis["outcomes"] = json!(outcomes);
@@ -278,8 +278,9 @@ pub fn parts(
 fn asked(own: &Questionnaire) -> Value {
     let Questionnaire {
         id,
-        // It decides how the answers are scored.
+        // They decide how the answers are scored.
         kind: _,
+        own: _,
         after,
         questions,
     } = own;
@@ -541,6 +542,7 @@ mod tests {
         protocol.questionnaires.push(Questionnaire {
             id: PartId::new("load").unwrap(),
             kind: Inventory::NasaTlx,
+            own: None,
             after: Occasion::Condition,
             questions: protocol.questions.clone(),
         });

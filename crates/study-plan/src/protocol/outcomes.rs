@@ -10,7 +10,7 @@ use study_base::text::QuestionId;
 pub const MAX_OUTCOMES: usize = 12;
 
 /// One of `[[outcomes]]`: a number that is measured in each trial of a rating part.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OutcomeRules {
     /// Its name, also in the identifiers of its statistics.
     pub id: QuestionId,
@@ -24,7 +24,7 @@ pub struct OutcomeRules {
 }
 
 /// What is measured, and by what.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "from", content = "measure", rename_all = "lowercase")]
 pub enum Measure {
     /// By the clock of the session.
@@ -138,6 +138,7 @@ impl Measure {
             Self::Questionnaire(own) => match own.kind {
                 Inventory::Sus => "score of the System Usability Scale",
                 Inventory::NasaTlx => "raw score of the Task Load Index",
+                Inventory::Own => return format!("score of the questionnaire {}", own.id).into(),
             },
         })
     }

@@ -4,6 +4,7 @@ use super::keys::words;
 use super::kinds::{self, QuestionKind};
 use super::parts::Task;
 use super::plan::Trial;
+use super::scoring::Scoring;
 use super::{Answer, Order, Protocol, Question};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -17,6 +18,9 @@ pub struct Questionnaire {
     pub id: PartId,
     /// Which one it is.
     pub kind: Inventory,
+    /// How one of the study's own is scored.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub own: Option<Scoring>,
     /// After what it is asked.
     pub after: Occasion,
     /// Its items, if it is asked between the trials; at the end they are questions of the `[[outro]]`.
@@ -62,6 +66,8 @@ words! {
         Sus = "sus",
         /// The NASA Task Load Index without weights (Hart & Staveland 1988; Hart 2006): six ratings from 0 to 100.
         NasaTlx = "nasa-tlx",
+        /// One that the study brings itself, with its items and its scoring.
+        Own = "own",
     }
 }
 
@@ -155,7 +161,7 @@ const NASA_TLX: [Item; 6] = [
 ];
 
 impl Inventory {
-    /// Its items, in their order.
+    /// Its items, in their order; none of one of the study's own.
     ///
     /// ```
     /// # use study_plan::protocol::Inventory;
@@ -165,22 +171,15 @@ impl Inventory {
         match self {
             Self::Sus => &SUS,
             Self::NasaTlx => &NASA_TLX,
+            Self::Own => &[],
         }
     }
 
-    /// The score of answers to all of its items, in their order; `None` if one is missing or not on its
-    /// scale.
-    pub fn score(self, answers: &[f64]) -> Option<f64> {
-        match self {
-            Self::Sus => sus(answers),
-            Self::NasaTlx => raw_tlx(answers),
-        }
-    }
-
-    /// The answers to an item, with labels at both ends of its scale.
-    pub fn scale(self, low: &str, high: &str) -> QuestionKind {
+    /// The answers to an item, with labels at both ends of its scale; `None` of one of the study's own.
+    pub fn scale(self, low: &str, high: &str) -> Option<QuestionKind> {
         let (low, high) = (low.to_owned(), high.to_owned());
-        match self {
+        Some(match self {
+            Self::Own => return None,
             Self::Sus => QuestionKind::Rating(kinds::Rating {
                 from: 1,
                 to: 5,
@@ -192,14 +191,18 @@ impl Inventory {
                 step: 5.0,
                 labels: BTreeMap::from([("0".to_owned(), low), ("100".to_owned(), high)]),
             }),
-        }
+        })
     }
 }
 
 impl Questionnaire {
-    /// The question of an item, such as `sus_1`.
-    pub fn question(&self, item: &Item) -> QuestionId {
-        item_id(&self.id, item)
+    /// What its score is made of.
+    pub fn scored(&self) -> Scored {
+        Scored {
+            id: self.id.clone(),
+            kind: self.kind,
+            own: self.own.clone(),
+        }
     }
 
     /// How often it is asked between the trials of a session, unless trials fail; 0 at the end.
@@ -243,25 +246,53 @@ impl Questionnaire {
     }
 }
 
-/// The score of a questionnaire that is asked after each condition.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+/// What the score of a questionnaire is made of.
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Scored {
     /// Identifier of the questionnaire.
     pub id: PartId,
     /// Which one it is.
     pub kind: Inventory,
+    /// How one of the study's own is scored.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub own: Option<Scoring>,
 }
 
 impl Scored {
+    /// The names of its items, in their order.
+    pub fn names(&self) -> Vec<String> {
+        match &self.own {
+            Some(own) => (1..=own.items).map(|item| item.to_string()).collect(),
+            None => (self.kind.items().iter())
+                .map(|item| item.name.to_owned())
+                .collect(),
+        }
+    }
+
+    /// The questions of its items, such as `sus_1`.
+    pub fn questions(&self) -> Vec<QuestionId> {
+        let names = self.names();
+        names.iter().map(|name| item_id(&self.id, name)).collect()
+    }
+
+    /// The score of answers to its items, in their order; `None` if one is missing or not on its scale.
+    pub fn score(&self, answers: &[Option<f64>]) -> Option<f64> {
+        if let Some(own) = &self.own {
+            return own.score(answers);
+        }
+        let all: Option<Vec<f64>> = answers.iter().copied().collect();
+        match self.kind {
+            Inventory::Sus => sus(&all?),
+            Inventory::NasaTlx => raw_tlx(&all?),
+            Inventory::Own => None,
+        }
+    }
+
     /// The score of these answers; `None` if one is missing.
     pub fn of(&self, answers: &BTreeMap<QuestionId, Answer>) -> Option<f64> {
-        let answer = |item| {
-            answers
-                .get(&item_id(&self.id, item))
-                .and_then(Answer::number)
-        };
-        let all: Option<Vec<f64>> = self.kind.items().iter().map(answer).collect();
-        self.kind.score(&all?)
+        let answer = |id: &QuestionId| answers.get(id).and_then(Answer::number);
+        let all: Vec<Option<f64>> = self.questions().iter().map(answer).collect();
+        self.score(&all)
     }
 }
 
@@ -290,8 +321,8 @@ impl Protocol {
 }
 
 /// The question of an item: the id of the questionnaire and the name of the item.
-pub(super) fn item_id(id: &PartId, item: &Item) -> QuestionId {
-    let id = QuestionId::new(format!("{id}_{}", item.name));
+pub(super) fn item_id(id: &PartId, name: &str) -> QuestionId {
+    let id = QuestionId::new(format!("{id}_{name}"));
     id.expect("a part id has at most 20 characters and the name of an item at most 11")
 }
 
@@ -303,13 +334,9 @@ mod tests {
     fn every_item_of_every_questionnaire_has_an_id() {
         for kind in [Inventory::Sus, Inventory::NasaTlx] {
             let id = PartId::new("x".repeat(20)).unwrap();
-            let own = Questionnaire {
-                id,
-                kind,
-                after: Occasion::Session,
-                questions: Vec::new(),
-            };
-            let ids: Vec<QuestionId> = kind.items().iter().map(|i| own.question(i)).collect();
+            let own = None;
+            let ids = Scored { id, kind, own }.questions();
+            assert_eq!(ids.len(), kind.items().len());
             assert!((1..ids.len()).all(|i| !ids[..i].contains(&ids[i])));
         }
     }
@@ -319,10 +346,11 @@ mod tests {
         let own = Scored {
             id: PartId::new("load").unwrap(),
             kind: Inventory::NasaTlx,
+            own: None,
         };
         let ratings = [70.0, 20.0, 55.0, 30.0, 65.0, 15.0];
-        let items = own.kind.items().iter().zip(ratings);
-        let given = items.map(|(item, x)| (item_id(&own.id, item), Answer::Number(x)));
+        let items = own.questions().into_iter().zip(ratings);
+        let given = items.map(|(id, x)| (id, Answer::Number(x)));
         let mut answers: BTreeMap<QuestionId, Answer> = given.collect();
         assert_eq!(own.of(&answers), Some(42.5));
         answers.remove(&QuestionId::new("load_effort").unwrap());

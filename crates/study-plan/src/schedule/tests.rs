@@ -513,6 +513,7 @@ fn load(after: Occasion) -> Questionnaire {
     Questionnaire {
         id: PartId::new("load").unwrap(),
         kind: Inventory::NasaTlx,
+        own: None,
         after,
         questions: Vec::new(),
     }

@@ -8,7 +8,7 @@ mod similarity;
 
 use crate::apa::{self, bare_p, interval_or_dash, listing, name, or_dash, plain, two};
 use crate::table::{Builder, Head, Table, file, page};
-use scales::{items, magnitudes, ratings, scores, scores_after};
+use scales::{items, magnitudes, ratings, scores, scores_after, subscales};
 use std::collections::BTreeMap;
 use study_analysis::analyze::psychophysics::results::{
     Ability, CellName, ConditionModel, Contrast, Function, PartResults, PopulationModel,
@@ -21,7 +21,7 @@ use study_base::text::Untrusted;
 type Kind = (&'static str, fn(&PartResults) -> Table);
 
 /// All tables, in the order of a page; those without rows and notes are left out of it.
-pub(crate) const KINDS: [Kind; 26] = [
+pub(crate) const KINDS: [Kind; 27] = [
     ("part_thresholds.csv", thresholds),
     ("part_population.csv", population::population),
     ("part_population_contrasts.csv", population::contrasts),
@@ -45,6 +45,7 @@ pub(crate) const KINDS: [Kind; 26] = [
     ("part_similarity.csv", similarity::participants),
     ("part_scores.csv", scores),
     ("part_scores_after.csv", scores_after),
+    ("part_subscales.csv", subscales),
     ("part_items.csv", items),
     ("part_groups.csv", groups),
     ("part_group_pairs.csv", group_pairs),

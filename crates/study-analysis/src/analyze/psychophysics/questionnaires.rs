@@ -4,14 +4,17 @@ use super::again::again;
 use super::findings::{PartFacts, of_groups_and_sessions};
 use super::over_participants::Measured;
 use super::part_data::{PartAnalysis, PartData, StudyData};
-use super::results::{ConditionName, ItemAnswers, PartResults, QuestionnaireResult, ScoresAfter};
+use super::results::{
+    ConditionName, ItemAnswers, ItemName, PartResults, QuestionnaireResult, ScoresAfter,
+    SubscaleScores,
+};
 use crate::analyze::record::{Interval, Stat};
 use crate::analyze::select::{Include, Whose, state_counts};
 use crate::analyze::warning::Warning;
 use std::collections::{BTreeMap, BTreeSet};
 use study_base::text::{PartId, ParticipantId, QuestionId, counted};
-use study_plan::protocol::Answer;
-use study_plan::protocol::questionnaires::{Item, Occasion, Questionnaire};
+use study_plan::protocol::questionnaires::{Occasion, Questionnaire};
+use study_plan::protocol::{Answer, Scoring, Subscale};
 use study_session::outcome::fold::History;
 use study_session::outcome::ratings::Origin;
 use study_session::outcome::{ParticipantRow, RatingRow};
@@ -66,8 +69,8 @@ fn filled<'a>(
     own: &Questionnaire,
     sessions: &'a [ParticipantRow],
 ) -> Vec<Filled<'a>> {
-    let items = own.kind.items().iter();
-    let questions: Vec<QuestionId> = items.map(|item| own.question(item)).collect();
+    let scored = own.scored();
+    let questions: Vec<QuestionId> = scored.questions();
     let number = |answers: &BTreeMap<QuestionId, Answer>, id: &QuestionId| {
         answers.get(id).and_then(Answer::number)
     };
@@ -75,10 +78,7 @@ fn filled<'a>(
         let asked = questions.iter().any(|id| answers.contains_key(id));
         asked.then(|| questions.iter().map(|id| number(answers, id)).collect())
     };
-    let score = |answers: &[Option<f64>]| -> Option<f64> {
-        let all: Option<Vec<f64>> = answers.iter().copied().collect();
-        own.kind.score(&all?)
-    };
+    let score = |answers: &[Option<f64>]| scored.score(answers);
     let several = study.protocol.sessions.len() > 1;
     let of_session = |row: &'a ParticipantRow| -> Option<Filled<'a>> {
         let answers = given(&row.answers)?;
@@ -153,7 +153,8 @@ fn one(study: &StudyData<'_>, own: &Questionnaire, sessions: &[ParticipantRow]) 
             value,
         }));
     }
-    let of_item = |(i, item): (usize, &Item)| {
+    let names = own.scored().names();
+    let of_item = |(i, name): (usize, &String)| {
         let known: Vec<f64> = filled.iter().filter_map(|form| form.answers[i]).collect();
         let few = "fewer than two have answered it";
         let answers = ItemAnswers {
@@ -161,18 +162,19 @@ fn one(study: &StudyData<'_>, own: &Questionnaire, sessions: &[ParticipantRow]) 
             mean: Stat::or(mean(&known), few),
             sd: Stat::or(sd(&known), few),
         };
-        (item.name.into(), answers)
+        (name.as_str().into(), answers)
     };
     let scored = filled.iter().filter(|form| form.score.is_some()).count();
     let incomplete = filled.len() - scored;
     let several = protocol.sessions.len() > 1;
-    let names: Vec<&str> = protocol.sessions.iter().map(|s| s.id.as_str()).collect();
-    let names = if several { &names[..] } else { &[] };
+    let sessions: Vec<&str> = protocol.sessions.iter().map(|s| s.id.as_str()).collect();
+    let sessions = if several { &sessions[..] } else { &[] };
     let mut results = PartResults::undefined("");
-    results.over.again = again(&scores, names, false);
+    results.over.again = again(&scores, sessions, false);
     results.questionnaire = Some(QuestionnaireResult {
         score: score_of,
-        item: own.kind.items().iter().enumerate().map(of_item).collect(),
+        item: names.iter().enumerate().map(of_item).collect(),
+        scale: subscales(own, &filled),
         after: by_condition(&filled),
         n_incomplete: Stat::count(incomplete),
         ..over_participants(&scores)
@@ -211,6 +213,33 @@ fn one(study: &StudyData<'_>, own: &Questionnaire, sessions: &[ParticipantRow]) 
             ..PartData::default()
         },
     }
+}
+
+/// The scores of each subscale of a questionnaire of the study's own, one mean for each participant.
+fn subscales(own: &Questionnaire, filled: &[Filled<'_>]) -> BTreeMap<ItemName, SubscaleScores> {
+    let one = |scoring: &Scoring, scale: &Subscale| {
+        let mut people: BTreeMap<&ParticipantId, Vec<f64>> = BTreeMap::new();
+        for form in filled {
+            if let Some(score) = scoring.subscale(scale, &form.answers) {
+                people.entry(form.participant).or_default().push(score);
+            }
+        }
+        let means: Vec<f64> = people.values().filter_map(|x| mean(x)).collect();
+        let found = one_sample(&means);
+        let few = "fewer than two participants have a score";
+        let scores = SubscaleScores {
+            n: Stat::count(means.len()),
+            mean: Stat::or(mean(&means), few),
+            sd: Stat::or(found.map(|f| f.sd), few),
+            ci95: Interval::or(found.map(|f| f.ci95), few),
+        };
+        (scale.id.as_str().into(), scores)
+    };
+    let scoring = own.own.iter();
+    scoring
+        .flat_map(|scoring| scoring.scales.iter().map(move |scale| (scoring, scale)))
+        .map(|(scoring, scale)| one(scoring, scale))
+        .collect()
 }
 
 /// The scores after each condition, block or part, one mean for each participant.

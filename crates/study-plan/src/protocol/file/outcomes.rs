@@ -9,11 +9,11 @@ use crate::protocol::keys::{Id, Kind, Shape, Variants, Words as _, keys};
 use crate::protocol::outcomes::{
     Answers, BetterEnd, Clock, MAX_OUTCOMES, Measure, OutcomeRules, Telemetry, Transform,
 };
-use crate::protocol::questionnaires::{Inventory, Scored};
+use crate::protocol::questionnaires::Scored;
 use crate::protocol::section::{Section, Variant, shapes};
 use study_base::diagnostic::Fault;
 use study_base::diagnostic::table::Document;
-use study_base::text::{PartId, QuestionId, Untrusted};
+use study_base::text::{QuestionId, Untrusted};
 
 pub(super) static OUTCOMES: Variants = Variants {
     tag: "from",
@@ -121,19 +121,12 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Vec<PartialOutcome> {
 
 impl PartialOutcome {
     /// The score of a questionnaire after each condition, whose section has this path.
-    pub(super) fn of_questionnaire(path: &str, id: &PartId, kind: Inventory) -> Self {
-        let name = QuestionId::new(id.as_str()).ok();
-        let better = match kind {
-            Inventory::Sus => BetterEnd::Higher,
-            Inventory::NasaTlx => BetterEnd::Lower,
-        };
+    pub(super) fn of_questionnaire(path: &str, scored: Scored, better: Option<BetterEnd>) -> Self {
+        let name = QuestionId::new(scored.id.as_str()).ok();
         let rules = |name: QuestionId| OutcomeRules {
             id: name,
-            measure: Measure::Questionnaire(Scored {
-                id: id.clone(),
-                kind,
-            }),
-            better: Some(better),
+            measure: Measure::Questionnaire(scored),
+            better,
             transform: Transform::Identity,
         };
         Self {

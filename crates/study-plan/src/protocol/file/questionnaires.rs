@@ -4,10 +4,14 @@ use super::agree::{Sections, at, collision};
 use super::outcomes::PartialOutcome;
 use super::parts::RawPart;
 use super::questions::PartialQuestion;
+use super::scoring::{self, OWN, RawOwn};
 use crate::protocol::keys::{Id, Kind, Shape, Variants, Words as _, keys};
-use crate::protocol::questionnaires::{Inventory, Occasion, Questionnaire, item_id};
+use crate::protocol::outcomes::BetterEnd;
+use crate::protocol::questionnaires::{Inventory, Occasion, Questionnaire, Scored, item_id};
+use crate::protocol::scoring::Scoring;
 use crate::protocol::section::{Section, Variant, shapes};
-use crate::protocol::{Order, Part, Role, Task};
+use crate::protocol::{Order, Part, QuestionKind, Role, Task, kinds};
+use std::collections::BTreeMap;
 use study_base::diagnostic::Fault;
 use study_base::diagnostic::table::Document;
 use study_base::text::{PartId, counted};
@@ -21,18 +25,36 @@ pub(super) static QUESTIONNAIRES: Variants = Variants {
         "id": Kind::Id(Id::Part), r#""sus""#, required;
         /// After what it is asked. What is not `session` needs the format `study-protocol/3`.
         "after": Kind::Word(Occasion::WORDS), r#""condition""#, default(r#""session""#);
-        /// The texts at both ends of every scale.
-        "labels": Kind::Texts(2), r#"["stimme gar nicht zu", "stimme voll zu"]"#, derived("those of the source, in English");
+        /// The texts at both ends of every scale; of kind `own` also two for each item.
+        "labels": Kind::Texts(2), r#"["stimme gar nicht zu", "stimme voll zu"]"#, derived("those of the source, in English; none of kind `own`");
     },
     shapes: &SHAPES,
 };
 
 static SHAPES: [Shape; KINDS.len()] = shapes(&KINDS);
 
-/// Reads the own key of a questionnaire: the word for what is judged.
-type Read = (Inventory, Option<String>);
+/// What only one kind has.
+struct Read {
+    kind: Inventory,
+    /// The word for what is judged.
+    system: Option<String>,
+    own: Option<RawOwn>,
+}
 
-const KINDS: [Variant<Read>; 2] = [
+impl Read {
+    fn standard(kind: Inventory, system: Option<String>) -> Self {
+        Self {
+            kind,
+            system,
+            own: None,
+        }
+    }
+}
+
+/// An item: the end of its id, its text and its answers.
+type Asked = (String, String, QuestionKind);
+
+const KINDS: [Variant<Read>; 3] = [
     Variant::new(
         "sus",
         "The System Usability Scale (Brooke 1996), free to use where the source is named.",
@@ -43,7 +65,7 @@ const KINDS: [Variant<Read>; 2] = [
             /// stands for that word.
             "items": Kind::Texts(1), r#"["Den {system} würde ich gern oft nutzen.", "…", "…", "…", "…", "…", "…", "…", "…", "…"]"#, derived("those of the source, in English");
         },
-        |section| Some((Inventory::Sus, section.text("system"))),
+        |section| Some(Read::standard(Inventory::Sus, section.text("system"))),
     ),
     Variant::new(
         "nasa-tlx",
@@ -52,7 +74,21 @@ const KINDS: [Variant<Read>; 2] = [
             /// The six items in other words or in another language, in their order.
             "items": Kind::Texts(1), r#"["Wie hoch war die geistige Anforderung?", "…", "…", "…", "…", "…"]"#, derived("those of the source, in English");
         },
-        |_| Some((Inventory::NasaTlx, None)),
+        |_| Some(Read::standard(Inventory::NasaTlx, None)),
+    ),
+    Variant::new(
+        "own",
+        "A questionnaire that the study brings itself, with its items and its scoring: one of the laboratory, or one whose terms do not let \
+         a program have its text. Needs the format `study-protocol/3`.",
+        OWN,
+        |section| {
+            let own = scoring::read(section)?;
+            Some(Read {
+                kind: Inventory::Own,
+                system: None,
+                own: Some(own),
+            })
+        },
     ),
 ];
 
@@ -63,28 +99,68 @@ pub(super) struct PartialQuestionnaire {
     path: String,
     id: Option<PartId>,
     kind: Option<Inventory>,
+    own: Option<Scoring>,
+    better: Option<BetterEnd>,
     after: Occasion,
-    /// The texts of its items, with the labels of their scales.
-    items: Vec<(String, [String; 2])>,
+    items: Vec<Asked>,
 }
 
 pub(super) fn read(root: &mut Section<'_, '_>) -> Vec<PartialQuestionnaire> {
     (root.variants("questionnaires", &KINDS).into_iter())
         .map(|(mut section, kind)| {
             let read = kind.and_then(|kind| (kind.read)(&mut section));
+            let own = read.as_ref().and_then(|read| read.own.as_ref());
             PartialQuestionnaire {
                 path: section.path().to_owned(),
                 id: section.part_id("id"),
-                kind: read.as_ref().map(|(kind, _)| *kind),
+                kind: read.as_ref().map(|read| read.kind),
+                own: own.map(|own| own.scoring.clone()),
+                better: match read.as_ref().map(|read| read.kind) {
+                    Some(Inventory::Sus) => Some(BetterEnd::Higher),
+                    Some(Inventory::NasaTlx) => Some(BetterEnd::Lower),
+                    Some(Inventory::Own) | None => own.and_then(|own| own.better),
+                },
                 after: section.word("after").unwrap_or(Occasion::Session),
-                items: read.map_or_else(Vec::new, |read| items(&mut section, &read)),
+                items: match (&read, own) {
+                    (Some(_), Some(own)) => own_items(&mut section, own),
+                    (Some(read), None) => items(&mut section, read),
+                    (None, _) => Vec::new(),
+                },
             }
         })
         .collect()
 }
 
-/// The texts of the items, as they are asked.
-fn items(section: &mut Section<'_, '_>, (kind, system): &Read) -> Vec<(String, [String; 2])> {
+/// The items of a questionnaire of the study's own.
+fn own_items(section: &mut Section<'_, '_>, own: &RawOwn) -> Vec<Asked> {
+    let labels = section.texts("labels");
+    let labels: Vec<String> = labels.into_iter().map(|(_, text)| text).collect();
+    let n = own.items.len();
+    if ![0, 2, 2 * n].contains(&labels.len()) {
+        let what = format!(
+            "`{}.labels` has {}, not 2 or, two for each item, {}",
+            section.path(),
+            counted(labels.len(), "text", "texts"),
+            2 * n
+        );
+        section.fault_at("labels", Fault::error(what));
+    }
+    let (from, to) = (own.scoring.from, own.scoring.to);
+    let item = |(i, text): (usize, &String)| {
+        let at = if labels.len() == 2 { 0 } else { 2 * i };
+        let ends = labels.get(at).zip(labels.get(at + 1));
+        let labels = ends.map_or_else(BTreeMap::new, |(low, high)| {
+            BTreeMap::from([(from, low.clone()), (to, high.clone())])
+        });
+        let kind = QuestionKind::Rating(kinds::Rating { from, to, labels });
+        ((i + 1).to_string(), text.clone(), kind)
+    };
+    own.items.iter().enumerate().map(item).collect()
+}
+
+/// The items of a standard questionnaire, as they are asked.
+fn items(section: &mut Section<'_, '_>, read: &Read) -> Vec<Asked> {
+    let kind = read.kind;
     let texts = |section: &mut Section<'_, '_>, key: &str, needed: usize| -> Vec<String> {
         let texts: Vec<String> = section.texts(key).into_iter().map(|(_, t)| t).collect();
         if !texts.is_empty() && texts.len() != needed {
@@ -100,14 +176,16 @@ fn items(section: &mut Section<'_, '_>, (kind, system): &Read) -> Vec<(String, [
     let known = kind.items();
     let own = texts(section, "items", known.len());
     let labels = texts(section, "labels", 2);
-    let system = system.as_deref().unwrap_or("system");
+    let system = read.system.as_deref().unwrap_or("system");
     let item = |(i, item): (usize, &crate::protocol::questionnaires::Item)| {
         let prompt = own.get(i).map_or(item.prompt, String::as_str);
         let [low, high] = [(0, item.low), (1, item.high)]
-            .map(|(end, label)| labels.get(end).map_or(label, String::as_str).to_owned());
-        (prompt.replace("{system}", system), [low, high])
+            .map(|(end, label)| labels.get(end).map_or(label, String::as_str));
+        let scale = kind.scale(low, high)?;
+        let prompt = prompt.replace("{system}", system);
+        Some((item.name.to_owned(), prompt, scale))
     };
-    known.iter().enumerate().map(item).collect()
+    known.iter().enumerate().filter_map(item).collect()
 }
 
 impl PartialQuestionnaire {
@@ -122,22 +200,25 @@ impl PartialQuestionnaire {
 
     /// The measured outcome that its scores are, if there is one for each condition.
     pub(super) fn outcome(&self) -> Option<PartialOutcome> {
-        let (id, kind) = (self.id.as_ref()?, self.kind?);
-        let own = || PartialOutcome::of_questionnaire(&self.path, id, kind);
+        let scored = Scored {
+            id: self.id.clone()?,
+            kind: self.kind?,
+            own: self.own.clone(),
+        };
+        let own = || PartialOutcome::of_questionnaire(&self.path, scored, self.better);
         (self.after == Occasion::Condition).then(own)
     }
 
     /// The items as questions.
     pub(super) fn questions(&self) -> Vec<PartialQuestion> {
-        let (Some(id), Some(kind)) = (&self.id, self.kind) else {
+        let Some(id) = &self.id else {
             return Vec::new();
         };
-        let items = kind.items().iter().zip(&self.items);
-        let question = |(item, (prompt, [low, high])): (_, &(String, [String; 2]))| {
-            let name = item_id(id, item);
-            PartialQuestion::made(&self.path, name.as_str(), prompt, kind.scale(low, high))
+        let question = |(name, prompt, kind): &Asked| {
+            let name = item_id(id, name);
+            PartialQuestion::made(&self.path, name.as_str(), prompt, kind.clone())
         };
-        items.map(question).collect()
+        self.items.iter().map(question).collect()
     }
 
     pub(super) fn finish(&self) -> Option<Questionnaire> {
@@ -149,6 +230,7 @@ impl PartialQuestionnaire {
         Some(Questionnaire {
             id: self.id.clone()?,
             kind: self.kind?,
+            own: self.own.clone(),
             after: self.after,
             questions: questions.collect::<Option<_>>()?,
         })

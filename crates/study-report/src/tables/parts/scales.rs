@@ -98,6 +98,18 @@ pub(super) fn scores(results: &PartResults) -> Table {
         .notes(mean)
 }
 
+/// The scores of the subscales of a questionnaire.
+pub(super) fn subscales(results: &PartResults) -> Table {
+    let scales = results.questionnaire.iter().flat_map(|q| &q.scale);
+    Builder::new("Subscales", scales)
+        .name("subscale", "subscale", &|own| own.0.as_str().to_owned())
+        .field(column("participants", "n"), plain, |own| &own.1.n)
+        .field(column("mean", "mean"), two, |own| &own.1.mean)
+        .ends(column("95 %", "mean_ci95"), two, &|own| own.1.ci95.ends())
+        .field(column("SD", "sd"), two, |own| &own.1.sd)
+        .done()
+}
+
 /// The scores after each condition, block or part.
 pub(super) fn scores_after(results: &PartResults) -> Table {
     let after = results.questionnaire.iter().flat_map(|q| &q.after);

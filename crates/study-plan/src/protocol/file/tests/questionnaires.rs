@@ -157,6 +157,7 @@ fn what_is_asked_after_each_condition_is_not_in_the_outro_and_is_an_outcome() {
     let scored = Scored {
         id: own.id.clone(),
         kind: Inventory::NasaTlx,
+        own: None,
     };
     assert_eq!(outcome.measure, Measure::Questionnaire(scored));
 }
@@ -253,6 +254,74 @@ fn a_study_can_consist_of_questionnaires() {
             "outcomes are measured in trials, and the study has none",
         ),
         (format!("{ALONE}{question}"), "nothing to present"),
+    ] {
+        let parsed = parse("p", &text);
+        assert!(parsed.protocol.is_none(), "{text}");
+        let shown = parsed.findings.render(false);
+        assert!(shown.contains(expected), "{text}\n{shown}");
+    }
+}
+
+const OWN: &str = r#"
+[[questionnaires]]
+id = "touch"
+kind = "own"
+items = ["One.", "Two.", "Three."]
+from = 0
+to = 6
+"#;
+
+#[test]
+fn a_questionnaire_of_the_studys_own_has_its_scale_and_its_scoring() {
+    let more = "labels = [\"a\", \"b\", \"c\", \"d\", \"e\", \"f\"]\nreverse = [2]\nscales = [{ id = \"x\", items = [1, 3] }]\n";
+    let parsed = parse("p", &newer(&format!("{OWN}{more}after = \"condition\"\n")));
+    let shown = parsed.findings.render(false);
+    let protocol = parsed.protocol.unwrap_or_else(|| panic!("{shown}"));
+    let own = &protocol.questionnaires[0];
+    let scoring = own.own.as_ref().unwrap();
+    assert_eq!(scoring.counted, [1, 2, 3]);
+    assert_eq!((scoring.times, scoring.plus), (1.0, 0.0));
+    let ids: Vec<&str> = own.questions.iter().map(|q| q.id.as_str()).collect();
+    assert_eq!(ids, ["touch_1", "touch_2", "touch_3"]);
+    let QuestionKind::Rating(kinds::Rating { from, to, labels }) = &own.questions[1].kind else {
+        panic!()
+    };
+    assert_eq!((*from, *to), (0, 6));
+    assert_eq!((labels[&0].as_str(), labels[&6].as_str()), ("c", "d"));
+    // Turned round, the second answer is 6.
+    let given = [Some(6.0), Some(0.0), Some(6.0)];
+    assert_eq!(own.scored().score(&given), Some(6.0));
+    assert_eq!(protocol.outcomes[0].better, None);
+}
+
+#[test]
+fn a_faulty_scoring_is_refused() {
+    let with_key = |more: &str| newer(&format!("{OWN}{more}\n"));
+    for (text, expected) in [
+        (
+            with(OWN),
+            "`questionnaires[0].from` needs the format `study-protocol/3`",
+        ),
+        (
+            with_key("reverse = [4]"),
+            "there is no item 4: the questionnaire has 3",
+        ),
+        (
+            with_key("scales = [{ id = \"x\", items = [1, 9] }]"),
+            "there is no item 9",
+        ),
+        (
+            with_key("labels = [\"a\", \"b\", \"c\"]"),
+            "has 3 texts, not 2 or, two for each item, 6",
+        ),
+        (
+            with_key("").replace("to = 6", "to = 0"),
+            "0 to 0 is no scale of at most 101 points",
+        ),
+        (
+            with_key("").replace("items = [\"One.\", \"Two.\", \"Three.\"]\n", ""),
+            "has no `items`",
+        ),
     ] {
         let parsed = parse("p", &text);
         assert!(parsed.protocol.is_none(), "{text}");
