@@ -340,6 +340,14 @@ fn questionnaire(part: &PartAnalysis) -> Option<(String, String)> {
                  without weights (Hart, 2006), is the mean of six ratings from 0 to 100, and more is more load."
             ),
         )),
+        "nasa-tlx-weighted" => Some((
+            "weighted NASA Task Load Index".to_owned(),
+            format!(
+                "Participants filled in the NASA Task Load Index with its comparisons (Hart & Staveland, 1988) {when}; its \
+                 score is the mean of six ratings from 0 to 100, each as often as its subscale was chosen from 15 pairs, \
+                 and more is more load."
+            ),
+        )),
         "own" => Some((
             format!("questionnaire {}", part.part),
             format!(

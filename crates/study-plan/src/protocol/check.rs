@@ -136,8 +136,12 @@ fn untranslated(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
     }
     for (i, own) in protocol.questionnaires.iter().enumerate() {
         let has = |key: &str| spans.contains_key(&format!("questionnaires[{i}].{key}"));
-        let is_own = own.kind == Inventory::Own;
-        if !is_own && (!has("items") || !has("labels")) {
+        let texts: &[&str] = match own.kind {
+            Inventory::Sus | Inventory::NasaTlx => &["items", "labels"],
+            Inventory::NasaTlxWeighted => &["items", "labels", "titles", "compare"],
+            Inventory::Own => &[],
+        };
+        if !texts.iter().all(|key| has(key)) {
             faults.push(
                 Fault::warning(format!(
                     "the questionnaire `{}` is in English, and the study in `{}`",
@@ -145,7 +149,10 @@ fn untranslated(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
                     Untrusted(lang)
                 ))
                 .at(spans.get(&format!("questionnaires[{i}].id")).cloned())
-                .hint("write a published translation in `items` and `labels`"),
+                .hint(format!(
+                    "write a published translation in {}",
+                    texts.join(", ")
+                )),
             );
         }
     }

@@ -138,6 +138,7 @@ impl Measure {
             Self::Questionnaire(own) => match own.kind {
                 Inventory::Sus => "score of the System Usability Scale",
                 Inventory::NasaTlx => "raw score of the Task Load Index",
+                Inventory::NasaTlxWeighted => "weighted score of the Task Load Index",
                 Inventory::Own => return format!("score of the questionnaire {}", own.id).into(),
             },
         })

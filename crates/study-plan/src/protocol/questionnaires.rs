@@ -9,7 +9,7 @@ use super::{Answer, Order, Protocol, Question};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use study_base::text::{ModelId, PartId, QuestionId};
-use study_stats::questionnaire::{raw_tlx, sus};
+use study_stats::questionnaire::{raw_tlx, sus, weighted_tlx};
 
 /// One of `[[questionnaires]]`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -66,6 +66,8 @@ words! {
         Sus = "sus",
         /// The NASA Task Load Index without weights (Hart & Staveland 1988; Hart 2006): six ratings from 0 to 100.
         NasaTlx = "nasa-tlx",
+        /// The NASA Task Load Index with weights (Hart & Staveland 1988): the six ratings, then 15 comparisons of two subscales each.
+        NasaTlxWeighted = "nasa-tlx-weighted",
         /// One that the study brings itself, with its items and its scoring.
         Own = "own",
     }
@@ -82,6 +84,8 @@ pub struct Item {
     pub low: &'static str,
     /// Label of the highest answer.
     pub high: &'static str,
+    /// Of a comparison, the places of both among the items, from 0; the answer is 1 or 2.
+    pub pair: Option<[usize; 2]>,
 }
 
 const fn agree(name: &'static str, prompt: &'static str) -> Item {
@@ -90,6 +94,7 @@ const fn agree(name: &'static str, prompt: &'static str) -> Item {
         prompt,
         low: "strongly disagree",
         high: "strongly agree",
+        pair: None,
     }
 }
 
@@ -99,6 +104,7 @@ const fn load(name: &'static str, prompt: &'static str) -> Item {
         prompt,
         low: "very low",
         high: "very high",
+        pair: None,
     }
 }
 
@@ -160,6 +166,52 @@ const NASA_TLX: [Item; 6] = [
     ),
 ];
 
+/// The titles of these subscales.
+const TITLES: [&str; 6] = [
+    "mental demand",
+    "physical demand",
+    "time pressure",
+    "performance",
+    "effort",
+    "frustration",
+];
+
+const fn compare(name: &'static str, first: usize, second: usize) -> Item {
+    Item {
+        name,
+        prompt: "Which of the two contributed more to the workload of the task?",
+        low: TITLES[first],
+        high: TITLES[second],
+        pair: Some([first, second]),
+    }
+}
+
+/// The ratings, and all pairs of subscales: m, p, t, o (own performance), e and f. Each comes first in
+/// two or three of its five pairs.
+const NASA_TLX_WEIGHTED: [Item; 21] = [
+    NASA_TLX[0],
+    NASA_TLX[1],
+    NASA_TLX[2],
+    NASA_TLX[3],
+    NASA_TLX[4],
+    NASA_TLX[5],
+    compare("pair_mp", 0, 1),
+    compare("pair_tm", 2, 0),
+    compare("pair_mo", 0, 3),
+    compare("pair_em", 4, 0),
+    compare("pair_mf", 0, 5),
+    compare("pair_pt", 1, 2),
+    compare("pair_op", 3, 1),
+    compare("pair_pe", 1, 4),
+    compare("pair_fp", 5, 1),
+    compare("pair_to", 2, 3),
+    compare("pair_et", 4, 2),
+    compare("pair_tf", 2, 5),
+    compare("pair_oe", 3, 4),
+    compare("pair_fo", 5, 3),
+    compare("pair_ef", 4, 5),
+];
+
 impl Inventory {
     /// Its items, in their order; none of one of the study's own.
     ///
@@ -171,21 +223,27 @@ impl Inventory {
         match self {
             Self::Sus => &SUS,
             Self::NasaTlx => &NASA_TLX,
+            Self::NasaTlxWeighted => &NASA_TLX_WEIGHTED,
             Self::Own => &[],
         }
     }
 
     /// The answers to an item, with labels at both ends of its scale; `None` of one of the study's own.
-    pub fn scale(self, low: &str, high: &str) -> Option<QuestionKind> {
+    pub fn scale(self, item: &Item, low: &str, high: &str) -> Option<QuestionKind> {
         let (low, high) = (low.to_owned(), high.to_owned());
         Some(match self {
+            _ if item.pair.is_some() => QuestionKind::Rating(kinds::Rating {
+                from: 1,
+                to: 2,
+                labels: BTreeMap::from([(1, low), (2, high)]),
+            }),
             Self::Own => return None,
             Self::Sus => QuestionKind::Rating(kinds::Rating {
                 from: 1,
                 to: 5,
                 labels: BTreeMap::from([(1, low), (5, high)]),
             }),
-            Self::NasaTlx => QuestionKind::Slider(kinds::Slider {
+            Self::NasaTlx | Self::NasaTlxWeighted => QuestionKind::Slider(kinds::Slider {
                 from: 0.0,
                 to: 100.0,
                 step: 5.0,
@@ -284,6 +342,18 @@ impl Scored {
         match self.kind {
             Inventory::Sus => sus(&all?),
             Inventory::NasaTlx => raw_tlx(&all?),
+            Inventory::NasaTlxWeighted => {
+                let all = all?;
+                let items = self.kind.items().iter().zip(&all);
+                let chosen: Option<Vec<usize>> = items
+                    .filter_map(|(item, answer)| Some((item.pair?, *answer)))
+                    .map(|(pair, answer)| {
+                        let at = [1.0, 2.0].iter().position(|own| *own == answer)?;
+                        Some(pair[at])
+                    })
+                    .collect();
+                weighted_tlx(all.get(..6)?, &chosen?)
+            }
             Inventory::Own => None,
         }
     }
@@ -332,13 +402,55 @@ mod tests {
 
     #[test]
     fn every_item_of_every_questionnaire_has_an_id() {
-        for kind in [Inventory::Sus, Inventory::NasaTlx] {
+        for kind in [
+            Inventory::Sus,
+            Inventory::NasaTlx,
+            Inventory::NasaTlxWeighted,
+        ] {
             let id = PartId::new("x".repeat(20)).unwrap();
             let own = None;
             let ids = Scored { id, kind, own }.questions();
             assert_eq!(ids.len(), kind.items().len());
             assert!((1..ids.len()).all(|i| !ids[..i].contains(&ids[i])));
         }
+    }
+
+    /// Each pair of subscales is there once, and none is always the first or the second.
+    #[test]
+    fn all_pairs_of_subscales_are_compared() {
+        let items = Inventory::NasaTlxWeighted.items();
+        let pairs: Vec<[usize; 2]> = items.iter().filter_map(|item| item.pair).collect();
+        for first in 0..6 {
+            for second in first + 1..6 {
+                let both = [[first, second], [second, first]];
+                let there = pairs.iter().filter(|pair| both.contains(pair));
+                assert_eq!(there.count(), 1, "{both:?}");
+            }
+            let ahead = pairs.iter().filter(|pair| pair[0] == first).count();
+            assert!(ahead == 2 || ahead == 3, "{first}: {ahead}");
+        }
+    }
+
+    /// Who always chooses the same subscale where it is compared, and the first one elsewhere.
+    #[test]
+    fn a_weighted_score_counts_what_was_chosen() {
+        let own = Scored {
+            id: PartId::new("load").unwrap(),
+            kind: Inventory::NasaTlxWeighted,
+            own: None,
+        };
+        let ratings = [70.0, 20.0, 55.0, 30.0, 65.0, 15.0];
+        let pairs = own.kind.items().iter().filter_map(|item| item.pair);
+        let choices: Vec<usize> = pairs.map(|pair| usize::from(pair[1] == 0)).collect();
+        let mut given: Vec<Option<f64>> = ratings.map(Some).to_vec();
+        given.extend(choices.iter().map(|at| Some((at + 1) as f64)));
+        // Mental demand 5 times, as often as they come first physical demand 2, time pressure 2, performance 2,
+        // effort 2, frustration 2.
+        let expected = (5.0 * 70.0 + 2.0 * (20.0 + 55.0 + 30.0 + 65.0 + 15.0)) / 15.0;
+        let found = own.score(&given).unwrap();
+        assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+        given[20] = Some(3.0);
+        assert_eq!(own.score(&given), None);
     }
 
     #[test]

@@ -38,6 +38,9 @@ struct Read {
     kind: Inventory,
     /// The word for what is judged.
     system: Option<String>,
+    /// What is asked of two subscales, and their titles.
+    compare: Option<String>,
+    titles: Vec<String>,
     own: Option<RawOwn>,
 }
 
@@ -46,6 +49,8 @@ impl Read {
         Self {
             kind,
             system,
+            compare: None,
+            titles: Vec::new(),
             own: None,
         }
     }
@@ -54,7 +59,7 @@ impl Read {
 /// An item: the end of its id, its text and its answers.
 type Asked = (String, String, QuestionKind);
 
-const KINDS: [Variant<Read>; 3] = [
+const KINDS: [Variant<Read>; 4] = [
     Variant::new(
         "sus",
         "The System Usability Scale (Brooke 1996), free to use where the source is named.",
@@ -77,6 +82,27 @@ const KINDS: [Variant<Read>; 3] = [
         |_| Some(Read::standard(Inventory::NasaTlx, None)),
     ),
     Variant::new(
+        "nasa-tlx-weighted",
+        "The NASA Task Load Index with weights (Hart & Staveland 1988): six ratings, and 15 comparisons of two subscales, which give the \
+         weights. Asked after each condition, both are asked each time.",
+        keys! {
+            /// The six items in other words or in another language, in their order.
+            "items": Kind::Texts(1), r#"["Wie hoch war die geistige Anforderung?", "…", "…", "…", "…", "…"]"#, derived("those of the source, in English");
+            /// What is asked of two subscales.
+            "compare": Kind::Text, r#""Was hat mehr zur Belastung beigetragen?""#, derived("in English");
+            /// The titles of the six subscales in another language, in the order of the items.
+            "titles": Kind::Texts(1), r#"["geistige Anforderung", "…", "…", "…", "…", "…"]"#, derived("in English");
+        },
+        |section| {
+            let titles = section.texts("titles");
+            Some(Read {
+                compare: section.text("compare"),
+                titles: titles.into_iter().map(|(_, text)| text).collect(),
+                ..Read::standard(Inventory::NasaTlxWeighted, None)
+            })
+        },
+    ),
+    Variant::new(
         "own",
         "A questionnaire that the study brings itself, with its items and its scoring: one of the laboratory, or one whose terms do not let \
          a program have its text. Needs the format `study-protocol/3`.",
@@ -84,9 +110,8 @@ const KINDS: [Variant<Read>; 3] = [
         |section| {
             let own = scoring::read(section)?;
             Some(Read {
-                kind: Inventory::Own,
-                system: None,
                 own: Some(own),
+                ..Read::standard(Inventory::Own, None)
             })
         },
     ),
@@ -117,7 +142,7 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Vec<PartialQuestionnaire> {
                 own: own.map(|own| own.scoring.clone()),
                 better: match read.as_ref().map(|read| read.kind) {
                     Some(Inventory::Sus) => Some(BetterEnd::Higher),
-                    Some(Inventory::NasaTlx) => Some(BetterEnd::Lower),
+                    Some(Inventory::NasaTlx | Inventory::NasaTlxWeighted) => Some(BetterEnd::Lower),
                     Some(Inventory::Own) | None => own.and_then(|own| own.better),
                 },
                 after: section.word("after").unwrap_or(Occasion::Session),
@@ -174,14 +199,28 @@ fn items(section: &mut Section<'_, '_>, read: &Read) -> Vec<Asked> {
         texts
     };
     let known = kind.items();
-    let own = texts(section, "items", known.len());
+    let rated = known.iter().filter(|item| item.pair.is_none()).count();
+    let own = texts(section, "items", rated);
     let labels = texts(section, "labels", 2);
+    let titles = &read.titles;
+    if !titles.is_empty() && titles.len() != rated {
+        let what = format!(
+            "`{}.titles` has {}, not {rated}",
+            section.path(),
+            counted(titles.len(), "text", "texts")
+        );
+        section.fault_at("titles", Fault::error(what));
+    }
     let system = read.system.as_deref().unwrap_or("system");
     let item = |(i, item): (usize, &crate::protocol::questionnaires::Item)| {
-        let prompt = own.get(i).map_or(item.prompt, String::as_str);
-        let [low, high] = [(0, item.low), (1, item.high)]
-            .map(|(end, label)| labels.get(end).map_or(label, String::as_str));
-        let scale = kind.scale(low, high)?;
+        let (prompt, ends) = match item.pair {
+            None => (own.get(i), [labels.first(), labels.get(1)]),
+            Some(pair) => (read.compare.as_ref(), pair.map(|at| titles.get(at))),
+        };
+        let prompt = prompt.map_or(item.prompt, String::as_str);
+        let low = ends[0].map_or(item.low, String::as_str);
+        let high = ends[1].map_or(item.high, String::as_str);
+        let scale = kind.scale(item, low, high)?;
         let prompt = prompt.replace("{system}", system);
         Some((item.name.to_owned(), prompt, scale))
     };

@@ -217,6 +217,35 @@ fn nothing_is_asked_after_what_has_no_end() {
     assert!(parse("p", &once).protocol.is_some());
 }
 
+#[test]
+fn subscales_are_compared_by_their_titles() {
+    let weighted = r#"
+[[questionnaires]]
+id = "load"
+kind = "nasa-tlx-weighted"
+compare = "Was mehr?"
+titles = ["a", "b", "c", "d", "e", "f"]
+"#;
+    let parsed = parse("p", &with(weighted));
+    let shown = parsed.findings.render(false);
+    let protocol = parsed.protocol.unwrap_or_else(|| panic!("{shown}"));
+    assert_eq!(protocol.outro.len(), 1 + 21);
+    let second = &protocol.outro[8];
+    assert_eq!(second.id.as_str(), "load_pair_tm");
+    assert_eq!(second.prompt, "Was mehr?");
+    let QuestionKind::Rating(kinds::Rating { from, to, labels }) = &second.kind else {
+        panic!()
+    };
+    assert_eq!((*from, *to), (1, 2));
+    assert_eq!((labels[&1].as_str(), labels[&2].as_str()), ("c", "a"));
+    let few = weighted.replace(", \"f\"", "");
+    let shown = parse("p", &with(&few)).findings.render(false);
+    assert!(
+        shown.contains("`questionnaires[0].titles` has 5 texts, not 6"),
+        "{shown}"
+    );
+}
+
 const ALONE: &str = r#"
 format = "study-protocol/3"
 study = { id = "s", title = "t", seed = 1 }
