@@ -67,6 +67,194 @@ fn questionnaires_are_answered_scored_and_reported() {
     );
 }
 
+const BETWEEN: &str = r#"
+[[questionnaires]]
+id = "load"
+kind = "nasa-tlx"
+after = "condition"
+
+[[questionnaires]]
+id = "usability"
+kind = "sus"
+after = "block"
+"#;
+
+const ITEMS: [&str; 6] = [
+    "load_mental",
+    "load_physical",
+    "load_temporal",
+    "load_performance",
+    "load_effort",
+    "load_frustration",
+];
+
+/// Scores after each realization are those of its rows, and are compared as a measured outcome; those after
+/// a block are described.
+#[test]
+fn scores_between_the_trials_are_those_of_their_conditions() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        let (code, out, err) = study(arguments, folder.path());
+        assert_eq!(code, 0, "{out}{err}");
+        out
+    };
+    run(&["new", "--seed", "20261128", "s"]);
+    let path = folder.path().join("s/protocol.toml");
+    let protocol = fs::read_to_string(&path).unwrap();
+    let protocol = protocol.replace("study-protocol/1", "study-protocol/3") + BETWEEN;
+    fs::write(&path, protocol).unwrap();
+    run(&["rehearse", "s", "--participants", "4", "--out", "out"]);
+    run(&["verify", "out"]);
+    let document = analyzed(folder.path());
+    let mut columns = vec!["model", "practice"];
+    columns.extend(ITEMS);
+    let rows = cells(&folder.path().join("out/s/ratings.csv"), &columns);
+    let [load, usability] = [0, 1].map(|i| &document["parts"][i]["values"]);
+    let near = |found: &Value, expected: f64| {
+        let found = found.as_f64().unwrap();
+        assert!((found - expected).abs() < 1e-9, "{found} {expected}");
+    };
+    for model in ["lambda-0.9991", "lambda-0.9995", "lambda-0.9999"] {
+        let own = rows
+            .iter()
+            .filter(|row| row[0] == model && row[1] == "false");
+        let scores: Vec<f64> = own
+            .map(|row| {
+                row[2..]
+                    .iter()
+                    .map(|x| x.parse::<f64>().unwrap())
+                    .sum::<f64>()
+                    / 6.0
+            })
+            .collect();
+        // Four participants, three blocks.
+        assert_eq!(scores.len(), 12);
+        let mean = scores.iter().sum::<f64>() / 12.0;
+        let values = &document["values"];
+        near(&values[format!("outcomes/load/desc/{model}/mean")], mean);
+        near(&load[format!("questionnaire/after/{model}/mean")], mean);
+    }
+    assert_eq!(document["values"]["outcomes/load/n_missing"], 0.0);
+    let p = document["values"]["outcomes/load/differ/p"].as_f64();
+    assert!(p.is_some_and(|p| (0.0..=1.0).contains(&p)), "{p:?}");
+    assert_eq!(usability["questionnaire/after/3/n"], 4.0);
+    assert!(document["values"]["outcomes/usability/n"].is_null());
+    run(&["analyze", "out"]);
+    let analysis = folder.path().join("out/s/analysis");
+    let report = fs::read_to_string(analysis.join("report.html")).unwrap();
+    for said in [
+        "raw score of the Task Load Index",
+        "(Hart &amp; Staveland, 1988) after each realization",
+        "(Brooke, 1996) after each block",
+        "Scores between the trials",
+    ] {
+        assert!(report.contains(said), "{said}");
+    }
+    assert!(analysis.join("part_scores_after.csv").is_file());
+    let to_csv = ["export", "out/s", "--to", "csv", "--out", "e"];
+    run(&[to_csv.as_slice(), ["--include", "simulated"].as_slice()].concat());
+    let dictionary = fs::read_to_string(folder.path().join("e/dictionary.csv")).unwrap();
+    assert!(
+        dictionary.contains("load_mental")
+            && dictionary.contains("How mentally demanding was the task?")
+    );
+    let outcomes = run(&["analyze", "out", "--question", "load"]);
+    assert!(outcomes.contains("load"), "{outcomes}");
+}
+
+/// The items and the scales of a questionnaire of the study's own, from the answers of each participant.
+#[test]
+fn a_questionnaire_of_the_studys_own_is_scored() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        let (code, out, err) = study(arguments, folder.path());
+        assert_eq!(code, 0, "{out}{err}");
+        out
+    };
+    let own = ALONE
+        .replace("study-protocol/1", "study-protocol/3")
+        .replace("primary = \"sus\"", "primary = \"touch\"")
+        .replace(
+            "id = \"sus\"\nkind = \"sus\"",
+            r#"id = "touch"
+kind = "own"
+items = ["One.", "Two.", "Three."]
+from = 0
+to = 6
+reverse = [2]
+total = "sum"
+times = 2.0
+scales = [{ id = "outer", items = [1, 3], times = 0.5 }]"#,
+        );
+    fs::create_dir(folder.path().join("q")).unwrap();
+    fs::write(folder.path().join("q/protocol.toml"), own).unwrap();
+    run(&["rehearse", "q", "--participants", "5", "--out", "out"]);
+    run(&["verify", "out"]);
+    let document = analyzed(folder.path());
+    let values = &document["parts"][0]["values"];
+    let table = folder.path().join("out/alone/participants.csv");
+    let columns = ["participant", "touch_1", "touch_2", "touch_3"];
+    let mut outer = 0.0;
+    for row in cells(&table, &columns) {
+        let x: Vec<f64> = row[1..].iter().map(|x| x.parse().unwrap()).collect();
+        let score = 2.0 * (x[0] + 6.0 - x[1] + x[2]);
+        assert_eq!(values[format!("questionnaire/score/{}", row[0])], score);
+        outer += 0.5 * (x[0] + x[2]) / 5.0;
+    }
+    let found = values["questionnaire/scale/outer/mean"].as_f64().unwrap();
+    assert!((found - outer).abs() < 1e-9, "{found} {outer}");
+    run(&["analyze", "out"]);
+    let analysis = folder.path().join("out/alone/analysis");
+    assert!(analysis.join("part_subscales.csv").is_file());
+}
+
+const ALONE: &str = r#"
+format = "study-protocol/1"
+study = { id = "alone", title = "Usability of a switch", seed = 1 }
+design = { participants = 3 }
+device = { kind = "manual" }
+analysis = { primary = "sus" }
+[[questionnaires]]
+id = "sus"
+kind = "sus"
+"#;
+
+/// Nothing is presented: there are no trials, and the scores are the result.
+#[test]
+fn a_study_can_consist_of_questionnaires() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        let (code, out, err) = study(arguments, folder.path());
+        assert_eq!(code, 0, "{out}{err}");
+        out
+    };
+    fs::create_dir(folder.path().join("q")).unwrap();
+    fs::write(folder.path().join("q/protocol.toml"), ALONE).unwrap();
+    run(&["check", "q"]);
+    assert!(run(&["schedule", "q"]).contains("only asks questionnaires"));
+    run(&["rehearse", "q", "--participants", "3", "--out", "out"]);
+    run(&["verify", "out"]);
+    let document = analyzed(folder.path());
+    assert_eq!(document["format"], "study-parts/1");
+    let part = &document["parts"][0];
+    assert_eq!((&part["task"], &part["trials"]), (&"sus".into(), &3.into()));
+    assert_eq!(part["values"]["questionnaire/n"], 3.0);
+    let out = run(&["analyze", "out"]);
+    assert!(out.contains("sus, 3 scores, 3 participants"), "{out}");
+    run(&[
+        "export",
+        "out/alone",
+        "--to",
+        "csv",
+        "--out",
+        "e",
+        "--include",
+        "simulated",
+    ]);
+    let answers = cells(&folder.path().join("e/participants.csv"), &["sus_1"]);
+    assert_eq!(answers.len(), 3);
+}
+
 #[test]
 fn magnitudes_of_realizations_are_estimated_and_compared() {
     let folder = tempfile::tempdir().unwrap();

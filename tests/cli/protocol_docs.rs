@@ -57,6 +57,7 @@ fn page() -> String {
             Kind::Variants(variants) => {
                 let _ = writeln!(out, "\n## `[[{}]]`\n\n{}", key.name, key.effect);
                 alternatives(&mut out, variants);
+                words(&mut out, variants.common);
                 nested(&mut out, key.name, variants.common);
                 below(&mut out, key.name, variants);
             }

@@ -122,6 +122,26 @@ impl Channel {
         }
     }
 
+    /// Leaves a session at the first page of a questionnaire between the trials, where the channel tells one page from another.
+    fn leave_a_questionnaire(self, folder: &Path, protocol: &Path) {
+        match self {
+            Self::Terminal => {
+                let run = ["run", protocol.to_str().unwrap(), "--operator", "lw"];
+                let mut terminal = Terminal::start(&run, folder, 24, 80);
+                play_until(&mut terminal, "P01", "Was it heavy?");
+                terminal.signal("KILL");
+            }
+            Self::Plain => {}
+            Self::Page => {
+                let mut session = Session::opened(folder, protocol, &[]);
+                let asks = |page: &Value| page["questions"][0]["id"] == "load_1";
+                session.browser.play("a questionnaire", asks);
+                session.child.kill().unwrap();
+                session.child.wait().unwrap();
+            }
+        }
+    }
+
     /// Begins or resumes a session and plays to the end.
     fn end(self, folder: &Path, protocol: &Path, more: &[&str]) {
         let run = [&["run", protocol.to_str().unwrap()][..], more].concat();
@@ -261,6 +281,43 @@ fn what_was_felt_too_long_ago_is_felt_again_on_every_channel() {
         let ratings = std::fs::read_to_string(ratings).unwrap();
         assert!(ratings.contains("felt_again_after_s"), "{ratings}");
         assert_eq!(crate::screen::rated(&ratings), 5, "{ratings}");
+    }
+}
+
+const BETWEEN: &str = r#"
+[[questionnaires]]
+id = "load"
+kind = "own"
+after = "condition"
+items = ["Was it heavy?", "Was it rough?"]
+from = 1
+to = 7
+
+[analysis]"#;
+
+/// Both items after each of five realizations, none twice, also of a session that was killed at the first of them.
+#[test]
+fn questionnaires_between_the_trials_are_answered_on_every_channel() {
+    for channel in EVERY {
+        let folder = tempfile::tempdir().unwrap();
+        let protocol = folder.path().join("paper");
+        let changes = [
+            PATIENT,
+            ("repetitions = 3", "repetitions = 1"),
+            ("study-protocol/1", "study-protocol/3"),
+            ("\n[analysis]", BETWEEN),
+        ];
+        changed_protocol("turn-signal", &protocol, &changes);
+        channel.leave_a_questionnaire(folder.path(), &protocol);
+        channel.end(folder.path(), &protocol, &[]);
+        let (code, out, err) = study(&["verify", "results"], folder.path());
+        assert_eq!(code, 0, "{channel:?}: {out}{err}");
+        let events = events(folder.path());
+        let between = |e: &&Value| e["event"] == "answered" && e["place"]["after"].is_object();
+        assert_eq!(events.iter().filter(between).count(), 10, "{channel:?}");
+        let ratings = folder.path().join("results/turn-signal/ratings.csv");
+        let ratings = std::fs::read_to_string(ratings).unwrap();
+        assert!(ratings.contains("load_1,load_2"), "{ratings}");
     }
 }
 

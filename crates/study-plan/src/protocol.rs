@@ -39,6 +39,7 @@ pub mod relative;
 pub mod rules;
 pub mod scale;
 pub mod schema;
+pub mod scoring;
 mod section;
 pub mod similarity;
 pub mod spaces;
@@ -61,11 +62,12 @@ pub use parts::{
 pub use plan::{Seat, Stimuli, Trial};
 pub use presentations::{Magnitude, Mushra, Presentations, Standard};
 pub use question::Question;
-pub use questionnaires::{Inventory, Questionnaire};
+pub use questionnaires::{Inventory, Occasion, Questionnaire, Scored};
 pub use ranking::Ranking;
 pub use relative::Relative;
 pub use rules::Exclusion;
 pub use scale::Scale;
+pub use scoring::{Scoring, Subscale, Total};
 pub use similarity::Similarity;
 pub use spaces::{Axis, SearchTask, SpaceRules};
 
@@ -113,7 +115,7 @@ pub struct Protocol {
     pub setup: Vec<Question>,
     /// `[[intake]]`, asked of the participant once.
     pub intake: Vec<Question>,
-    /// `[[outro]]` and the items of the questionnaires, asked of the participant at the end.
+    /// `[[outro]]` and the items of the questionnaires after it, asked of the participant at the end.
     pub outro: Vec<Question>,
     /// `[[questionnaires]]`
     #[serde(skip_serializing_if = "Vec::is_empty")]

@@ -33,7 +33,8 @@ pub use crate::protocol::{Seat, Trial};
 pub use requeue::{Felt, Requeued, breaks_constraint, requeue};
 
 use crate::protocol::{
-    Drawn, FileOrders, Identification, Magnitude, Mushra, PartsOrder, Protocol, Stimuli, Task,
+    Drawn, FileOrders, Identification, Magnitude, Mushra, Occasion, Order, PartsOrder, Protocol,
+    Stimuli, Task,
 };
 use constraints::Violation;
 use pairs::PairOrders;
@@ -166,6 +167,18 @@ pub enum ScheduleError {
         /// `repetitions`
         expected: u32,
     },
+    /// A row of the file comes back to a realization after which a questionnaire was to be asked.
+    #[error(
+        "the file of orders, row {row}, position {position}: `{model}` comes again after others, and a questionnaire is asked after each condition"
+    )]
+    Interleaved {
+        /// Row of the file.
+        row: u32,
+        /// Position in it, from 1.
+        position: usize,
+        /// The realization.
+        model: ModelId,
+    },
 }
 
 impl ScheduleError {
@@ -186,6 +199,9 @@ impl ScheduleError {
                 Some("use the ids of [[models]] whose role is not practice")
             }
             Self::TooLong { .. } => Some("lower repetitions"),
+            Self::Interleaved { .. } => Some(
+                "bring the trials of each realization together, or take order = \"blocked\", which asks in each block",
+            ),
             Self::NoRealizations
             | Self::NoRepetitions
             | Self::SeatZero(_)
@@ -273,6 +289,17 @@ impl Planner {
     pub fn new(protocol: &Protocol, orders: Option<&FileOrders>) -> Result<Self, ScheduleError> {
         let seed = protocol.study.seed;
         let parts_order = protocol.design.parts_order;
+        if let (Order::File(_), Some(orders)) = (&protocol.design.order, orders)
+            && (protocol.questionnaires.iter()).any(|own| own.after == Occasion::Condition)
+        {
+            orders.iter().try_for_each(together)?;
+        }
+        if protocol.only_asks() {
+            return Ok(Self {
+                parts_order,
+                parts: Vec::new(),
+            });
+        }
         if protocol.parts.is_empty() {
             let models = protocol.scheduled_models().map(|m| m.id.clone()).collect();
             let only = PartOrders {
@@ -501,6 +528,22 @@ impl PartOrders {
             }
         };
         (0..rounds).flat_map(round).collect()
+    }
+}
+
+/// Checks that a row of the file of orders has the trials of each realization one after another.
+fn together((row, models): (&u32, &Vec<ModelId>)) -> Result<(), ScheduleError> {
+    let comes_again = |at: &usize| {
+        let (before, model) = (&models[..*at], &models[*at]);
+        before.last() != Some(model) && before.contains(model)
+    };
+    match (0..models.len()).find(comes_again) {
+        None => Ok(()),
+        Some(at) => Err(ScheduleError::Interleaved {
+            row: *row,
+            position: at + 1,
+            model: models[at].clone(),
+        }),
     }
 }
 

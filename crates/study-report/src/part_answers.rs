@@ -8,6 +8,7 @@ use study_analysis::analyze::psychophysics::{LevelData, PartAnalysis, PartFindin
 use study_analysis::analyze::results::{Interval, Number as _, Stat};
 use study_analysis::analyze::{Pair, Verdict};
 use study_base::text::counted;
+use study_plan::protocol::Occasion;
 use study_stats::psychometric::{Core, Spacing};
 
 /// The most pairs that a sentence lists.
@@ -350,17 +351,37 @@ fn scores(part: &PartAnalysis) -> Option<String> {
 }
 
 /// The name of a questionnaire, and how it is scored.
-fn questionnaire(part: &PartAnalysis) -> Option<(&'static str, &'static str)> {
+fn questionnaire(part: &PartAnalysis) -> Option<(String, String)> {
+    let when = part.data.between.unwrap_or(Occasion::Session).when();
     match part.task {
         "sus" => Some((
-            "System Usability Scale",
-            "Participants filled in the System Usability Scale (Brooke, 1996) at the end; its score goes from 0 to \
-             100, and more is better.",
+            "System Usability Scale".to_owned(),
+            format!(
+                "Participants filled in the System Usability Scale (Brooke, 1996) {when}; its score goes from 0 to \
+                 100, and more is better."
+            ),
         )),
         "nasa-tlx" => Some((
-            "raw NASA Task Load Index",
-            "Participants filled in the NASA Task Load Index (Hart & Staveland, 1988) at the end; its raw score, \
-             without weights (Hart, 2006), is the mean of six ratings from 0 to 100, and more is more load.",
+            "raw NASA Task Load Index".to_owned(),
+            format!(
+                "Participants filled in the NASA Task Load Index (Hart & Staveland, 1988) {when}; its raw score, \
+                 without weights (Hart, 2006), is the mean of six ratings from 0 to 100, and more is more load."
+            ),
+        )),
+        "nasa-tlx-weighted" => Some((
+            "weighted NASA Task Load Index".to_owned(),
+            format!(
+                "Participants filled in the NASA Task Load Index with its comparisons (Hart & Staveland, 1988) {when}; its \
+                 score is the mean of six ratings from 0 to 100, each as often as its subscale was chosen from 15 pairs, \
+                 and more is more load."
+            ),
+        )),
+        "own" => Some((
+            format!("questionnaire {}", part.part),
+            format!(
+                "Participants filled in the questionnaire {} {when}; its items and its scoring are in the protocol.",
+                part.part
+            ),
         )),
         _ => None,
     }
@@ -427,7 +448,7 @@ pub(super) fn methods(part: &PartAnalysis) -> String {
         });
     }
     if let Some((_, how)) = questionnaire(part) {
-        text.push(how.to_owned());
+        text.push(how);
     }
     if over.identification.is_some() {
         text.push(

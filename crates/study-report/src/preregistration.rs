@@ -18,8 +18,8 @@ use study_plan::protocol::pairs::IntervalOrder;
 use study_plan::protocol::parts::{Part, Task, TrackRules};
 use study_plan::protocol::presentations::{Presentations, Standard};
 use study_plan::protocol::{
-    Assign, Drawn, Feedback, Identification, Order, Protocol, Question, Role, Scale, SessionPlan,
-    Unfinished,
+    Assign, Drawn, Feedback, Identification, Occasion, Order, Protocol, Question, Questionnaire,
+    Role, Scale, SessionPlan, Unfinished,
 };
 
 /// The document for people.
@@ -241,7 +241,8 @@ fn text(raw: &str) -> String {
 fn design(c: &Content<'_>) -> Vec<String> {
     let (d, p) = (c.document, c.protocol);
     let people = counted(d.participants as usize, "participant", "participants");
-    let mut lines = vec![match p.parts.is_empty() {
+    let only = p.only_asks();
+    let mut lines = vec![match p.parts.is_empty() && !only {
         true => format!(
             "{people}, {} of each realization.",
             counted(p.design.repetitions as usize, "repetition", "repetitions")
@@ -261,11 +262,11 @@ fn design(c: &Content<'_>) -> Vec<String> {
         };
         let parts = s.parts.iter().flatten().map(|id| format!("`{id}`"));
         let parts: Vec<String> = parts.collect();
-        let only = match parts.is_empty() {
+        let with = match parts.is_empty() {
             true => String::new(),
             false => format!(" with {}", parts.join(", ")),
         };
-        format!("`{}`{only}{gap}", s.id)
+        format!("`{}`{with}{gap}", s.id)
     };
     let sessions: Vec<String> = p.sessions.iter().map(session).collect();
     if !sessions.is_empty() {
@@ -317,9 +318,19 @@ fn design(c: &Content<'_>) -> Vec<String> {
     for part in &p.parts {
         lines.push(format!("Part `{}`: {}.", part.id, trials(p, part)));
     }
+    let told = |own: &&Questionnaire| only || own.after != Occasion::Session;
+    for own in p.questionnaires.iter().filter(told) {
+        lines.push(format!(
+            "Questionnaire `{}` ({}): {}.",
+            own.id,
+            own.kind.as_str(),
+            own.after.when()
+        ));
+    }
     lines.extend(c.tracks.iter().map(|track| text(track)));
     let seed = p.study.seed;
     lines.push(match p.parts.is_empty() {
+        true if only => "Nothing is presented: there are no trials.".to_owned(),
         true => format!(
             "Order of the trials: {}; all orders follow from the seed {seed} (`study schedule`).",
             order(&p.design.order)

@@ -26,6 +26,7 @@
 //! [`Input::DeviceLoaded`] for it may follow.
 
 mod away;
+mod between;
 mod failures;
 mod flow;
 mod forms;

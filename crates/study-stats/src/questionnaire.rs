@@ -31,6 +31,16 @@ pub fn raw_tlx(ratings: &[f64]) -> Option<f64> {
     describe::mean(ratings)
 }
 
+/// The score of the NASA Task Load Index with weights (Hart & Staveland 1988): the mean of its six ratings
+/// from 0 to 100, each as often as its subscale was chosen in the comparisons of all 15 pairs. `chosen` has
+/// the place of the chosen one, from 0. `None` if ratings or comparisons are missing or not on the scale.
+pub fn weighted_tlx(ratings: &[f64], chosen: &[usize]) -> Option<f64> {
+    raw_tlx(ratings)?;
+    let each = |at: &usize| ratings.get(*at).copied();
+    let weighted: Option<Vec<f64>> = chosen.iter().map(each).collect();
+    describe::mean(&weighted?).filter(|_| chosen.len() == 15)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -60,5 +70,19 @@ mod tests {
         );
         assert_eq!(raw_tlx(&[70.0, 20.0, 55.0, 30.0, 65.0]), None);
         assert_eq!(raw_tlx(&[101.0; 6]), None);
+    }
+
+    /// Who always prefers the earlier subscale gives the weights 5 to 0.
+    #[test]
+    fn the_weights_are_how_often_a_subscale_was_chosen() {
+        let chosen = [0, 0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 3, 3, 4];
+        let ratings = [70.0, 20.0, 55.0, 30.0, 65.0, 15.0];
+        let expected = (5.0 * 70.0 + 4.0 * 20.0 + 3.0 * 55.0 + 2.0 * 30.0 + 65.0) / 15.0;
+        let found = weighted_tlx(&ratings, &chosen).unwrap();
+        assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+        assert_eq!(weighted_tlx(&[40.0; 6], &chosen), Some(40.0));
+        assert_eq!(weighted_tlx(&ratings, &chosen[1..]), None);
+        assert_eq!(weighted_tlx(&ratings[1..], &chosen), None);
+        assert_eq!(weighted_tlx(&ratings, &[6; 15]), None);
     }
 }

@@ -13,7 +13,7 @@ use super::record::{Interval, Number as _, OutcomeName, RealizationName, Stat};
 use super::results::{AdjustedCells, FactorialTests};
 use super::warning::Warning;
 use super::{Better, Rules, effects, factorial, outcome_model};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use study_base::text::counted;
 use study_plan::protocol::{BetterEnd, Measure, OutcomeRules, Transform};
 use study_session::outcome::ratings::{Measured, Ratings};
@@ -87,7 +87,7 @@ fn one(
         // They speak of ratings.
         finding.caveats.clear();
     }
-    let counts = Counts::of(used, own, transform);
+    let counts = Counts::of(used, own, outcome);
     let has_factors = tests.is_some();
     // Of the numbers themselves, also where their logarithms are compared.
     let numbers: Vec<(usize, f64)> = trials(used, own)
@@ -165,23 +165,39 @@ fn paired(time: &CellMeans, other: &CellMeans) -> OutcomePair {
     }
 }
 
-/// Trials with a rating.
+/// Trials with a rating. A questionnaire is not asked in every trial: where it is missing, it has no score
+/// in any trial of a participant and realization.
 struct Counts {
     measured: usize,
     missing: usize,
+    /// Of how many it could be missing.
+    asked: usize,
     left_out: usize,
 }
 
 impl Counts {
-    fn of(used: &Ratings, own: &Measured, transform: Transform) -> Self {
-        let values: Vec<Option<f64>> = trials(used, own).map(|(_, value)| value).collect();
-        let measured = values.iter().flatten();
+    fn of(used: &Ratings, own: &Measured, outcome: &OutcomeRules) -> Self {
+        let values: Vec<(usize, Option<f64>)> = trials(used, own).collect();
+        let measured: Vec<f64> = values.iter().filter_map(|trial| trial.1).collect();
+        let (asked, with) = match &outcome.measure {
+            Measure::Questionnaire(_) => {
+                let cell =
+                    |trial: &(usize, Option<f64>)| (used.subject[trial.0], used.model[trial.0]);
+                let all: BTreeSet<_> = values.iter().map(cell).collect();
+                let scored = values.iter().filter(|trial| trial.1.is_some());
+                let with: BTreeSet<_> = scored.map(cell).collect();
+                (all.len(), with.len())
+            }
+            Measure::Clock(_) | Measure::Telemetry(_) | Measure::Answers(_) => {
+                (values.len(), measured.len())
+            }
+        };
+        let left_out = |x: &&f64| outcome.transform.apply(**x).is_none();
         Self {
-            missing: values.len() - measured.clone().count(),
-            left_out: (measured.clone())
-                .filter(|x| transform.apply(**x).is_none())
-                .count(),
-            measured: measured.count(),
+            missing: asked - with,
+            asked,
+            left_out: measured.iter().filter(left_out).count(),
+            measured: measured.len(),
         }
     }
 }
@@ -345,17 +361,23 @@ fn order(means: &AdjustedCells, better: Option<BetterEnd>) -> Vec<String> {
 
 fn caveats(counts: &Counts, design: Design, outcome: &OutcomeRules) -> Vec<Warning> {
     let mut found = Vec::new();
-    let all = counts.measured + counts.missing;
+    let all = counts.asked;
     let many = |n: usize| n as f64 > MANY_MISSING * all as f64;
+    let of = match &outcome.measure {
+        Measure::Questionnaire(_) => counted(
+            all,
+            "realization of a participant",
+            "realizations of the participants",
+        ),
+        Measure::Clock(_) | Measure::Telemetry(_) | Measure::Answers(_) => {
+            counted(all, "trial", "trials")
+        }
+    };
     let mut tell = |code: &'static str, text: String| found.push(Warning { code, text });
     if many(counts.missing) {
         tell(
             "outcome-missing",
-            format!(
-                "it was not measured in {} of {}",
-                counts.missing,
-                counted(all, "trial", "trials")
-            ),
+            format!("it was not measured in {} of {of}", counts.missing),
         );
     }
     if counts.left_out > 0 {

@@ -161,7 +161,7 @@ fn modeled(protocol: &Protocol) -> Vec<(&OutcomeRules, &str)> {
     fn column(outcome: &OutcomeRules) -> Option<&str> {
         match (&outcome.measure, outcome.model?) {
             // R's glmer does not maximize the likelihood of gamma.
-            (_, OutcomeFamily::Gamma) | (Measure::Clock(_), _) => None,
+            (_, OutcomeFamily::Gamma) | (Measure::Clock(_) | Measure::Questionnaire(_), _) => None,
             (Measure::Telemetry(what), _) => (*what == Telemetry::Strokes).then_some("strokes"),
             (Measure::Answers(answers), _) => answers.questions.first().map(QuestionId::as_str),
         }

@@ -38,7 +38,9 @@ pub(super) fn methods(job: &Job<'_>) -> String {
         ),
         protocol.design.participants
     );
-    if protocol.parts.is_empty() {
+    if protocol.only_asks() {
+        text += " Nothing was presented.";
+    } else if protocol.parts.is_empty() {
         let felt = protocol.scheduled_models().count();
         text += &format!(
             " Each felt {} {}, in an order that is {}.",
@@ -123,7 +125,7 @@ pub(super) fn methods(job: &Job<'_>) -> String {
         };
         text += &format!(" Part {}: {task}.", part.id);
     }
-    for question in &protocol.questions {
+    for question in protocol.questions.iter().chain(protocol.between()) {
         let scale = match question.kind.scale() {
             Scale::Levels { from, to, labels } => {
                 let labels: Vec<String> =

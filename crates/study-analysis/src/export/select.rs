@@ -33,13 +33,21 @@ pub(super) fn is_age(question: &str) -> bool {
 pub(super) fn select(source: &Source<'_>, options: &Options) -> Result<Selected, ExportError> {
     let of_them = |r: &&RatingRow| Origin::of(r.simulated, r.pilot) == options.whose;
     let theirs: Vec<&RatingRow> = source.rows.iter().filter(of_them).collect();
-    let ids: BTreeSet<&ParticipantId> = theirs.iter().map(|r| &r.participant).collect();
+    // A study that only asks questionnaires has no trials.
+    let answered = |p: &&ParticipantRow| {
+        let whose = Origin::of(p.simulated, p.pilot);
+        source.protocol.only_asks() && whose == options.whose && !p.answers.is_empty()
+    };
+    let asked: Vec<&ParticipantRow> = source.participants.iter().filter(answered).collect();
+    let ids: BTreeSet<&ParticipantId> = (theirs.iter().map(|r| &r.participant))
+        .chain(asked.iter().map(|p| &p.participant))
+        .collect();
     let ids = renamed(&ids, options, source.secrets);
     let mut rows: Vec<RatingRow> = (theirs.into_iter())
         .filter(|r| options.practice || !r.practice)
         .cloned()
         .collect();
-    if rows.is_empty() {
+    if rows.is_empty() && asked.is_empty() {
         return Err(ExportError::Nobody(options.whose));
     }
     let place = |p: &ParticipantId, session: u32, trial: u32| (p.clone(), session, trial);

@@ -5,7 +5,7 @@ use super::table::{Field, Table, Type};
 use super::{ExportError, Format, Job, readme, telemetry};
 use std::collections::BTreeMap;
 use study_base::text::{ParticipantId, QuestionId};
-use study_plan::protocol::Question;
+use study_plan::protocol::{Occasion, Question, Questionnaire};
 use study_session::outcome::cell::Cell;
 use study_session::outcome::{RatingRow, Status};
 
@@ -119,9 +119,11 @@ fn side_by_side<'a>(job: &Job<'a>) -> Result<Table<'a>, ExportError> {
         .iter()
         .map(|p| &p.participant)
         .collect();
-    let numeric = protocol
-        .questions
-        .iter()
+    // Those of other questionnaires are about no realization.
+    let about_each = |own: &&Questionnaire| own.after == Occasion::Condition;
+    let after_each = protocol.questionnaires.iter().filter(about_each);
+    let numeric = (protocol.questions.iter())
+        .chain(after_each.flat_map(|own| &own.questions))
         .filter(|q| q.kind.scale().is_number());
     for question in numeric {
         let mut ratings: BTreeMap<(usize, Group), Repetitions<'_>> = BTreeMap::new();

@@ -431,11 +431,14 @@ impl<'a> Tables<'a> {
                 _ => plain(column, name),
             }
         };
+        let mut in_trials: Vec<&'a [Question]> = vec![protocol.questions.as_slice()];
+        let between = protocol.questionnaires.iter();
+        in_trials.extend(between.map(|own| own.questions.as_slice()));
         let mut ratings = table(
             ("ratings", "One row for each planned trial."),
             &RatingRow::header_of(protocol, &selected.rows),
             &selected.rows,
-            |c: RatingColumn, name| asked(&[&protocol.questions], c.column(), name),
+            |c: RatingColumn, name| asked(&in_trials, c.column(), name),
         );
         ratings.key = &["participant", "session", "trial"];
         ratings.refers = &[

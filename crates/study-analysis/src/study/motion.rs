@@ -23,9 +23,10 @@ pub(super) fn measured(study: &Study, outcomes: &[OutcomeRules]) -> Motions {
     let wanted: Vec<Telemetry> = (outcomes.iter())
         .filter_map(|outcome| match &outcome.measure {
             // Strokes are counted by the device.
-            Measure::Telemetry(Telemetry::Strokes) | Measure::Clock(_) | Measure::Answers(_) => {
-                None
-            }
+            Measure::Telemetry(Telemetry::Strokes)
+            | Measure::Clock(_)
+            | Measure::Answers(_)
+            | Measure::Questionnaire(_) => None,
             Measure::Telemetry(what) => Some(*what),
         })
         .collect();

@@ -13,7 +13,7 @@ pub use ladders::coarse;
 pub use parts::is_about_realizations;
 
 use super::phrases::{self, Phrase};
-use super::{Design, DeviceKind, ModelEntry, Protocol, Question, Role};
+use super::{Design, DeviceKind, Inventory, ModelEntry, Protocol, Question, Questionnaire, Role};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use study_base::diagnostic::Fault;
@@ -136,7 +136,12 @@ fn untranslated(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
     }
     for (i, own) in protocol.questionnaires.iter().enumerate() {
         let has = |key: &str| spans.contains_key(&format!("questionnaires[{i}].{key}"));
-        if !has("items") || !has("labels") {
+        let texts: &[&str] = match own.kind {
+            Inventory::Sus | Inventory::NasaTlx => &["items", "labels"],
+            Inventory::NasaTlxWeighted => &["items", "labels", "titles", "compare"],
+            Inventory::Own => &[],
+        };
+        if !texts.iter().all(|key| has(key)) {
             faults.push(
                 Fault::warning(format!(
                     "the questionnaire `{}` is in English, and the study in `{}`",
@@ -144,7 +149,10 @@ fn untranslated(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
                     Untrusted(lang)
                 ))
                 .at(spans.get(&format!("questionnaires[{i}].id")).cloned())
-                .hint("write a published translation in `items` and `labels`"),
+                .hint(format!(
+                    "write a published translation in {}",
+                    texts.join(", ")
+                )),
             );
         }
     }
@@ -211,7 +219,7 @@ mod pace {
 /// Estimated duration of a session, min. Assumes 25 s of exploration and 15 s with
 /// the reference in a trial, 6 s for an answer that is chosen, 15 s for one that is
 /// typed (8 s if optional), 30 s to mount a sample by hand, 2 min for arrival, 2 min
-/// for consent, and breaks of the least duration.
+/// for consent, breaks of the least duration, and the questionnaires between the trials.
 pub fn minutes(protocol: &Protocol) -> f64 {
     let mut seconds = pace::ARRIVAL_S;
     if protocol.consent.is_some() {
@@ -249,6 +257,9 @@ pub fn minutes(protocol: &Protocol) -> f64 {
         let rests = counted.saturating_sub(1) / breaks.every.max(1);
         seconds += f64::from(rests) * breaks.at_least_s;
     }
+    let items = |own: &Questionnaire| answers_s(&own.questions);
+    let between = |own: &Questionnaire| f64::from(own.times(protocol)) * items(own);
+    seconds += protocol.questionnaires.iter().map(between).sum::<f64>();
     seconds / 60.0
 }
 

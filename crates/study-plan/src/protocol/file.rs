@@ -29,6 +29,7 @@ mod questionnaires;
 mod questions;
 mod ranking;
 mod resolve;
+mod scoring;
 mod similarity;
 mod spaces;
 mod standard;
@@ -72,7 +73,7 @@ pub const ROOT: &[Key] = keys! {
     /// How a trial goes.
     "trial": Kind::Table(general::TRIAL), "";
     /// The realizations; at least one whose role is not `practice`.
-    "models": Kind::Tables(models::MODELS), "", derived("required, unless every part takes its levels from families or spaces");
+    "models": Kind::Tables(models::MODELS), "", derived("required, unless every part takes its levels from families or spaces, or only questionnaires are asked");
     /// The factors of a factorial design: what is varied within participants. Every combination of
     /// their levels has a realization. Needs the format `study-protocol/3`.
     "factors": Kind::Tables(factors::FACTORS), "";
@@ -94,15 +95,16 @@ pub const ROOT: &[Key] = keys! {
     /// participant comes once. Needs the format `study-protocol/2` and `[[parts]]`.
     "sessions": Kind::Tables(groups::SESSIONS), "";
     /// Asked after each trial; at least one.
-    "questions": Kind::Variants(&questions::QUESTIONS), "", derived("required, unless every part has an answer of its own");
+    "questions": Kind::Variants(&questions::QUESTIONS), "", derived("required, unless every part has an answer of its own, or only questionnaires are asked");
     /// Asked of the experimenter before the first trial.
     "setup": Kind::Variants(&questions::QUESTIONS), "";
     /// Asked of the participant once, before the first trial.
     "intake": Kind::Variants(&questions::QUESTIONS), "";
     /// Asked of the participant once, at the end.
     "outro": Kind::Variants(&questions::QUESTIONS), "";
-    /// Standard questionnaires, asked of the participant after `[[outro]]`, with their scores in
-    /// the analysis.
+    /// Standard questionnaires, asked of the participant after `[[outro]]` or between the trials, with their scores in
+    /// the analysis. A study can consist of them alone, without `[[models]]` and `[[questions]]`: its primary question is
+    /// then the name of one, and its device can be `manual`.
     "questionnaires": Kind::Variants(&questionnaires::QUESTIONNAIRES), "";
     /// What is measured in each trial beside the questions, such as times: described, and compared between the
     /// realizations. Needs the format `study-protocol/3`.
@@ -131,7 +133,7 @@ const FORMATS: &[Word] = &[
 const OF_FORMAT_2: [&str; 5] = ["parts", "families", "tracks", "groups", "sessions"];
 
 /// Keys that need [`FORMAT_3`], without the places in lists.
-pub const OF_FORMAT_3: [&str; 15] = [
+pub const OF_FORMAT_3: [&str; 17] = [
     "confirms",
     "design.order_version",
     "factors",
@@ -147,6 +149,8 @@ pub const OF_FORMAT_3: [&str; 15] = [
     "device.self_weigh",
     "tracks.relative",
     "tracks.condition",
+    "questionnaires.after",
+    "questionnaires.from",
 ];
 
 /// Largest protocol file that is read, bytes.
@@ -344,11 +348,15 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
     let sessions = root.sections("sessions").into_iter().map(groups::session);
     let sessions: Option<Vec<_>> = sessions.collect();
     let has_parts = !raw.parts.is_empty();
-    let design = (root.section("design")).and_then(|section| design::read(section, has_parts));
+    let models = root.sections("models").into_iter().map(models::read);
+    let models: Vec<PartialModel> = models.collect();
+    let questionnaires = questionnaires::read(&mut root);
+    let only_asks = !has_parts && models.is_empty() && !questionnaires.is_empty();
+    let design =
+        (root.section("design")).and_then(|section| design::read(section, has_parts, only_asks));
     let session = root.section("session").and_then(general::session);
     let device = root.section("device").and_then(device::read);
     let trial = root.section("trial").and_then(general::trial);
-    let models = root.sections("models").into_iter().map(models::read);
     let factors = root.sections("factors").into_iter().map(factors::read);
     let factors: Option<Vec<_>> = factors.collect();
     let mut questions = questions::read(&mut root, "questions");
@@ -358,9 +366,13 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
     let setup = questions::read(&mut root, "setup");
     let intake = questions::read(&mut root, "intake");
     let mut outro = questions::read(&mut root, "outro");
-    let questionnaires = questionnaires::read(&mut root);
-    outro.extend(questionnaires.iter().flat_map(|q| q.questions()));
-    let outcomes = outcomes::read(&mut root);
+    let items = |between: bool| {
+        let own = (questionnaires.iter()).filter(move |q| q.is_between() == between);
+        own.flat_map(|q| q.questions())
+    };
+    outro.extend(items(false));
+    let between: Vec<PartialQuestion> = items(true).collect();
+    let mut outcomes = outcomes::read(&mut root);
     let analysis = root.section("analysis").and_then(analysis::read);
     let power = root.section("power").and_then(power::read);
 
@@ -369,18 +381,25 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
         device: device.as_ref(),
         minimum_strokes: trial.as_ref().map_or(0, |t| t.minimum_strokes),
         exposure: trial.as_ref().map(|t| t.exposure).unwrap_or_default(),
-        models: models.collect(),
+        models,
         factors: factors.as_deref().unwrap_or_default(),
         questions,
         setup,
         intake,
         outro,
+        between,
+        questionnaires: (questionnaires.iter())
+            .filter_map(|q| q.id().cloned())
+            .collect(),
         analysis: analysis.as_ref(),
         has_parts,
         has_faulty_parts,
     };
     named.extend(sections.files());
     named.extend(raw.files());
+    if outcomes::primary_of_part(&sections).is_none() {
+        outcomes.extend(questionnaires.iter().filter_map(|q| q.outcome()));
+    }
     if !broken {
         sections.agree(document);
         questionnaires::agree(&questionnaires, &raw.parts, document);
@@ -392,6 +411,9 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
     {
         let known = groups.as_ref().and_then(Option::as_ref);
         groups::agree(known, sessions, (parts, families), document);
+    }
+    if let (Some(parts), false) = (&resolved.parts, broken) {
+        questionnaires::agree_after(&questionnaires, &sections, parts, document);
     }
     if let (Some(factors), false) = (&factors, broken) {
         let known = groups.as_ref().and_then(Option::as_ref);

@@ -12,7 +12,7 @@
 //!   participants (more of them change no order); device kind, limits,
 //!   `uncertified`; each realization's id, role, device, `duplicate_of` and the
 //!   SHA-256 of its file; minimum strokes, exposure, duration of the reference; id,
-//!   scale and `required` of the questions after a trial; the orders file; parts
+//!   scale and `required` of the questions after a trial and of the questionnaires between trials; the orders file; parts
 //!   without their texts, tracks, groups, repeated sessions, and families and spaces with the SHA-256 of their
 //!   files; of spaces also which points are certified; the search that is confirmed.
 //! * wording: title, authors and the like; all texts, prompts and labels; consent;
@@ -22,7 +22,8 @@
 
 use super::keys::word;
 use super::{
-    FamilyRules, FileOrders, FitRules, Order, Part, Protocol, Question, SpaceRules, TrackRules,
+    FamilyRules, FileOrders, FitRules, Occasion, Order, Part, Protocol, Question, Questionnaire,
+    SpaceRules, TrackRules,
 };
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -192,6 +193,11 @@ pub fn parts(
     if !spaces.is_empty() {
         stimulus["spaces"] = spaces.iter().map(|s| points(s, model_bytes)).collect();
     }
+    let between = |own: &&Questionnaire| own.after != Occasion::Session;
+    let between: Vec<&Questionnaire> = questionnaires.iter().filter(between).collect();
+    if !between.is_empty() {
+        stimulus["questionnaires"] = between.iter().map(|own| asked(own)).collect();
+    }
     if groups.is_some() {
         stimulus["groups"] = json!(groups);
     }
@@ -223,6 +229,10 @@ pub fn parts(
             .map(|part| json!({ "id": part.id, "text": part.text }));
         wording["parts"] = texts.collect();
     }
+    if !between.is_empty() {
+        let items = between.iter().flat_map(|own| &own.questions);
+        wording["questionnaires"] = items.map(words).collect();
+    }
     let known: Vec<Value> = models
         .iter()
         .map(|m| json!({ "id": m.id, "vaf": m.vaf, "covariates": m.covariates }))
@@ -251,7 +261,8 @@ pub fn parts(
         analysis["conditions"] = tracks.iter().map(condition).collect();
     }
     if !questionnaires.is_empty() {
-        analysis["questionnaires"] = json!(questionnaires);
+        let scored = |own: &Questionnaire| json!(own.scored());
+        analysis["questionnaires"] = questionnaires.iter().map(scored).collect();
     }
     if !outcomes.is_empty() {
         analysis["outcomes"] = json!(outcomes);
@@ -261,6 +272,23 @@ pub fn parts(
         wording,
         analysis,
     }
+}
+
+/// What of a questionnaire between the trials determines its answers.
+fn asked(own: &Questionnaire) -> Value {
+    let Questionnaire {
+        id,
+        // They decide how the answers are scored.
+        kind: _,
+        own: _,
+        after,
+        questions,
+    } = own;
+    json!({
+        "id": id,
+        "after": after,
+        "questions": questions.iter().map(scale).collect::<Vec<_>>(),
+    })
 }
 
 /// What of a part determines its trials.
@@ -391,8 +419,7 @@ fn write_canonical(value: &Value, text: &mut String) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::protocol::QuestionKind;
-    use crate::protocol::{Text, example};
+    use crate::protocol::{Inventory, QuestionKind, Text, example};
 
     fn bytes(protocol: &Protocol) -> BTreeMap<ModelId, Vec<u8>> {
         protocol
@@ -506,6 +533,36 @@ mod tests {
             changed(&|p| p.models[0].file = Some("elsewhere.toml".to_owned())),
             [false, false, false]
         );
+    }
+
+    /// What is asked between the trials is stimulus, as what is asked in them is, and its texts are wording.
+    #[test]
+    fn a_questionnaire_between_the_trials_is_a_question_of_the_trials() {
+        let mut protocol = example::protocol(2, 1);
+        protocol.questionnaires.push(Questionnaire {
+            id: PartId::new("load").unwrap(),
+            kind: Inventory::NasaTlx,
+            own: None,
+            after: Occasion::Condition,
+            questions: protocol.questions.clone(),
+        });
+        let first = print(&protocol);
+        let changed = |f: &dyn Fn(&mut Questionnaire)| {
+            let mut changed = protocol.clone();
+            f(&mut changed.questionnaires[0]);
+            let prints = print(&changed);
+            [
+                prints.stimulus != first.stimulus,
+                prints.wording != first.wording,
+                prints.analysis != first.analysis,
+            ]
+        };
+        let occasion = changed(&|own| own.after = Occasion::Block);
+        assert_eq!(occasion, [true, false, false]);
+        let item = changed(&|own| own.questions[0].prompt.push('?'));
+        assert_eq!(item, [false, true, false]);
+        let kind = changed(&|own| own.kind = Inventory::Sus);
+        assert_eq!(kind, [false, false, true]);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Measured outcomes: `[[outcomes]]`, what a study measures in each trial beside its questions.
 
 use super::keys::words;
+use super::questionnaires::{Inventory, Scored};
 use serde::Serialize;
 use std::borrow::Cow;
 use study_base::text::QuestionId;
@@ -9,7 +10,7 @@ use study_base::text::QuestionId;
 pub const MAX_OUTCOMES: usize = 12;
 
 /// One of `[[outcomes]]`: a number that is measured in each trial of a rating part.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OutcomeRules {
     /// Its name, also in the identifiers of its statistics.
     pub id: QuestionId,
@@ -29,7 +30,7 @@ pub struct OutcomeRules {
 }
 
 /// What is measured, and by what.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "from", content = "measure", rename_all = "lowercase")]
 pub enum Measure {
     /// By the clock of the session.
@@ -38,6 +39,8 @@ pub enum Measure {
     Telemetry(Telemetry),
     /// The mean of the answers to some questions of the trial.
     Answers(Answers),
+    /// The score of a questionnaire that is asked after each condition.
+    Questionnaire(Scored),
 }
 
 /// The mean of some answers of a trial, such as the items of a questionnaire, or the one answer.
@@ -116,7 +119,7 @@ impl Measure {
     /// Whether its numbers can be counts: full strokes, or the answer to one question.
     pub fn can_be_counted(&self) -> bool {
         match self {
-            Self::Clock(_) => false,
+            Self::Clock(_) | Self::Questionnaire(_) => false,
             Self::Telemetry(what) => *what == Telemetry::Strokes,
             Self::Answers(answers) => answers.questions.len() == 1,
         }
@@ -128,6 +131,7 @@ impl Measure {
             Self::Clock(_) => "clock",
             Self::Telemetry(_) => "telemetry",
             Self::Answers(_) => "answers",
+            Self::Questionnaire(_) => "questionnaire",
         }
     }
 
@@ -140,6 +144,7 @@ impl Measure {
             Self::Telemetry(Telemetry::Strokes) => "1",
             Self::Telemetry(Telemetry::Energy) => "J",
             Self::Answers(answers) => &answers.unit,
+            Self::Questionnaire(_) => "points",
         }
     }
 
@@ -157,6 +162,12 @@ impl Measure {
             Self::Answers(answers) => match answers.questions.as_slice() {
                 [one] => return format!("answer to {one}").into(),
                 all => return format!("mean of {} answers", all.len()).into(),
+            },
+            Self::Questionnaire(own) => match own.kind {
+                Inventory::Sus => "score of the System Usability Scale",
+                Inventory::NasaTlx => "raw score of the Task Load Index",
+                Inventory::NasaTlxWeighted => "weighted score of the Task Load Index",
+                Inventory::Own => return format!("score of the questionnaire {}", own.id).into(),
             },
         })
     }

@@ -1,8 +1,7 @@
 use super::balance::{Balance, balances};
 use super::*;
-use crate::protocol::Order;
-use crate::protocol::Role;
 use crate::protocol::example::{model, protocol};
+use crate::protocol::{Inventory, Questionnaire, Role};
 use std::collections::BTreeMap;
 
 fn design(models: usize, repetitions: u32, order: Order) -> Protocol {
@@ -508,4 +507,39 @@ fn a_practice_trial_before_does_not_enter_a_constraint() {
         (letters(&got.queue), got.constraint_broken),
         ("BA".into(), false)
     );
+}
+
+fn load(after: Occasion) -> Questionnaire {
+    Questionnaire {
+        id: PartId::new("load").unwrap(),
+        kind: Inventory::NasaTlx,
+        own: None,
+        after,
+        questions: Vec::new(),
+    }
+}
+
+#[test]
+fn a_study_that_only_asks_has_no_trials() {
+    let mut p = design(0, 1, Order::Fixed);
+    assert_eq!(
+        plan(&p, None, Seat::Row(1)),
+        Err(ScheduleError::NoRealizations)
+    );
+    p.questionnaires.push(load(Occasion::Session));
+    assert_eq!(plan(&p, None, Seat::Row(1)), Ok(Vec::new()));
+}
+
+#[test]
+fn a_file_of_orders_brings_the_trials_together_after_which_something_is_asked() {
+    let mut p = design(2, 2, Order::File("orders.csv".to_owned()));
+    let mixed = file(&[(1, "BBAA"), (2, "ABBA")]);
+    assert!(Planner::new(&p, Some(&mixed)).is_ok());
+    p.questionnaires.push(load(Occasion::Condition));
+    assert_eq!(
+        message(&p, Some(&mixed), Seat::Row(1)),
+        "the file of orders, row 2, position 4: `A` comes again after others, and a questionnaire is asked after each condition"
+    );
+    let together = file(&[(1, "BBAA"), (2, "AABB")]);
+    assert!(Planner::new(&p, Some(&together)).is_ok());
 }

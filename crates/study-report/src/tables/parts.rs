@@ -9,7 +9,7 @@ mod similarity;
 
 use crate::apa::{self, bare_p, interval_or_dash, listing, name, or_dash, plain, two};
 use crate::table::{Builder, Head, Table, file, page};
-use scales::{items, magnitudes, ratings, scores};
+use scales::{items, magnitudes, ratings, scores, scores_after, subscales};
 use std::collections::BTreeMap;
 use study_analysis::analyze::psychophysics::results::{
     Ability, CellName, ConditionModel, Contrast, Function, PartResults, PopulationModel,
@@ -22,7 +22,7 @@ use study_base::text::Untrusted;
 type Kind = (&'static str, fn(&PartResults) -> Table);
 
 /// All tables, in the order of a page; those without rows and notes are left out of it.
-pub(crate) const KINDS: [Kind; 28] = [
+pub(crate) const KINDS: [Kind; 30] = [
     ("part_thresholds.csv", thresholds),
     ("part_population.csv", population::population),
     ("part_population_contrasts.csv", population::contrasts),
@@ -48,6 +48,8 @@ pub(crate) const KINDS: [Kind; 28] = [
     ("part_rank_pairs.csv", ranking::pairs),
     ("part_rankings.csv", ranking::participants),
     ("part_scores.csv", scores),
+    ("part_scores_after.csv", scores_after),
+    ("part_subscales.csv", subscales),
     ("part_items.csv", items),
     ("part_groups.csv", groups),
     ("part_group_pairs.csv", group_pairs),

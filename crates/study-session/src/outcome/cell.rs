@@ -152,15 +152,17 @@ struct Repeated<'a> {
 }
 
 impl RatingRow {
-    /// The header of `ratings.csv`: questions in the protocol's order, covariates
-    /// sorted by name, factors in the protocol's order.
+    /// The header of `ratings.csv`: questions in the protocol's order, those of questionnaires
+    /// between the trials last, covariates sorted by name, factors in the protocol's order.
     pub fn header(protocol: &Protocol) -> Header<RatingColumn> {
         let models = protocol.models.iter();
         let covariates: BTreeSet<&str> = models
             .flat_map(|m| m.covariates.keys().map(String::as_str))
             .collect();
         let repeated = Repeated {
-            questions: protocol.questions.iter().map(|q| q.id.as_str()).collect(),
+            questions: (protocol.questions.iter().chain(protocol.between()))
+                .map(|q| q.id.as_str())
+                .collect(),
             covariates: covariates.into_iter().collect(),
             factors: protocol.factors.iter().map(|f| f.id.as_str()).collect(),
             has_parts: !protocol.parts.is_empty(),

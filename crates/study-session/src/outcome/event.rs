@@ -81,6 +81,13 @@ pub enum FormId {
         /// Attempt, from 1.
         attempt: u32,
     },
+    /// Questionnaires after a condition, block or part. Since `study-protocol/3`.
+    After {
+        /// The trial with which it ended, whose realization is that of a condition.
+        trial: u32,
+        /// The attempt with which that trial was completed.
+        attempt: u32,
+    },
     /// Questions to the participant at the end.
     Outro,
 }

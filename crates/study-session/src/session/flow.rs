@@ -101,11 +101,14 @@ impl Session {
         false
     }
 
-    /// Enters an unfinished rating, a break or the next trial; returns whether there
-    /// was one.
+    /// Enters an unfinished rating, a questionnaire between trials, a break or the next trial;
+    /// returns whether there was one.
     fn trials(&mut self, at: Moment) -> bool {
         if self.history.open().is_some() {
             self.after_playback(at);
+            return true;
+        }
+        if self.ask_between(at) {
             return true;
         }
         if let Some(began) = self.history.open_break {
@@ -126,7 +129,8 @@ impl Session {
         }
         self.end_practice(at);
         self.end_tracks(at);
-        if self.show_message(MessageKind::Part) {
+        // Only now is a part of tracks over.
+        if self.ask_between(at) || self.show_message(MessageKind::Part) {
             return true;
         }
         let Some(next) = self.history.next_trial() else {

@@ -50,6 +50,7 @@ impl Session {
             FormId::Setup => &self.protocol.setup,
             FormId::Intake => &self.protocol.intake,
             FormId::Outro => &self.protocol.outro,
+            FormId::After { trial, .. } => return self.asked_after(trial),
             FormId::Trial { trial, .. } => {
                 let part = (self.history.planned(trial)).and_then(|t| self.part_of(t));
                 if let Some(part) = part {
@@ -359,7 +360,7 @@ fn step_of(form: FormId) -> Option<Step> {
         FormId::Setup => Some(Step::Setup),
         FormId::Intake => Some(Step::Intake),
         FormId::Outro => Some(Step::Outro),
-        FormId::Trial { .. } => None,
+        FormId::Trial { .. } | FormId::After { .. } => None,
     }
 }
 

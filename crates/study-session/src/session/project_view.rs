@@ -341,7 +341,7 @@ impl Session {
             FormId::Setup => Phrase::FormSetup,
             FormId::Intake => Phrase::FormIntake,
             FormId::Outro => Phrase::FormOutro,
-            FormId::Trial { trial, .. } => {
+            FormId::Trial { trial, .. } | FormId::After { trial, .. } => {
                 let (practice, number) = self.shown_number(trial);
                 let phrase = match practice {
                     true => Phrase::PracticeNumber,
@@ -367,7 +367,7 @@ impl Session {
             FormId::Setup => "set-up".to_owned(),
             FormId::Intake => "intake".to_owned(),
             FormId::Outro => "closing questions".to_owned(),
-            FormId::Trial { trial, .. } => {
+            FormId::Trial { trial, .. } | FormId::After { trial, .. } => {
                 let (practice, number) = self.shown_number(trial);
                 title(practice, number)
             }

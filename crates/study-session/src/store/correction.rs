@@ -175,7 +175,10 @@ fn given(session: &SessionData, request: &AnswerCorrection) -> Option<(FormId, A
     let forms = match request.trial {
         Some(trial) => {
             let attempt = history.attempts(trial);
-            vec![FormId::Trial { trial, attempt }]
+            vec![
+                FormId::Trial { trial, attempt },
+                FormId::After { trial, attempt },
+            ]
         }
         None => vec![FormId::Setup, FormId::Intake, FormId::Outro],
     };
@@ -193,6 +196,7 @@ fn asked<'a>(protocol: &'a Protocol, form: FormId, id: &QuestionId) -> Option<&'
         FormId::Intake => &protocol.intake,
         FormId::Outro => &protocol.outro,
         FormId::Trial { .. } => &protocol.questions,
+        FormId::After { .. } => return protocol.between().find(|q| q.id == *id),
     };
     all.iter().find(|q| q.id == *id)
 }

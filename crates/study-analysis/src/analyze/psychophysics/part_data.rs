@@ -14,7 +14,7 @@ use crate::analyze::warning::Warning;
 use std::collections::BTreeMap;
 use study_base::text::{PartId, ParticipantId, QuestionId};
 use study_plan::protocol::parts::{Part, Task};
-use study_plan::protocol::{Answer, Protocol};
+use study_plan::protocol::{Answer, Occasion, Protocol};
 use study_session::outcome::fold::History;
 use study_session::outcome::{IntervalRow, ParticipantRow, RatingRow};
 use study_stats::psychometric::{Core, Level, Spacing};
@@ -98,6 +98,8 @@ pub struct PartData {
     pub vaf: BTreeMap<String, f64>,
     /// Thresholds and sensitivities, by which tracks, groups and sessions are compared.
     pub measured: Vec<Measured>,
+    /// After what a questionnaire was asked between the trials.
+    pub between: Option<Occasion>,
 }
 
 /// Positive answers of one participant in one condition.

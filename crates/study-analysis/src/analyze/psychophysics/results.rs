@@ -50,12 +50,40 @@ statistics! {
         sd: Stat,
     }
 
+    /// The scores after one condition, block or part.
+    pub struct ScoresAfter {
+        /// participants with a score
+        n: Stat,
+        /// mean of the participants' means
+        mean: Stat,
+        /// their standard deviation
+        sd: Stat,
+        /// t interval of the mean
+        ci95: Interval,
+    }
+
+    /// The scores of a subscale of a questionnaire of the study's own.
+    pub struct SubscaleScores {
+        /// participants with a score
+        n: Stat,
+        /// mean of the participants' means
+        mean: Stat,
+        /// their standard deviation
+        sd: Stat,
+        /// t interval of the mean
+        ci95: Interval,
+    }
+
     /// A questionnaire.
     pub struct QuestionnaireResult {
         /// by participant; in a study of several sessions by participant@session
         score: BTreeMap<ParticipantName, Stat>,
         /// by item
         item: BTreeMap<ItemName, ItemAnswers>,
+        /// by subscale
+        scale: BTreeMap<ItemName, SubscaleScores>,
+        /// between the trials, by condition, block or part
+        after: BTreeMap<ConditionName, ScoresAfter>,
         /// questionnaires without an answer to every item
         n_incomplete: Stat,
         /// participants with a score

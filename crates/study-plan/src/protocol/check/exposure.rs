@@ -11,7 +11,8 @@ pub(super) fn warnings(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Faul
     }
     let without = protocol.parts.iter().filter(|p| p.exposure.min_s <= 0.0);
     let parts: Vec<String> = without.map(|part| format!("`{}`", part.id)).collect();
-    let whole = protocol.parts.is_empty() && protocol.trial.exposure.min_s <= 0.0;
+    let has_trials = protocol.parts.is_empty() && !protocol.only_asks();
+    let whole = has_trials && protocol.trial.exposure.min_s <= 0.0;
     let of = match (whole, &parts[..]) {
         (true, _) => "a trial".to_owned(),
         (false, []) => return,

@@ -178,7 +178,7 @@ pub fn is_about_realizations(protocol: &Protocol) -> bool {
     };
     let tested = protocol.models.iter().any(|m| m.role == Role::Test);
     let compares = protocol.parts.is_empty() || (protocol.parts.iter().any(about) && tested);
-    compares && protocol.confirms.is_none()
+    compares && protocol.confirms.is_none() && !protocol.only_asks()
 }
 
 /// Too few levels for an exponent, or levels that it leaves out.

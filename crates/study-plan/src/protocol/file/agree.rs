@@ -12,7 +12,7 @@ use crate::protocol::{
 };
 use study_base::diagnostic::table::Document;
 use study_base::diagnostic::{Fault, did_you_mean};
-use study_base::text::{ModelId, QuestionId, Untrusted};
+use study_base::text::{ModelId, PartId, QuestionId, Untrusted};
 
 /// The sections, as far as they could be read.
 #[derive(Debug)]
@@ -27,6 +27,10 @@ pub(super) struct Sections<'a> {
     pub(super) setup: Vec<PartialQuestion>,
     pub(super) intake: Vec<PartialQuestion>,
     pub(super) outro: Vec<PartialQuestion>,
+    /// The items of the questionnaires between the trials.
+    pub(super) between: Vec<PartialQuestion>,
+    /// The ids of the questionnaires.
+    pub(super) questionnaires: Vec<PartId>,
     pub(super) analysis: Option<&'a AnalysisRules>,
     /// Whether there are `[[parts]]`.
     pub(super) has_parts: bool,
@@ -91,9 +95,15 @@ impl Sections<'_> {
             .map(ModelId::as_str)
     }
 
+    /// Whether the study presents nothing and asks questionnaires.
+    pub(super) fn only_asks(&self) -> bool {
+        let presents = self.has_parts || !self.models.is_empty();
+        !presents && self.questions.is_empty() && !self.questionnaires.is_empty()
+    }
+
     fn presence(&self, document: &Document<'_>) {
         // What a part lacks is reported there.
-        if self.has_parts {
+        if self.has_parts || self.only_asks() {
             return;
         }
         if self.models.iter().all(|m| m.role == Role::Practice) {
@@ -261,7 +271,7 @@ impl Sections<'_> {
             false => is_ratings_column,
         };
         let ratings = "ratings.csv";
-        for question in &self.questions {
+        for question in self.questions.iter().chain(&self.between) {
             column(document, question, &mut taken, fixed_in_ratings, ratings);
         }
         let mut once: Vec<String> = Vec::new();
@@ -310,6 +320,9 @@ impl Sections<'_> {
         let Some(analysis) = self.analysis else {
             return;
         };
+        if self.only_asks() {
+            return self.analysis_of_questionnaires(analysis, document);
+        }
         let place = document.span_of("analysis.primary");
         let primary = &analysis.primary;
         let mut questions = self.questions.iter();
@@ -381,6 +394,30 @@ impl Sections<'_> {
                     .at(place)
                     .label(format!("{from} to {to}")),
             );
+        }
+    }
+}
+
+impl Sections<'_> {
+    /// The analysis of a study that presents nothing is about one of its questionnaires.
+    fn analysis_of_questionnaires(&self, analysis: &AnalysisRules, document: &Document<'_>) {
+        let primary = analysis.primary.as_str();
+        let known: Vec<&str> = self.questionnaires.iter().map(PartId::as_str).collect();
+        if !known.contains(&primary) {
+            let place = document.span_of("analysis.primary");
+            document.fault(unknown("questionnaire", primary, known).at(place));
+        }
+        for (key, given) in [
+            ("share_of", analysis.share_of.is_some()),
+            ("realistic_from", analysis.realistic_from.is_some()),
+            ("equivalence_margin", analysis.equivalence_margin.is_some()),
+            ("equivalence_r", analysis.equivalence_r.is_some()),
+        ] {
+            if given {
+                let what = format!("`analysis.{key}` has no effect: nothing is rated");
+                let place = document.span_of(&format!("analysis.{key}"));
+                document.fault(Fault::error(what).at(place));
+            }
         }
     }
 }

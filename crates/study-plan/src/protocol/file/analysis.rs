@@ -7,7 +7,8 @@ use std::ops::Bound;
 
 pub(super) const ANALYSIS: &[Key] = keys! {
     /// The id of the question that the analysis is about: a rating, a slider or a number
-    /// of `[[questions]]`, a choice with `share_of`, or a part that has an answer of its own.
+    /// of `[[questions]]`, a choice with `share_of`, or a part that has an answer of its own; in a study
+    /// that only asks questionnaires one of them.
     "primary": Kind::Id(Id::Question), r#""realism""#, required;
     /// The recording whose VAF counts, by its name in the model files; the same for all
     /// realizations. Needed if a model file has several.

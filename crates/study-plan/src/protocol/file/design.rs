@@ -9,9 +9,9 @@ pub(super) const DESIGN: &[Key] = keys! {
     /// How many participants are planned. An analysis of fewer is reported as interim.
     "participants": Kind::Whole(1, 100_000), "10", required;
     /// How often each participant rates each realization.
-    "repetitions": Kind::Whole(1, 10_000), "3", derived("required, unless there are `[[parts]]`, which have their own");
+    "repetitions": Kind::Whole(1, 10_000), "3", derived("required, unless there are `[[parts]]`, which have their own, or nothing is presented");
     /// How the order of the trials is made. [schedule.md](schedule.md) specifies each.
-    "order": Kind::WordOrTable(Order::WORDS, ORDER_FILE), r#""blocked""#, derived("required, unless there are `[[parts]]`, which have their own");
+    "order": Kind::WordOrTable(Order::WORDS, ORDER_FILE), r#""blocked""#, derived("required, unless there are `[[parts]]`, which have their own, or nothing is presented");
     /// The largest number of consecutive trials with the same realization; 1 forbids the
     /// same realization twice in a row.
     "max_run": Kind::COUNT, "1";
@@ -92,26 +92,41 @@ impl Order {
     }
 }
 
-/// `has_parts`: whether there are `[[parts]]`.
-pub(super) fn read(mut section: Section<'_, '_>, has_parts: bool) -> Option<Design> {
+/// `has_parts`: whether there are `[[parts]]`; `only_asks`: whether there are only questionnaires.
+pub(super) fn read(
+    mut section: Section<'_, '_>,
+    has_parts: bool,
+    only_asks: bool,
+) -> Option<Design> {
+    let elsewhere = match (has_parts, only_asks) {
+        (true, _) => Some((
+            "in a study with [[parts]]",
+            "each part has its own; write it there",
+        )),
+        (false, true) => Some(("in a study that presents nothing", "leave it out")),
+        (false, false) => None,
+    };
     let participants = section.whole("participants");
     let mut repetitions = section.whole("repetitions");
     let mut order = order(&mut section);
     for name in OF_A_PART {
         let given = section.value(name).is_some();
-        if has_parts && given {
-            let what = format!("`design.{name}` has no effect in a study with [[parts]]");
-            let hint = "each part has its own; write it there";
-            section.fault_at(name, Fault::error(what).hint(hint));
-        } else if !has_parts && !given && matches!(name, "repetitions" | "order") {
-            section.report_missing(name, section.key(name).such_as());
+        match elsewhere {
+            Some((study, hint)) if given => {
+                let what = format!("`design.{name}` has no effect {study}");
+                section.fault_at(name, Fault::error(what).hint(hint));
+            }
+            None if !given && matches!(name, "repetitions" | "order") => {
+                section.report_missing(name, section.key(name).such_as());
+            }
+            _ => {}
         }
     }
     if !has_parts && section.value("parts_order").is_some() {
         let what = "`design.parts_order` has no effect: there are no [[parts]]";
         section.fault_at("parts_order", Fault::error(what));
     }
-    if has_parts {
+    if elsewhere.is_some() {
         (repetitions, order) = (Some(1), Some(Order::Fixed));
     }
     let parts_order = section.word("parts_order");

@@ -10,6 +10,7 @@ use crate::protocol::outcomes::{
     Answers, BetterEnd, Clock, MAX_OUTCOMES, Measure, OutcomeFamily, OutcomeRules, Telemetry,
     Transform,
 };
+use crate::protocol::questionnaires::Scored;
 use crate::protocol::section::{Section, Variant, shapes};
 use study_base::diagnostic::Fault;
 use study_base::diagnostic::table::Document;
@@ -134,6 +135,24 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Vec<PartialOutcome> {
 }
 
 impl PartialOutcome {
+    /// The score of a questionnaire after each condition, whose section has this path.
+    pub(super) fn of_questionnaire(path: &str, scored: Scored, better: Option<BetterEnd>) -> Self {
+        let name = QuestionId::new(scored.id.as_str()).ok();
+        let rules = |name: QuestionId| OutcomeRules {
+            id: name,
+            measure: Measure::Questionnaire(scored),
+            better,
+            transform: Transform::Identity,
+            model: None,
+            of: None,
+        };
+        Self {
+            path: path.to_owned(),
+            outcome: name.clone().map(rules),
+            id: name,
+        }
+    }
+
     pub(super) fn finish(self) -> Option<OutcomeRules> {
         self.outcome
     }
@@ -190,10 +209,11 @@ pub(super) fn agree(all: &[PartialOutcome], sections: &Sections<'_>, document: &
     let Some(first) = all.first() else {
         return;
     };
-    // The answer of a part is no rating of a realization.
-    let primary = sections.analysis.map(|analysis| &analysis.primary);
-    let of_part = |q: &&PartialQuestion| q.id.as_ref() == primary && q.path.starts_with("parts[");
-    if let Some(question) = sections.questions.iter().find(of_part) {
+    if sections.only_asks() {
+        let what = "outcomes are measured in trials, and the study has none";
+        fault(&first.path, "from", Fault::error(what));
+    }
+    if let Some(question) = primary_of_part(sections) {
         let name = question.id.as_ref().map_or("", QuestionId::as_str);
         let what = format!(
             "outcomes are measured in trials that rate a realization, and the primary question, `{name}`, is the answer of a part of another kind"
@@ -207,6 +227,9 @@ pub(super) fn agree(all: &[PartialOutcome], sections: &Sections<'_>, document: &
         let hint = "each is tested, and the tests are corrected for their number: choose those that matter";
         fault(&more.path, "id", Fault::error(what).hint(hint));
     }
+    let asked: Vec<&PartialQuestion> = (sections.questions.iter())
+        .chain(&sections.between)
+        .collect();
     for (i, own) in all.iter().enumerate() {
         let (path, Some(id)) = (own.path.as_str(), &own.id) else {
             continue;
@@ -217,7 +240,7 @@ pub(super) fn agree(all: &[PartialOutcome], sections: &Sections<'_>, document: &
         let earlier = all[..i].iter().filter_map(|o| o.id.as_ref());
         if let Some(other) = earlier.clone().find(|other| is(other.as_str())) {
             fault(path, "id", collision(name, other.as_str()));
-        } else if sections.questions.iter().any(|q| question(&q.id)) {
+        } else if asked.iter().any(|q| question(&q.id)) {
             let what = format!("`{name}` is a question and an outcome");
             fault(path, "id", Fault::error(what));
         } else if is(GROUP) || sections.factors.iter().any(|f| is(f.id.as_str())) {
@@ -262,6 +285,13 @@ pub(super) fn agree(all: &[PartialOutcome], sections: &Sections<'_>, document: &
             fault(path, "measure", Fault::error(what));
         }
     }
+}
+
+/// The primary question, if it is the answer of a part: no rating of a realization.
+pub(super) fn primary_of_part<'a>(sections: &'a Sections<'_>) -> Option<&'a PartialQuestion> {
+    let primary = sections.analysis.map(|analysis| &analysis.primary);
+    let mut questions = sections.questions.iter();
+    questions.find(|q| q.id.as_ref() == primary && q.path.starts_with("parts["))
 }
 
 /// What is wrong with the questions of an outcome.

@@ -98,6 +98,35 @@ pub(super) fn scores(results: &PartResults) -> Table {
         .notes(mean)
 }
 
+/// The scores of the subscales of a questionnaire.
+pub(super) fn subscales(results: &PartResults) -> Table {
+    let scales = results.questionnaire.iter().flat_map(|q| &q.scale);
+    Builder::new("Subscales", scales)
+        .name("subscale", "subscale", &|own| own.0.as_str().to_owned())
+        .field(column("participants", "n"), plain, |own| &own.1.n)
+        .field(column("mean", "mean"), two, |own| &own.1.mean)
+        .ends(column("95 %", "mean_ci95"), two, &|own| own.1.ci95.ends())
+        .field(column("SD", "sd"), two, |own| &own.1.sd)
+        .done()
+}
+
+/// The scores after each condition, block or part.
+pub(super) fn scores_after(results: &PartResults) -> Table {
+    let after = results.questionnaire.iter().flat_map(|q| &q.after);
+    let mut after: Vec<_> = after.collect();
+    // Block 2 before 10; names as they are.
+    after.sort_by_key(|own| own.0.as_str().parse::<u32>().unwrap_or(0));
+    let note = "After each realization, block or part: over participants, of each the mean.";
+    let any = !after.is_empty();
+    Builder::new("Scores between the trials", after)
+        .name("after", "after", &|own| own.0.as_str().to_owned())
+        .field(column("participants", "n"), plain, |own| &own.1.n)
+        .field(column("mean", "mean"), two, |own| &own.1.mean)
+        .ends(column("95 %", "mean_ci95"), two, &|own| own.1.ci95.ends())
+        .field(column("SD", "sd"), two, |own| &own.1.sd)
+        .notes(any.then(|| note.to_owned()))
+}
+
 /// The answers to the items of a questionnaire, as they were given.
 pub(super) fn items(results: &PartResults) -> Table {
     let items = results.questionnaire.iter().flat_map(|q| &q.item);

@@ -157,7 +157,9 @@ fn resume_text(gap_s: f64, choice: Option<Choice>) -> String {
 
 fn trial_of(form: FormId) -> (Option<u32>, Option<u32>) {
     match form {
-        FormId::Trial { trial, attempt } => (Some(trial), Some(attempt)),
+        FormId::Trial { trial, attempt } | FormId::After { trial, attempt } => {
+            (Some(trial), Some(attempt))
+        }
         FormId::Setup | FormId::Intake | FormId::Outro => (None, None),
     }
 }

@@ -214,6 +214,10 @@ impl History {
                     .completion(trial)
                     .is_some_and(|(done, _)| done == attempt)
             }
+            FormId::After { trial, attempt } => {
+                let done = self.completion(trial);
+                done.is_some_and(|(done, _)| done == attempt)
+            }
         }
     }
 }

@@ -38,7 +38,7 @@ impl History {
             trials_done: self.closed(false),
             trials_planned: self.planned_total(false),
             started_at: self.started_at().map(|at| at.wall),
-            answers: answers(self.answers.iter().filter(|g| !is_rating(g))),
+            answers: answers(self.answers.iter().filter(|g| !is_of_trial(g))),
             group: start.and_then(|s| s.assigned.group.clone()),
             session_id: start.and_then(|s| s.assigned.session_id.clone()),
             gap_h: start.and_then(|s| s.assigned.gap_h),
@@ -54,6 +54,10 @@ impl History {
         let begun = shown.and_then(|a| a.start.as_ref());
         let given: Vec<&GivenAnswer> = match counted.map(|a| a.number) {
             Some(attempt) => self.answers_of(trial.trial, attempt).collect(),
+            None => Vec::new(),
+        };
+        let between: Vec<&GivenAnswer> = match counted.map(|a| a.number) {
+            Some(attempt) => self.answers_after(trial.trial, attempt).collect(),
             None => Vec::new(),
         };
         let part = trial.part.as_ref().and_then(|id| protocol.part(id));
@@ -138,7 +142,7 @@ impl History {
             host_late_ms: played.and_then(|p| Some(p.host_late_ms?[1])),
             input_channel: primary.and_then(|g| g.channel),
             front_name: sitting.front.clone(),
-            answers: answers(given.into_iter()),
+            answers: answers(given.into_iter().chain(between)),
             group: start.assigned.group.clone(),
             session_id: start.assigned.session_id.clone(),
             paused_s: done.and_then(|d| d.paused_s),
@@ -149,6 +153,12 @@ impl History {
 
     fn answers_of(&self, trial: u32, attempt: u32) -> impl Iterator<Item = &GivenAnswer> {
         let form = FormId::Trial { trial, attempt };
+        self.answers.iter().filter(move |g| g.form == form)
+    }
+
+    /// The answers to the questionnaires of the condition, block or part that ended with an attempt.
+    fn answers_after(&self, trial: u32, attempt: u32) -> impl Iterator<Item = &GivenAnswer> {
+        let form = FormId::After { trial, attempt };
         self.answers.iter().filter(move |g| g.form == form)
     }
 }
@@ -201,8 +211,9 @@ fn correct(
     }
 }
 
-fn is_rating(given: &GivenAnswer) -> bool {
-    matches!(given.form, FormId::Trial { .. })
+/// Whether an answer belongs to a trial, and not to the participant.
+fn is_of_trial(given: &GivenAnswer) -> bool {
+    matches!(given.form, FormId::Trial { .. } | FormId::After { .. })
 }
 
 fn answers<'a>(given: impl Iterator<Item = &'a GivenAnswer>) -> BTreeMap<QuestionId, Answer> {

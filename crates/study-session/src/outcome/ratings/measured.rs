@@ -111,6 +111,7 @@ fn measured(at: usize, row: &RatingRow, measure: &Measure, telemetry: &Motions) 
             let all = all.filter(|all| !all.is_empty())?;
             Some(all.iter().sum::<f64>() / all.len() as f64)
         }
+        Measure::Questionnaire(own) => own.of(&row.answers),
     }
 }
 

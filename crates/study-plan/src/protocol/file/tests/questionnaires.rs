@@ -1,7 +1,9 @@
 //! `[[questionnaires]]`.
 
 use crate::protocol::file::parse;
-use crate::protocol::{Answer, QuestionKind, kinds};
+use crate::protocol::{
+    Answer, BetterEnd, Inventory, Measure, Occasion, QuestionKind, Scored, kinds,
+};
 
 const STUDY: &str = r#"
 format = "study-protocol/1"
@@ -115,4 +117,244 @@ fn a_questionnaire_in_another_language_than_the_study_is_a_warning() {
         warned(&german.replace("id = \"sus\"", &items)),
         expected[1..]
     );
+}
+
+const AFTER_EACH: &str = r#"
+[[questionnaires]]
+id = "load"
+kind = "nasa-tlx"
+after = "condition"
+"#;
+
+fn newer(questionnaires: &str) -> String {
+    with(questionnaires).replace("study-protocol/1", "study-protocol/3")
+}
+
+const ONE: &str = r#"models = [{ id = "a", file = "a.toml" }]"#;
+const TWO: &str = r#"models = [{ id = "a", file = "a.toml" }, { id = "b", file = "b.toml" }]"#;
+const BLOCKED: &str = r#"repetitions = 1, order = "blocked""#;
+
+#[test]
+fn what_is_asked_after_each_condition_is_not_in_the_outro_and_is_an_outcome() {
+    let text = newer(AFTER_EACH)
+        .replace(ONE, TWO)
+        .replace("repetitions = 1", "repetitions = 3");
+    let parsed = parse("p", &text);
+    let shown = parsed.findings.render(false);
+    let protocol = parsed.protocol.unwrap_or_else(|| panic!("{shown}"));
+    assert_eq!(protocol.outro.len(), 1);
+    let ids: Vec<&str> = protocol.between().map(|q| q.id.as_str()).collect();
+    assert_eq!((ids.len(), ids[0]), (6, "load_mental"));
+    let own = &protocol.questionnaires[0];
+    assert_eq!(own.after, Occasion::Condition);
+    // Each of two realizations, in each of three blocks.
+    assert_eq!(own.times(&protocol), 6);
+    let [outcome] = protocol.outcomes.as_slice() else {
+        panic!("{:?}", protocol.outcomes)
+    };
+    assert_eq!(outcome.id.as_str(), "load");
+    assert_eq!(outcome.better, Some(BetterEnd::Lower));
+    let scored = Scored {
+        id: own.id.clone(),
+        kind: Inventory::NasaTlx,
+        own: None,
+    };
+    assert_eq!(outcome.measure, Measure::Questionnaire(scored));
+}
+
+#[test]
+fn what_is_asked_after_each_block_is_no_outcome() {
+    let text = newer(AFTER_EACH)
+        .replace("\"condition\"", "\"block\"")
+        .replace("repetitions = 1", "repetitions = 3");
+    let protocol = parse("p", &text).protocol.unwrap();
+    assert!(protocol.outcomes.is_empty());
+    assert_eq!(protocol.questionnaires[0].times(&protocol), 3);
+}
+
+#[test]
+fn nothing_is_asked_after_what_has_no_end() {
+    let after = |word: &str| AFTER_EACH.replace("condition", word);
+    let shuffled = |questionnaires: &str| {
+        newer(questionnaires)
+            .replace(ONE, TWO)
+            .replace(BLOCKED, r#"repetitions = 2, order = "shuffled""#)
+    };
+    for (text, expected) in [
+        (
+            with(AFTER_EACH),
+            "`questionnaires[0].after` needs the format `study-protocol/3`",
+        ),
+        (
+            shuffled(AFTER_EACH),
+            "after = \"condition\" has no meaning: order = \"shuffled\" mixes the repetitions of the realizations",
+        ),
+        (
+            shuffled(AFTER_EACH),
+            "order = \"blocked\" (or williams, latin-square, fixed) asks it in each block",
+        ),
+        (
+            shuffled(&after("block")),
+            "after = \"block\" has no meaning: its order has no blocks",
+        ),
+        (
+            newer(&after("part")),
+            "after = \"part\" needs [[parts]], and the study has none",
+        ),
+        (newer(&after("conditions")), "did you mean"),
+        (
+            newer(&AFTER_EACH.replace("\"load\"", "\"realism\"")),
+            "`realism` is a question and an outcome",
+        ),
+    ] {
+        let parsed = parse("p", &text);
+        assert!(parsed.protocol.is_none(), "{text}");
+        let shown = parsed.findings.render(false);
+        assert!(shown.contains(expected), "{text}\n{shown}");
+    }
+    // Each realization once: each is over after its only trial.
+    let once = shuffled(AFTER_EACH).replace("repetitions = 2", "repetitions = 1");
+    assert!(parse("p", &once).protocol.is_some());
+}
+
+#[test]
+fn subscales_are_compared_by_their_titles() {
+    let weighted = r#"
+[[questionnaires]]
+id = "load"
+kind = "nasa-tlx-weighted"
+compare = "Was mehr?"
+titles = ["a", "b", "c", "d", "e", "f"]
+"#;
+    let parsed = parse("p", &with(weighted));
+    let shown = parsed.findings.render(false);
+    let protocol = parsed.protocol.unwrap_or_else(|| panic!("{shown}"));
+    assert_eq!(protocol.outro.len(), 1 + 21);
+    let second = &protocol.outro[8];
+    assert_eq!(second.id.as_str(), "load_pair_tm");
+    assert_eq!(second.prompt, "Was mehr?");
+    let QuestionKind::Rating(kinds::Rating { from, to, labels }) = &second.kind else {
+        panic!()
+    };
+    assert_eq!((*from, *to), (1, 2));
+    assert_eq!((labels[&1].as_str(), labels[&2].as_str()), ("c", "a"));
+    let few = weighted.replace(", \"f\"", "");
+    let shown = parse("p", &with(&few)).findings.render(false);
+    assert!(
+        shown.contains("`questionnaires[0].titles` has 5 texts, not 6"),
+        "{shown}"
+    );
+}
+
+const ALONE: &str = r#"
+format = "study-protocol/3"
+study = { id = "s", title = "t", seed = 1 }
+design = { participants = 4 }
+device = { kind = "manual" }
+analysis = { primary = "sus" }
+[[questionnaires]]
+id = "sus"
+kind = "sus"
+"#;
+
+#[test]
+fn a_study_can_consist_of_questionnaires() {
+    let parsed = parse("p", ALONE);
+    let shown = parsed.findings.render(false);
+    let protocol = parsed.protocol.unwrap_or_else(|| panic!("{shown}"));
+    assert!(protocol.only_asks());
+    assert_eq!(protocol.outro.len(), 10);
+    let question = "[[questions]]\nid = \"q\"\nkind = \"text\"\nprompt = \"?\"\n";
+    for (text, expected) in [
+        (
+            ALONE.replace("primary = \"sus\"", "primary = \"susi\""),
+            "there is no questionnaire `susi`",
+        ),
+        (
+            ALONE.replace("participants = 4", "participants = 4, repetitions = 3"),
+            "`design.repetitions` has no effect in a study that presents nothing",
+        ),
+        (
+            format!("{ALONE}after = \"condition\"\n"),
+            "after = \"condition\" needs realizations, and nothing is presented",
+        ),
+        (
+            format!("{ALONE}[[outcomes]]\nid = \"time\"\nfrom = \"clock\"\n"),
+            "outcomes are measured in trials, and the study has none",
+        ),
+        (format!("{ALONE}{question}"), "nothing to present"),
+    ] {
+        let parsed = parse("p", &text);
+        assert!(parsed.protocol.is_none(), "{text}");
+        let shown = parsed.findings.render(false);
+        assert!(shown.contains(expected), "{text}\n{shown}");
+    }
+}
+
+const OWN: &str = r#"
+[[questionnaires]]
+id = "touch"
+kind = "own"
+items = ["One.", "Two.", "Three."]
+from = 0
+to = 6
+"#;
+
+#[test]
+fn a_questionnaire_of_the_studys_own_has_its_scale_and_its_scoring() {
+    let more = "labels = [\"a\", \"b\", \"c\", \"d\", \"e\", \"f\"]\nreverse = [2]\nscales = [{ id = \"x\", items = [1, 3] }]\n";
+    let parsed = parse("p", &newer(&format!("{OWN}{more}after = \"condition\"\n")));
+    let shown = parsed.findings.render(false);
+    let protocol = parsed.protocol.unwrap_or_else(|| panic!("{shown}"));
+    let own = &protocol.questionnaires[0];
+    let scoring = own.own.as_ref().unwrap();
+    assert_eq!(scoring.counted, [1, 2, 3]);
+    assert_eq!((scoring.times, scoring.plus), (1.0, 0.0));
+    let ids: Vec<&str> = own.questions.iter().map(|q| q.id.as_str()).collect();
+    assert_eq!(ids, ["touch_1", "touch_2", "touch_3"]);
+    let QuestionKind::Rating(kinds::Rating { from, to, labels }) = &own.questions[1].kind else {
+        panic!()
+    };
+    assert_eq!((*from, *to), (0, 6));
+    assert_eq!((labels[&0].as_str(), labels[&6].as_str()), ("c", "d"));
+    // Turned round, the second answer is 6.
+    let given = [Some(6.0), Some(0.0), Some(6.0)];
+    assert_eq!(own.scored().score(&given), Some(6.0));
+    assert_eq!(protocol.outcomes[0].better, None);
+}
+
+#[test]
+fn a_faulty_scoring_is_refused() {
+    let with_key = |more: &str| newer(&format!("{OWN}{more}\n"));
+    for (text, expected) in [
+        (
+            with(OWN),
+            "`questionnaires[0].from` needs the format `study-protocol/3`",
+        ),
+        (
+            with_key("reverse = [4]"),
+            "there is no item 4: the questionnaire has 3",
+        ),
+        (
+            with_key("scales = [{ id = \"x\", items = [1, 9] }]"),
+            "there is no item 9",
+        ),
+        (
+            with_key("labels = [\"a\", \"b\", \"c\"]"),
+            "has 3 texts, not 2 or, two for each item, 6",
+        ),
+        (
+            with_key("").replace("to = 6", "to = 0"),
+            "0 to 0 is no scale of at most 101 points",
+        ),
+        (
+            with_key("").replace("items = [\"One.\", \"Two.\", \"Three.\"]\n", ""),
+            "has no `items`",
+        ),
+    ] {
+        let parsed = parse("p", &text);
+        assert!(parsed.protocol.is_none(), "{text}");
+        let shown = parsed.findings.render(false);
+        assert!(shown.contains(expected), "{text}\n{shown}");
+    }
 }

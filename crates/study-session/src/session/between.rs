@@ -1,0 +1,62 @@
+//! Questionnaires between the trials: after each condition, block or part.
+//!
+//! A form of them belongs to the trial with which the condition ended, and to its attempt: if that trial
+//! is felt again, they are asked again, and the answers of before do not count.
+
+use super::Session;
+use crate::outcome::{FormId, Moment};
+use std::collections::{BTreeMap, BTreeSet};
+use study_plan::protocol::questionnaires::Stretch;
+use study_plan::protocol::{Question, Questionnaire};
+
+impl Session {
+    /// Opens the questionnaires of a condition, block or part that is over and in which they are not
+    /// completely answered; returns whether there are any.
+    pub(super) fn ask_between(&mut self, at: Moment) -> bool {
+        let questionnaires = self.protocol.questionnaires.iter();
+        let over: BTreeSet<u32> = questionnaires
+            .flat_map(|own| self.ended_with(own))
+            .collect();
+        let forms: Vec<FormId> = over
+            .into_iter()
+            .filter_map(|t| self.form_after(t))
+            .collect();
+        forms.into_iter().any(|form| self.open_form(form, at))
+    }
+
+    /// The items that are asked after a trial, those after its condition first.
+    pub(super) fn asked_after(&self, trial: u32) -> Vec<&Question> {
+        let all = self.protocol.questionnaires.iter();
+        let mut asked: Vec<&Questionnaire> = all
+            .filter(|own| self.ended_with(own).contains(&trial))
+            .collect();
+        asked.sort_by_key(|own| own.after);
+        asked.into_iter().flat_map(|own| &own.questions).collect()
+    }
+
+    fn form_after(&self, trial: u32) -> Option<FormId> {
+        let (attempt, _) = self.history.completion(trial)?;
+        Some(FormId::After { trial, attempt })
+    }
+
+    /// Of each condition, block or part of which no trial is to come, the last trial that was completed,
+    /// in the order of the plan.
+    fn ended_with(&self, own: &Questionnaire) -> BTreeSet<u32> {
+        let to_come: BTreeSet<u32> = self.history.queue.iter().copied().collect();
+        let planned = self.history.schedule().iter();
+        let all: Vec<(Stretch<'_>, u32)> = planned
+            .filter_map(|trial| Some((own.stretch(&self.protocol, trial)?, trial.trial)))
+            .collect();
+        let goes_on: BTreeSet<Stretch<'_>> = (all.iter())
+            .filter(|(_, trial)| to_come.contains(trial))
+            .map(|(stretch, _)| *stretch)
+            .collect();
+        let mut last: BTreeMap<Stretch<'_>, u32> = BTreeMap::new();
+        for (stretch, trial) in all {
+            if !goes_on.contains(&stretch) && self.history.completion(trial).is_some() {
+                last.insert(stretch, trial);
+            }
+        }
+        last.into_values().collect()
+    }
+}
