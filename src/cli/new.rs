@@ -95,6 +95,8 @@ enum TrialKind {
     Identification,
     /// How different two realizations are, for a map
     Similarity,
+    /// A level that is set until it feels equal to a standard
+    Adjustment,
     /// Yes or no, with catch trials
     #[value(name = "yesno")]
     YesNo,
@@ -117,6 +119,7 @@ impl TrialKind {
             Self::Mushra => (include_str!("new/mushra.toml"), &WITH_ANCHORS),
             Self::Identification => (include_str!("new/identification.toml"), &CROSSED),
             Self::Similarity => (include_str!("new/similarity.toml"), &[STATIC]),
+            Self::Adjustment => (include_str!("new/adjustment.toml"), &[STATIC]),
             Self::YesNo => (include_str!("new/yesno.toml"), &[STATIC]),
             Self::Abx => (include_str!("new/abx.toml"), &[MODELS[0], MODELS[2]]),
         }

@@ -5,7 +5,7 @@ use super::pages::{self, Page};
 use crate::tui::keys;
 use study_base::text::{QuestionId, Untrusted, sentence};
 use study_plan::protocol::phrases::{Phrase, Words};
-use study_plan::protocol::{Answer, Given, Question};
+use study_plan::protocol::{Answer, Given, Question, Turn};
 use study_session::outcome::{Author, Choice};
 use study_session::page::{self, Does};
 use study_session::session::view::{Correctable, DeviceState, Mirror, Telemetry};
@@ -382,6 +382,9 @@ impl Dialogue {
                 }
             },
             Screen::SaveTrouble { .. } => Ok(vec![Input::RetrySave]),
+            Screen::Playing { .. } if turn(&key, view).is_some() => {
+                Ok(turn(&key, view).map(Input::Adjust).into_iter().collect())
+            }
             Screen::Form {
                 form, questions, ..
             } => {
@@ -507,6 +510,17 @@ impl Dialogue {
                 }])
             }
         }
+    }
+}
+
+/// What a typed line changes where a level is set.
+fn turn(line: &str, view: &View) -> Option<Turn> {
+    let own = view.adjusting.as_ref().filter(|own| !own.at_standard)?;
+    match line {
+        "-" | "−" if own.can_lower => Some(Turn::Lower),
+        "+" if own.can_higher => Some(Turn::Higher),
+        "r" if own.has_standard => Some(Turn::Standard),
+        _ => None,
     }
 }
 

@@ -6,6 +6,7 @@
 //! beyond a criterion. Draws come from a stream of their own and their number never depends
 //! on the realizations.
 
+use super::adjusting::equal;
 use super::{Effect, Impression, MIDPOINT, Rater, Reference};
 use std::collections::BTreeMap;
 use study_base::perception::FORCE_JND_N;
@@ -55,6 +56,8 @@ pub struct Percepts {
     /// Of two realizations with labels, or of a part of similarity, the distance between them, N; the one
     /// that sorts first comes first.
     between: BTreeMap<(ModelId, ModelId), f64>,
+    /// Of each part of adjustment the place in its ladder that feels equal to its standard.
+    equal: BTreeMap<PartId, f64>,
 }
 
 impl Percepts {
@@ -73,7 +76,9 @@ impl Percepts {
             distances: BTreeMap::new(),
             from_reference: BTreeMap::new(),
             between: between(protocol, tables, &reference),
+            equal: BTreeMap::new(),
         };
+        percepts.equal = equal(protocol, tables, &percepts.impressions, &reference);
         for part in &protocol.parts {
             let Task::Mushra(own) = &part.task else {
                 continue;
@@ -149,6 +154,11 @@ impl Percepts {
         } else {
             0.0
         })
+    }
+
+    /// The place in the ladder of a part of adjustment, from 0, that feels equal to its standard.
+    pub fn equal(&self, part: &PartId) -> Option<f64> {
+        self.equal.get(part).copied()
     }
 
     /// The impression of a realization.
@@ -339,7 +349,7 @@ impl Rater {
             _ => {}
         }
         let method = match &trial.stimuli {
-            Stimuli::One { .. } | Stimuli::Rated { .. } => return None,
+            Stimuli::One { .. } | Stimuli::Rated { .. } | Stimuli::Adjusted { .. } => return None,
             Stimuli::Pair { .. } | Stimuli::Search { .. } => None,
             Stimuli::Track { track, .. } => Some(protocol.track(track)?.method),
         };

@@ -268,12 +268,18 @@ fn procedures_of_tracks_are_compared() {
 fn what_is_not_simulated_is_said() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
-    for kind in ["magnitude", "mushra", "identification", "similarity"] {
+    for kind in [
+        "magnitude",
+        "mushra",
+        "identification",
+        "similarity",
+        "adjustment",
+    ] {
         let protocol = new(kind, dir);
         let (code, _, err) = study(&["power", &protocol], dir);
         assert_eq!(code, 1, "{err}");
         for part in [
-            "not magnitude estimation, MUSHRA, identification and similarity",
+            "not magnitude estimation, MUSHRA, identification, similarity and adjustment",
             "--scale continuous",
         ] {
             assert!(err.contains(part), "{err}");

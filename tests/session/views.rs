@@ -139,6 +139,7 @@ pub(crate) fn view(screen: Screen) -> View {
         remarks: vec!["the motor hums".to_owned()],
         force: true,
         has_reference: false,
+        adjusting: None,
         progress: before.then_some(Progress {
             practice: false,
             current: 7,

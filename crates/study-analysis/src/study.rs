@@ -439,12 +439,15 @@ fn analyzed(ratings: &Ratings, rules: &Rules, progress: Option<&Progress>) -> An
 }
 
 /// Whether the primary question is analyzed as a rating: numbers other than estimates of
-/// magnitude and ratings of two realizations, or the share of an answer.
+/// magnitude, ratings of two realizations and levels that were set, or the share of an answer.
 pub fn is_rated(protocol: &Protocol) -> bool {
     let primary = &protocol.analysis.primary;
     let estimated = (protocol.parts.iter()).any(|part| {
-        matches!(part.task, Task::Magnitude(_) | Task::Similarity(_))
-            && part.asks.first() == Some(primary)
+        let own = matches!(
+            part.task,
+            Task::Magnitude(_) | Task::Similarity(_) | Task::Adjustment(_)
+        );
+        own && part.asks.first() == Some(primary)
     });
     !estimated && question(protocol, None).is_ok()
 }

@@ -16,6 +16,7 @@
 //!
 //! Positions count from 1.
 
+mod adjustment;
 pub mod balance;
 mod completions;
 pub mod constraints;
@@ -32,9 +33,10 @@ pub use crate::protocol::{Seat, Trial};
 pub use requeue::{Felt, Requeued, breaks_constraint, requeue};
 
 use crate::protocol::{
-    Drawn, FileOrders, Identification, Magnitude, Mushra, PartsOrder, Protocol, Similarity,
-    Stimuli, Task,
+    Adjustment, Drawn, FileOrders, Identification, Magnitude, Mushra, PartsOrder, Protocol,
+    Similarity, Stimuli, Task,
 };
+use adjustment::AdjustmentOrders;
 use constraints::Violation;
 use pairs::PairOrders;
 use search::SearchOrders;
@@ -242,6 +244,8 @@ struct PartOrders {
     reference: Option<ModelId>,
     /// Whose practice has pairs that are drawn.
     similarity: Option<Similarity>,
+    /// Whose practice has starts that are drawn.
+    adjustment: Option<Adjustment>,
     kind: Kind,
 }
 
@@ -251,6 +255,7 @@ enum Kind {
     Pairs(PairOrders),
     Tracks(TrackOrders),
     Search(SearchOrders),
+    Adjustment(AdjustmentOrders),
 }
 
 /// A trial of a part before it is numbered.
@@ -281,6 +286,7 @@ impl Planner {
                 seed,
                 reference: None,
                 similarity: None,
+                adjustment: None,
                 kind: Kind::Rating(Sequence::of_models(
                     seed,
                     None,
@@ -322,6 +328,9 @@ impl Planner {
                 Task::Similarity(own) => {
                     Kind::Pairs(PairOrders::new(seed, &part.id, &own.pairs(), &design)?)
                 }
+                Task::Adjustment(own) => {
+                    Kind::Adjustment(AdjustmentOrders::new(seed, &part.id, own))
+                }
             };
             Ok(PartOrders {
                 part: id.cloned(),
@@ -335,6 +344,7 @@ impl Planner {
                     Task::Similarity(own) => Some(own.clone()),
                     _ => None,
                 },
+                adjustment: part.task.adjustment().cloned(),
                 kind,
             })
         };
@@ -398,7 +408,7 @@ impl Planner {
     pub fn verify(&self, participants: u32) -> Result<(), ScheduleError> {
         self.parts.iter().try_for_each(|part| match &part.kind {
             Kind::Rating(sequence) => sequence.verify(participants),
-            Kind::Pairs(_) | Kind::Tracks(_) | Kind::Search(_) => Ok(()),
+            Kind::Pairs(_) | Kind::Tracks(_) | Kind::Search(_) | Kind::Adjustment(_) => Ok(()),
         })
     }
 }
@@ -411,6 +421,7 @@ impl PartOrders {
             Kind::Pairs(pairs) => pairs.plan(seat)?,
             Kind::Tracks(tracks) => tracks.plan(seat),
             Kind::Search(search) => search.plan(seat),
+            Kind::Adjustment(adjustment) => adjustment.plan(seat),
         };
         let last = |of: fn(&Trial) -> u32, practice: bool| {
             let same = trials.iter().filter(|t| t.practice == practice);
@@ -452,6 +463,9 @@ impl PartOrders {
     fn practiced(&self, seat: Seat) -> Vec<Stimuli> {
         if let (Some(own), Some(part)) = (&self.similarity, &self.part) {
             return similarity::practiced(self.seed, part, own, seat);
+        }
+        if let (Some(own), Some(part)) = (&self.adjustment, &self.part) {
+            return adjustment::practiced(self.seed, part, own, seat);
         }
         let models = self.practiced_models(seat);
         let rated = models

@@ -481,6 +481,20 @@ fn trials(p: &Protocol, part: &Part) -> String {
             counted(own.repetitions as usize, "trial", "trials"),
             order(&own.order)
         ),
+        Task::Adjustment(own) => format!(
+            "a level of `{}` is set {} from below and as often from above, one step of its {} at a time, until it feels {}; where it \
+             starts is drawn",
+            own.family,
+            counted(own.repetitions as usize, "time", "times"),
+            counted(own.models.len(), "level", "levels"),
+            match &own.standard {
+                Some(standard) => match p.level_of(standard) {
+                    Some(level) => format!("equal to {level}"),
+                    None => format!("equal to `{standard}`"),
+                },
+                None => "as it should".to_owned(),
+            }
+        ),
         Task::Search(own) => format!(
             "search in the space `{}`, {}, {}; it decides nothing",
             own.space,

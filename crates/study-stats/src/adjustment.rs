@@ -148,9 +148,11 @@ mod tests {
 
     fn subjects() -> Vec<Settings> {
         let of = |(up, down): &(&[f64], &[f64])| {
-            let set = |ascending: bool| move |level: &f64| Setting {
-                level: *level,
-                ascending,
+            let set = |ascending: bool| {
+                move |level: &f64| Setting {
+                    level: *level,
+                    ascending,
+                }
             };
             let all = up.iter().map(set(true)).chain(down.iter().map(set(false)));
             Settings::of(&all.collect::<Vec<_>>()).unwrap()

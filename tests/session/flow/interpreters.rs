@@ -2,7 +2,9 @@
 //! journals are equal but for the channel. Every page is checked against the schema of
 //! docs/page.md, and none has the name of a realization.
 
-use super::part_rig::{beside_a_reference, identification, pairs, read, similarity, track};
+use super::part_rig::{
+    adjustment, beside_a_reference, identification, pairs, read, similarity, track,
+};
 use super::rig::{DeviceMood, Rig, StoreMood};
 use super::studies::{MODELS, PRACTICE, question, rich};
 use crate::kinds::questions;
@@ -57,6 +59,7 @@ repetitions = 1
             "practice = [\"KJW-3\", \"XQZ-7\"]\nfeedback = \"always\"\ncriterion = { correct = 2, of = 3, rounds = 3 }",
         ),
         similarity("identical = true\npractice = 2"),
+        adjustment("standard = 2.0\npractice = 1"),
     ]
 }
 
@@ -81,19 +84,22 @@ enum Act {
 }
 
 fn act(draws: &mut Stream) -> Act {
-    const OTHER: [Does; 6] = [
+    const OTHER: [Does; 9] = [
         Does::Decline,
         Does::Back,
         Does::Replay,
         Does::RateStopped,
         Does::PlayAgain,
         Does::Refuse,
+        Does::Lower,
+        Does::Higher,
+        Does::Compare,
     ];
     match draws.below(40) {
         0..=1 => Act::Wrong,
         2..=3 => Act::Old,
-        4..=9 => Act::Other(OTHER[draws.below(6) as usize]),
-        10..=12 => Act::Stop,
+        4..=10 => Act::Other(OTHER[draws.below(9) as usize]),
+        11..=12 => Act::Stop,
         13 => Act::Pause,
         14..=15 => Act::Wait,
         16 => Act::Fault,
@@ -330,7 +336,9 @@ fn lines(want: &Want) -> Vec<String> {
             Does::Refuse => vec!["n", "n"],
             Does::Back => vec!["/back"],
             Does::Replay => vec!["/replay"],
-            Does::RateStopped => vec!["r"],
+            Does::RateStopped | Does::Compare => vec!["r"],
+            Does::Lower => vec!["-"],
+            Does::Higher => vec!["+"],
             _ => vec![""],
         }
         .into_iter()

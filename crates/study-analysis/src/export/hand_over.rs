@@ -297,6 +297,7 @@ fn settings(
             Task::Discrimination { .. } => "tracks",
             Task::Search(_) => "search",
             Task::Similarity(_) => "similarity",
+            Task::Adjustment(_) => "adjustment",
         };
         put(&format!("{kind} {}", part.id), question);
         for session in sessions_of(protocol, part).into_iter().flatten() {
@@ -333,6 +334,16 @@ fn settings(
                 });
                 for (model, label) in labels {
                     put(&format!("label {} {model}", part.id), label);
+                }
+            }
+            Task::Adjustment(own) => {
+                let below = own.below.iter().map(|start| (start, "below"));
+                let above = own.above.iter().map(|start| (start, "above"));
+                for (start, side) in below.chain(above) {
+                    put(&format!("start {} {start}", part.id), side);
+                }
+                if let Some(level) = own.standard.as_ref().and_then(|s| protocol.level_of(s)) {
+                    put(&format!("standard {}", part.id), &level.to_string());
                 }
             }
             Task::Rating(_) | Task::Mushra(_) | Task::Search(_) | Task::Similarity(_) => {}

@@ -140,7 +140,8 @@ fn plan(protocol: &Protocol, flags: &Overrides, part: &Part) -> Result<Plan, Pla
         | Task::Mushra(_)
         | Task::Identification(_)
         | Task::Search(_)
-        | Task::Similarity(_) => {
+        | Task::Similarity(_)
+        | Task::Adjustment(_) => {
             return Err(PlanError::NoPower(part.id.clone()));
         }
     };

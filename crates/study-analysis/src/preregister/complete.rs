@@ -8,7 +8,9 @@ use study_base::text::{ModelId, PartId, ParticipantId, QuestionId};
 use study_plan::protocol::pairs::Pairs;
 use study_plan::protocol::parts::{Part, Task, TrackRules};
 use study_plan::protocol::presentations::Presentations;
-use study_plan::protocol::{Answer, GroupRules, ModelEntry, Protocol, Role, Scale, Similarity};
+use study_plan::protocol::{
+    Adjustment, Answer, GroupRules, ModelEntry, Protocol, Role, Scale, Similarity,
+};
 use study_session::outcome::ratings::{Ratings, Realization, Row, Subject};
 use study_session::outcome::{IntervalRow, RatingRow};
 
@@ -188,6 +190,7 @@ impl Made<'_> {
             // It has no test.
             Task::Search(_) => {}
             Task::Similarity(own) => self.similarity(part, own, who),
+            Task::Adjustment(own) => self.adjustment(part, own, who),
         }
     }
 
@@ -257,6 +260,36 @@ impl Made<'_> {
         }
     }
 
+    fn adjustment(&mut self, part: &Part, own: &Adjustment, who: Who<'_>) {
+        let (Some(question), last) = (part.asks.first(), own.models.len().saturating_sub(1)) else {
+            return;
+        };
+        for repetition in 0..own.repetitions as usize {
+            for starts in [&own.below, &own.above] {
+                let Some(start) = starts.get(repetition % starts.len().max(1)) else {
+                    continue;
+                };
+                let place = (self.draws.unit() * last as f64).round() as usize;
+                let Some(set) = own.models.get(place) else {
+                    continue;
+                };
+                let level = self.protocol.level_of(set);
+                let answer = Answer::Number(level.unwrap_or(0.0));
+                let row = self.row(part, who, answer, question);
+                row.model = Some(set.clone());
+                row.level = level;
+                let trial = row.trial;
+                let first = u32::from(own.standard.is_some());
+                for (interval, model) in (first + 1..).zip([start, set]) {
+                    self.intervals.push(IntervalRow {
+                        target: Some(true),
+                        ..interval_of(part, who, (trial, interval), model)
+                    });
+                }
+            }
+        }
+    }
+
     fn compared(
         &mut self,
         part: &Part,
@@ -275,28 +308,9 @@ impl Made<'_> {
                 let row = self.row(part, who, answer, question);
                 let trial = row.trial;
                 for (interval, model) in (1..).zip([first, 1 - first]) {
-                    self.intervals.push(IntervalRow {
-                        study: String::new(),
-                        participant: who.participant.clone(),
-                        session: who.session,
-                        part: Some(part.id.clone()),
-                        trial,
-                        attempt: 1,
-                        interval,
-                        model: Some(pair[model].clone()),
-                        level: None,
-                        level_proposed: None,
-                        track: None,
-                        track_trial: None,
-                        target: None,
-                        catch: None,
-                        gap_s: None,
-                        replays: 0,
-                        exploration_s: None,
-                        strokes: None,
-                        fidelity: None,
-                        host_late_ms: None,
-                    });
+                    let presented = (trial, interval);
+                    self.intervals
+                        .push(interval_of(part, who, presented, &pair[model]));
                 }
             }
         }
@@ -363,5 +377,36 @@ impl Made<'_> {
         });
         let last = self.rows.len() - 1;
         &mut self.rows[last]
+    }
+}
+
+/// A presentation of a trial, by its number and that of the interval.
+fn interval_of(
+    part: &Part,
+    who: Who<'_>,
+    (trial, interval): (u32, u32),
+    model: &ModelId,
+) -> IntervalRow {
+    IntervalRow {
+        study: String::new(),
+        participant: who.participant.clone(),
+        session: who.session,
+        part: Some(part.id.clone()),
+        trial,
+        attempt: 1,
+        interval,
+        model: Some(model.clone()),
+        level: None,
+        level_proposed: None,
+        track: None,
+        track_trial: None,
+        target: None,
+        catch: None,
+        gap_s: None,
+        replays: 0,
+        exploration_s: None,
+        strokes: None,
+        fidelity: None,
+        host_late_ms: None,
     }
 }

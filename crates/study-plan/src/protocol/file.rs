@@ -8,6 +8,7 @@
 //! [`ROOT`] declares every key. [`parse_orders`] reads the `orders.csv` that a
 //! protocol may name.
 
+mod adjustment;
 mod agree;
 mod analysis;
 mod confirms;
@@ -130,7 +131,7 @@ const FORMATS: &[Word] = &[
 const OF_FORMAT_2: [&str; 5] = ["parts", "families", "tracks", "groups", "sessions"];
 
 /// Keys that need [`FORMAT_3`], without the places in lists.
-pub const OF_FORMAT_3: [&str; 14] = [
+pub const OF_FORMAT_3: [&str; 15] = [
     "confirms",
     "design.order_version",
     "factors",
@@ -138,6 +139,7 @@ pub const OF_FORMAT_3: [&str; 14] = [
     "spaces",
     "models.levels",
     "parts.answers",
+    "parts.confirm",
     "parts.different",
     "parts.modulus",
     "analysis.model",

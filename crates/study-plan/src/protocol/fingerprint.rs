@@ -218,10 +218,7 @@ pub fn parts(
         "outro": outro,
     });
     if !parts.is_empty() {
-        let texts = parts
-            .iter()
-            .map(|part| json!({ "id": part.id, "text": part.text }));
-        wording["parts"] = texts.collect();
+        wording["parts"] = parts.iter().map(texts).collect();
     }
     let known: Vec<Value> = models
         .iter()
@@ -261,6 +258,16 @@ pub fn parts(
         wording,
         analysis,
     }
+}
+
+/// What of a part is read.
+fn texts(part: &Part) -> Value {
+    let mut texts = json!({ "id": part.id, "text": part.text });
+    // Absent from the fingerprints of protocols without it.
+    if let Some(own) = part.task.adjustment() {
+        texts["words"] = json!(own.words);
+    }
+    texts
 }
 
 /// What of a part determines its trials.

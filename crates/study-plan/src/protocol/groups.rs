@@ -137,7 +137,7 @@ impl Protocol {
                     Task::Similarity(task) => {
                         task.keep(|m| models.contains(m) || self.level_of(m).is_some());
                     }
-                    Task::Discrimination { .. } | Task::Search(_) => {}
+                    Task::Discrimination { .. } | Task::Search(_) | Task::Adjustment(_) => {}
                 }
             }
         }

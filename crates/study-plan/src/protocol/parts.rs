@@ -7,7 +7,9 @@
 
 use super::keys::words;
 use super::presentations::{Magnitude, Mushra, Presentations};
-use super::{Answer, Identification, Pairs, Protocol, Relative, SearchTask, Seat, Similarity};
+use super::{
+    Adjustment, Answer, Identification, Pairs, Protocol, Relative, SearchTask, Seat, Similarity,
+};
 use crate::procedure::{Ladder, ProcedureError, Rule, Track};
 use serde::{Deserialize, Serialize};
 use study_base::rng::Stream;
@@ -54,6 +56,8 @@ pub enum Task {
     Search(SearchTask),
     /// Two realizations are felt, and how different they are is rated.
     Similarity(Similarity),
+    /// A level of a family is set, step by step, until it feels equal to a standard or as it should.
+    Adjustment(Adjustment),
 }
 
 impl Task {
@@ -67,7 +71,8 @@ impl Task {
             Self::Pairs(_)
             | Self::Discrimination { .. }
             | Self::Search(_)
-            | Self::Similarity(_) => None,
+            | Self::Similarity(_)
+            | Self::Adjustment(_) => None,
         }
     }
 
@@ -76,12 +81,21 @@ impl Task {
         match self {
             Self::Mushra(own) => own.reference.as_ref(),
             Self::Magnitude(own) => own.standard.as_ref().map(|standard| &standard.model),
+            Self::Adjustment(own) => own.standard.as_ref(),
             Self::Rating(_)
             | Self::Identification(_)
             | Self::Pairs(_)
             | Self::Discrimination { .. }
             | Self::Search(_)
             | Self::Similarity(_) => None,
+        }
+    }
+
+    /// What a part of adjustment sets.
+    pub fn adjustment(&self) -> Option<&Adjustment> {
+        match self {
+            Self::Adjustment(own) => Some(own),
+            _ => None,
         }
     }
 

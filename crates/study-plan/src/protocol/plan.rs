@@ -61,6 +61,14 @@ pub enum Stimuli {
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         easy: bool,
     },
+    /// A level is set, from the level of its start.
+    Adjusted {
+        /// The level at which it starts.
+        start: ModelId,
+        /// What is felt before it.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        standard: Option<ModelId>,
+    },
     /// A trial of a search. Its two points follow from the answers before it.
     Search {
         /// The space.
@@ -86,7 +94,10 @@ impl Trial {
     pub fn model(&self) -> Option<&ModelId> {
         match &self.stimuli {
             Stimuli::One { model } | Stimuli::Rated { model, .. } => Some(model),
-            Stimuli::Pair { .. } | Stimuli::Track { .. } | Stimuli::Search { .. } => None,
+            Stimuli::Pair { .. }
+            | Stimuli::Track { .. }
+            | Stimuli::Adjusted { .. }
+            | Stimuli::Search { .. } => None,
         }
     }
 
@@ -97,6 +108,7 @@ impl Trial {
             Stimuli::One { .. }
             | Stimuli::Rated { .. }
             | Stimuli::Pair { .. }
+            | Stimuli::Adjusted { .. }
             | Stimuli::Search { .. } => None,
         }
     }

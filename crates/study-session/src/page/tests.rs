@@ -32,6 +32,7 @@ fn view(screen: Screen) -> View {
         can_go_back: false,
         force: true,
         has_reference: false,
+        adjusting: None,
         remarks: Vec::new(),
         can_advance: true,
         words: Arc::new(Words::default()),

@@ -69,7 +69,9 @@ impl Session {
         if step_of(form).is_some_and(|step| self.passed.contains(&step)) {
             return false;
         }
-        let questions = self.questions(form);
+        let set = self.set_in(form);
+        let mut questions = self.questions(form);
+        questions.retain(|q| Some(&q.id) != set);
         let reached = questions
             .iter()
             .rposition(|q| self.history.answer(form, &q.id).is_some())
@@ -235,7 +237,10 @@ impl Session {
                 let label = own.label_of(model).map(str::to_owned);
                 Some(Told { correct, label })
             }
-            Stimuli::Rated { .. } | Stimuli::Pair { .. } | Stimuli::Search { .. } => None,
+            Stimuli::Rated { .. }
+            | Stimuli::Pair { .. }
+            | Stimuli::Adjusted { .. }
+            | Stimuli::Search { .. } => None,
         }
     }
 
@@ -289,6 +294,10 @@ impl Session {
         self.accepts_records()?;
         let asked = self.questions(form).into_iter().find(|q| q.id == *question);
         let given = self.history.answer(form, question);
+        // A level that was felt cannot be typed.
+        if self.set_in(form) == Some(question) {
+            return Err(InputRefused::NothingToCorrect);
+        }
         let (Some(asked), Some(from), true) = (asked, given, self.history.is_current(form)) else {
             return Err(InputRefused::NothingToCorrect);
         };

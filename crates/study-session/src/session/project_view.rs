@@ -40,6 +40,7 @@ impl Session {
             remarks: self.remarks.iter().rev().take(3).cloned().collect(),
             force: self.presents_force(),
             has_reference: self.has_reference(),
+            adjusting: self.shown_adjustment(),
             can_advance: can_advance(&screen),
             words: self.words.clone(),
             screen,
@@ -180,11 +181,23 @@ impl Session {
     /// Whether the first interval of the trial under way is a reference.
     fn has_reference(&self) -> bool {
         let open = self.history.open();
-        open.is_some_and(|open| matches!(open.trial.stimuli, Stimuli::Rated { .. }))
+        open.is_some_and(|open| match &open.trial.stimuli {
+            Stimuli::Rated { .. } => true,
+            Stimuli::Adjusted { standard, .. } => standard.is_some(),
+            Stimuli::One { .. }
+            | Stimuli::Pair { .. }
+            | Stimuli::Track { .. }
+            | Stimuli::Search { .. } => false,
+        })
     }
 
     /// The interval under way and their number, if there are several.
     fn interval_of(&self) -> Option<(u32, u32)> {
+        let attempt = self.history.open()?.attempt;
+        // How often a level was changed is not shown.
+        if attempt.is_adjusted() {
+            return attempt.is_at_standard().then_some((1, 2));
+        }
         Some((self.interval()?, self.intervals()?))
     }
 
@@ -314,7 +327,9 @@ impl Session {
         let mut items = Vec::new();
         for (form, answers) in forms {
             let title = self.shown_title(form);
-            for question in self.questions(form) {
+            let set = self.set_in(form);
+            let questions = self.questions(form).into_iter();
+            for question in questions.filter(|q| Some(&q.id) != set) {
                 let given = answers.iter().find(|g| g.question == question.id);
                 items.extend(given.map(|given| Correctable {
                     form,

@@ -37,6 +37,10 @@ impl Session {
                 return Some(Presenting::of(vec![reference.clone(), model.clone()]));
             }
             Stimuli::Pair { pair } => return Some(Presenting::of(pair.to_vec())),
+            Stimuli::Adjusted { start, standard } => {
+                let models = standard.iter().chain([start]).cloned();
+                return Some(Presenting::of(models.collect()));
+            }
             Stimuli::Search { swapped, .. } => {
                 let models = self.searched(trial, *swapped)?;
                 return Some(Presenting::of(models));

@@ -83,6 +83,10 @@ pub fn parts(study: &StudyData<'_>, include: Include) -> Vec<PartAnalysis> {
                 "groups and sessions are not compared in this part: its map is that of all participants and \
                  sessions together",
             ),
+            Task::Adjustment(_) => Some(
+                "groups and sessions are not compared in this part: its means are those of all participants and \
+                 sessions together",
+            ),
             Task::Rating(_)
             | Task::Discrimination { .. }
             | Task::Identification(_)
@@ -182,6 +186,7 @@ fn of_part_task(
             let trials = (rows, intervals);
             Some(of_similarity(study.protocol, part, own, trials, rules))
         }
+        Task::Adjustment(_) => None,
     }
 }
 

@@ -182,7 +182,7 @@ pub(super) fn agree(
                     own.keep(|m| models.contains(m) || is_level(m));
                     (task.models.clone(), own.different.len())
                 }
-                Task::Discrimination { .. } | Task::Search(_) => continue,
+                Task::Discrimination { .. } | Task::Search(_) | Task::Adjustment(_) => continue,
             };
             if left == 0 {
                 let what = format!(

@@ -1,5 +1,6 @@
 //! `[[parts]]`: trials of one kind each.
 
+use super::adjustment::{ADJUSTMENT, RawAdjustment};
 use super::pairs::{RawPairs, which};
 use super::similarity::{RawSimilarity, SIMILARITY};
 use super::spaces::RULES;
@@ -95,7 +96,7 @@ const SEARCH: &[Key] = keys! {
 };
 
 /// The kinds of trial. A new one is declared here and in [`crate::protocol::Task`].
-pub(super) const KINDS: [Variant<RawTask>; 8] = [
+pub(super) const KINDS: [Variant<RawTask>; 9] = [
     Variant::new(
         "rating",
         "One realization is felt and rated.",
@@ -230,6 +231,12 @@ pub(super) const KINDS: [Variant<RawTask>; 8] = [
         SIMILARITY,
         similarity,
     ),
+    Variant::new(
+        "adjustment",
+        "A level of a family is set, one step of its ladder at a time, until it feels equal to a standard or as it should. Needs the format `study-protocol/3`.",
+        ADJUSTMENT,
+        adjustment,
+    ),
 ];
 
 /// A part as it was read; its ids are not looked up yet.
@@ -299,6 +306,7 @@ pub(super) enum RawTask {
         gap_s: f64,
     },
     Similarity(RawSimilarity),
+    Adjustment(RawAdjustment),
 }
 
 /// A label, and of what it is the right answer.
@@ -542,4 +550,8 @@ fn search(section: &mut Section<'_, '_>) -> Option<RawTask> {
 
 fn similarity(section: &mut Section<'_, '_>) -> Option<RawTask> {
     super::similarity::similarity(section).map(RawTask::Similarity)
+}
+
+fn adjustment(section: &mut Section<'_, '_>) -> Option<RawTask> {
+    super::adjustment::adjustment(section).map(RawTask::Adjustment)
 }

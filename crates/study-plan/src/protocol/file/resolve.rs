@@ -116,6 +116,16 @@ impl Raw {
                     });
                     Some(PartialQuestion::made(&part.path, id, &own.prompt, scale))
                 }
+                // The level that was set.
+                RawTask::Adjustment(own) => {
+                    let number = QuestionKind::Number(kinds::Number {
+                        unit: None,
+                        min: None,
+                        max: None,
+                        above: None,
+                    });
+                    Some(PartialQuestion::made(&part.path, id, &own.prompt, number))
+                }
                 RawTask::Search { prompt, .. } => Some(PartialQuestion::made(
                     &part.path,
                     id,
@@ -279,6 +289,7 @@ impl Raw {
                 Some(RawTask::Similarity(own)) => {
                     own.family.as_ref().is_some_and(|own| own.0 == *id)
                 }
+                Some(RawTask::Adjustment(own)) => own.family == *id,
                 _ => false,
             };
             if !self.tracks.iter().any(of) && !self.parts.iter().any(felt) {
@@ -453,6 +464,13 @@ impl Raw {
                 asks.push(QuestionId::new(id.as_str()).ok()?);
                 (
                     Task::Similarity(looked.similarity(own, families, path)?),
+                    own.gap_s,
+                )
+            }
+            RawTask::Adjustment(own) => {
+                asks.push(QuestionId::new(id.as_str()).ok()?);
+                (
+                    Task::Adjustment(looked.adjustment(own, families?, path)?),
                     own.gap_s,
                 )
             }

@@ -37,6 +37,7 @@ fn row(
         Stimuli::One { .. }
         | Stimuli::Rated { .. }
         | Stimuli::Pair { .. }
+        | Stimuli::Adjusted { .. }
         | Stimuli::Search { .. } => None,
     };
     let playback = presentation.ended.map(|(_, ended)| ended.playback);
@@ -55,7 +56,11 @@ fn row(
         track_trial: trial.track().map(|_| trial.repetition),
         target: intervals
             .and_then(|i| i.get(at))
-            .map(|i| *i == Interval::Comparison),
+            .map(|i| *i == Interval::Comparison)
+            .or_else(|| {
+                let level = !attempt.is_standard(presentation.interval);
+                attempt.is_adjusted().then_some(level)
+            }),
         catch: track.and_then(|t| Some(t.method.is_catch(intervals?))),
         gap_s: presentation.gap_s,
         replays: presentation.replays,

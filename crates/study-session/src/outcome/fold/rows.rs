@@ -63,6 +63,7 @@ impl History {
         };
         let primary = given.iter().find(|g| g.question == *primary);
         let model = trial.model().or(match shown.map(|a| &a.models[..]) {
+            _ if shown.is_some_and(Attempt::is_adjusted) => shown.and_then(Attempt::set_to),
             Some([only]) => Some(only),
             _ => None,
         });
@@ -194,7 +195,10 @@ fn correct(
     match &trial.stimuli {
         Stimuli::Track { intervals, .. } => track?.is_correct(intervals, answer),
         Stimuli::One { model } => part?.task.identification()?.is_correct(model, answer),
-        Stimuli::Rated { .. } | Stimuli::Pair { .. } | Stimuli::Search { .. } => None,
+        Stimuli::Rated { .. }
+        | Stimuli::Pair { .. }
+        | Stimuli::Adjusted { .. }
+        | Stimuli::Search { .. } => None,
     }
 }
 
