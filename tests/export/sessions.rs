@@ -229,6 +229,16 @@ fn the_headline_of_groups_and_sessions_is_that_of_the_analysis() {
                 "similarity/pair/detent.1|detent.2/rescaled",
             ],
         ),
+        (
+            "adjustment",
+            "",
+            &[
+                "adjustment/pse",
+                "adjustment/error/p",
+                "adjustment/start/t",
+                "adjustment/spread/sd",
+            ],
+        ),
     ] {
         let home = tempfile::tempdir().unwrap();
         let folder = match kind {

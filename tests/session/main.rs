@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod adjusting_channels;
 mod another_build;
 mod blinding;
 mod bridges;

@@ -51,6 +51,9 @@ fn answer(part: &PartAnalysis, f: &PartFinding) -> Option<Answer> {
     if f.question == PartQuestion::Dimensions {
         answer.main.extend(dimensions(part));
     }
+    if f.question == PartQuestion::Starts {
+        answer.main.extend(settings(part));
+    }
     if f.question == PartQuestion::Sessions {
         answer.main.extend(retest(part));
     }
@@ -125,6 +128,7 @@ pub(super) fn results(part: &PartAnalysis) -> String {
     text.extend(information(part));
     text.extend(agreement(part));
     text.extend(identical(part));
+    text.extend(settings(part));
     let tested = part.findings.iter().filter(|f| f.test.is_some());
     text.extend(tested.filter_map(|f| wording::of_part(part, f).paper()));
     text.extend(dimensions(part));
@@ -234,6 +238,27 @@ fn agreement(part: &PartAnalysis) -> Option<String> {
     Some(format!(
         "Agreement: the ratings of two participants correlate by {} on average{w}.{order}",
         apa::two(correlation)
+    ))
+}
+
+/// Where levels feel equal, and how much settings scatter.
+fn settings(part: &PartAnalysis) -> Option<String> {
+    let found = part.results.over.adjustment.as_ref()?;
+    let pse = apa::plain(found.pse.number()?);
+    let ci95 = found.pse_ci95.ends();
+    let ci95 = ci95.map_or_else(String::new, |(low, high)| {
+        format!(", 95 % CI [{}, {}]", apa::plain(low), apa::plain(high))
+    });
+    let spread = found.spread.sd.number().map_or_else(String::new, |sd| {
+        let share = found.spread.relative.number();
+        let share = share.map_or_else(String::new, |share| format!(" ({} of it)", apa::percent(share)));
+        format!(
+            " Settings of a participant scattered by {}{share} from one side, one standard deviation.",
+            apa::plain(sd)
+        )
+    });
+    Some(format!(
+        "The point of subjective equality was {pse} on average{ci95}.{spread}"
     ))
 }
 

@@ -277,6 +277,8 @@ analysis = { primary = "better" }
             PartQuestion::Structure,
             PartQuestion::Dimensions,
             PartQuestion::MapFollows("VAF".to_owned()),
+            PartQuestion::Adjusted,
+            PartQuestion::Starts,
             PartQuestion::Groups,
             PartQuestion::GroupsConditions,
             PartQuestion::Sessions,

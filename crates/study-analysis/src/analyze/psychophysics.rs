@@ -1,8 +1,9 @@
 //! Statistics of thresholds and comparisons: tracks, psychometric functions, detection,
-//! paired preferences, magnitude estimation, MUSHRA, identification, similarity. Each function takes what was
+//! paired preferences, magnitude estimation, MUSHRA, identification, similarity, adjustment. Each function takes what was
 //! answered and returns statistics as records; `docs/statistics-psychophysics.md`
 //! defines them.
 
+mod adjustment;
 mod again;
 mod counting;
 pub(crate) mod decided;
@@ -13,6 +14,7 @@ mod findings;
 mod fits;
 mod identification;
 mod marginal;
+mod of_adjustment;
 mod of_identification;
 mod of_scales;
 mod of_similarity;
@@ -32,6 +34,7 @@ mod table;
 mod tracks;
 mod trials;
 
+pub use adjustment::{SettingRow, adjustment};
 pub use detection::{Detection, Task, detection};
 pub(crate) use discriminations::{have_ratios, settings as track_settings};
 pub use findings::{PartFinding, PartQuestion};

@@ -1,6 +1,7 @@
 //! The tables of thresholds, sensitivities and preferences: the same on the terminal, in
 //! the report and as CSV.
 
+mod adjustment;
 mod identification;
 mod population;
 mod scales;
@@ -21,7 +22,7 @@ use study_base::text::Untrusted;
 type Kind = (&'static str, fn(&PartResults) -> Table);
 
 /// All tables, in the order of a page; those without rows and notes are left out of it.
-pub(crate) const KINDS: [Kind; 25] = [
+pub(crate) const KINDS: [Kind; 26] = [
     ("part_thresholds.csv", thresholds),
     ("part_population.csv", population::population),
     ("part_population_contrasts.csv", population::contrasts),
@@ -43,6 +44,7 @@ pub(crate) const KINDS: [Kind; 25] = [
     ("part_map_follows.csv", similarity::follows),
     ("part_differences.csv", similarity::pairs),
     ("part_similarity.csv", similarity::participants),
+    ("part_adjustment.csv", adjustment::participants),
     ("part_scores.csv", scores),
     ("part_items.csv", items),
     ("part_groups.csv", groups),

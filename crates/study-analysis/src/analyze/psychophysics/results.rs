@@ -1,5 +1,6 @@
 //! The statistics of a part as records.
 
+pub use super::adjustment::{Adjusted, ConstantError, OwnSettings, SettingSpread, SidesOfStart};
 pub use super::again::{Again, Groups, Profiles, Retest};
 pub use super::detection::Sensitivity;
 pub use super::fits::{
@@ -88,6 +89,8 @@ statistics! {
         identification: Option<Identified>,
         /// how different realizations are
         similarity: Option<Similarities>,
+        /// levels that were set
+        adjustment: Option<Adjusted>,
         /// groups and sessions
         again: Again as "",
     }

@@ -1,5 +1,6 @@
 //! Trials of somebody else's experiment, from a CSV.
 
+use super::adjustment::{SettingRow, adjustment};
 use super::identification::{LabelRow, identification, labels_of};
 use super::preferences::{Choice, Preference, in_both_orders, preferences};
 use super::results::PartResults;
@@ -27,16 +28,19 @@ pub enum TableKind {
     Identification,
     /// Similarity: `participant,first,second,rating`.
     Similarity,
+    /// Adjustment: `participant,start,level[,standard]`.
+    Adjustment,
 }
 
 impl TableKind {
     /// The kinds that are no trials, with their names.
-    const OTHERS: [(Self, &str); 5] = [
+    const OTHERS: [(Self, &str); 6] = [
         (Self::Pairs, "pairs"),
         (Self::Magnitude, "magnitude"),
         (Self::Mushra, "mushra"),
         (Self::Identification, "identification"),
         (Self::Similarity, "similarity"),
+        (Self::Adjustment, "adjustment"),
     ];
 
     /// The kind of a name.
@@ -145,6 +149,10 @@ pub fn analyze_table(
             let (ratings, streams) = (rows.differences()?, (settings.seed, "table"));
             results.over.similarity = Some(similarity(&ratings, &Properties::new(), streams));
         }
+        TableKind::Adjustment => {
+            let ((set, standard), streams) = (rows.settings()?, (settings.seed, "table"));
+            results.over.adjustment = Some(adjustment(&set, standard, streams));
+        }
     }
     Ok((results, rows.records.len()))
 }
@@ -162,6 +170,7 @@ pub fn read_table(name: &str, input: impl BufRead, kind: TableKind) -> Result<()
         TableKind::Mushra => rows.ratings().map(|_| ()),
         TableKind::Identification => rows.labels().map(|_| ()),
         TableKind::Similarity => rows.differences().map(|_| ()),
+        TableKind::Adjustment => rows.settings().map(|_| ()),
     }
 }
 
@@ -248,6 +257,7 @@ impl<'a> Rows<'a> {
                 ("identification", "participant[,realization],target,answer")
             }
             TableKind::Similarity => ("similarity", "participant,first,second,rating"),
+            TableKind::Adjustment => ("adjustment", "participant,start,level[,standard]"),
         };
         found.ok_or_else(|| TableError::Column {
             name: self.name.to_owned(),
@@ -476,6 +486,36 @@ impl<'a> Rows<'a> {
             })
         };
         self.records.iter().map(one).collect()
+    }
+
+    /// Levels that were set, and that of the standard, if the table has it.
+    fn settings(&self) -> Result<(Vec<SettingRow>, Option<f64>), TableError> {
+        let participant = self.required("participant")?;
+        let (start, level) = (self.required("start")?, self.required("level")?);
+        let any = (f64::MIN, f64::MAX);
+        let mut standard: Option<f64> = None;
+        for row in &self.records {
+            let Some(at) = self.column("standard") else {
+                break;
+            };
+            let own = self.number(row, ("standard", at), any)?;
+            let first = *standard.get_or_insert(own);
+            if own != first {
+                let expected = format!("{first}: a table has one standard");
+                return Err(self.fault(row.0, "standard", &row.1[at], expected));
+            }
+        }
+        let one = |row: &(u64, csv::StringRecord)| {
+            let side = self.word(row, ("start", start), &["below", "above"])?;
+            Ok(SettingRow {
+                participant: row.1[participant].to_owned(),
+                level: self.number(row, ("level", level), any)?,
+                ascending: side == 0,
+                changes: None,
+            })
+        };
+        let rows: Result<Vec<_>, TableError> = self.records.iter().map(one).collect();
+        Ok((rows?, standard))
     }
 
     /// The ratings, and which conditions are hidden reference and mid anchor.

@@ -52,12 +52,4 @@ impl Attempt {
         let levels = numbered.filter(|(interval, _)| !self.is_standard(*interval));
         levels.last().map(|(_, model)| model)
     }
-
-    /// The level at which a trial of adjustment starts.
-    pub fn starts_at(&self) -> Option<&ModelId> {
-        self.standards.as_ref()?;
-        let mut numbered = (1..).zip(&self.models);
-        let start = numbered.find(|(interval, _)| !self.is_standard(*interval));
-        start.map(|(_, model)| model)
-    }
 }
