@@ -558,6 +558,9 @@ fn random_sessions_have_the_same_journal_in_lines_by_the_browser_and_through_a_f
         "RateStopped",
         "PlayAgain",
         "Refuse",
+        "Lower",
+        "Higher",
+        "Compare",
     ] {
         assert!(
             outcomes.contains(&(format!("Other({does})"), true)),

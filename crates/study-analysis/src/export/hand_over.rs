@@ -128,13 +128,14 @@ impl Format for R {
 }
 
 /// The analysis of the exported rows; `None` if the primary question has no numbers, has
-/// estimates of magnitude, or nothing was rated.
+/// estimates of magnitude or levels that were set, or nothing was rated.
 fn analysis(job: &Job<'_>) -> Option<Analysis> {
     let protocol = job.source.protocol;
     let question = protocol.primary()?;
     let share_of = protocol.analysis.share_of(&question.id);
     let estimated = (protocol.parts.iter()).any(|part| {
-        matches!(part.task, Task::Magnitude(_)) && part.asks.first() == Some(&question.id)
+        let own = matches!(part.task, Task::Magnitude(_) | Task::Adjustment(_));
+        own && part.asks.first() == Some(&question.id)
     });
     if estimated || !(question.kind.scale().is_number() || share_of.is_some()) {
         return None;

@@ -276,7 +276,6 @@ impl Made<'_> {
                 let level = self.protocol.level_of(set);
                 let answer = Answer::Number(level.unwrap_or(0.0));
                 let row = self.row(part, who, answer, question);
-                row.model = Some(set.clone());
                 row.level = level;
                 let trial = row.trial;
                 let first = u32::from(own.standard.is_some());

@@ -63,7 +63,8 @@ impl History {
         };
         let primary = given.iter().find(|g| g.question == *primary);
         let model = trial.model().or(match shown.map(|a| &a.models[..]) {
-            _ if shown.is_some_and(Attempt::is_adjusted) => shown.and_then(Attempt::set_to),
+            // What was set is a level, and no realization that was presented.
+            _ if shown.is_some_and(Attempt::is_adjusted) => None,
             Some([only]) => Some(only),
             _ => None,
         });
@@ -132,7 +133,8 @@ impl History {
             level: (track.and_then(TrackRules::family))
                 .and_then(|_| shown?.level)
                 .map(|level| level.presented)
-                .or_else(|| protocol.level_of(shown.and(model)?)),
+                .or_else(|| protocol.level_of(shown.and(model)?))
+                .or_else(|| protocol.level_of(shown?.set_to()?)),
             correct: correct(trial, track, part, &given, before_feedback.as_ref()),
             replays: shown.map(|a| a.replays),
             fidelity: worst.cloned(),
