@@ -115,7 +115,7 @@ fn texts(question: &PartQuestion) -> Wording {
             ask: "Do settings differ from the standard?",
             yes: "Settings differed from the standard",
             not_shown: "It was not shown that settings differ from the standard",
-            shown: "by {size}, {result} ({corrected}, {people})",
+            shown: "difference {size}, {result} ({corrected}, {people})",
             ..PART
         },
         PartQuestion::Starts => Wording {
