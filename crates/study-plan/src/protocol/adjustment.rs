@@ -80,7 +80,7 @@ impl Adjustment {
         let target = standard.filter(|s| self.step(s).is_some()).or(middle);
         let starts = self.below.iter().chain(&self.above);
         let all = starts.filter_map(|start| self.steps(start, target?));
-        let (mut sum, mut n) = (0, 0);
+        let (mut sum, mut n) = (0_usize, 0_usize);
         for steps in all {
             sum += steps;
             n += 1;
