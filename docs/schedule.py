@@ -322,6 +322,16 @@ def similarity_of(seed, part, different, identical, practice, kind, number, pair
     yield from pairs(different + [[m, m] for m in identical])
 
 
+def rankings_of(seed, part, models, practice, order, kind, number):
+    stream = Stream(seed, "schedule", "part", part, "practice", kind, str(number))
+    for _ in range(practice):
+        once = list(models)
+        stream.shuffle(once)
+        yield " ".join(once)
+    for at in range(0, len(order), len(models)):
+        yield " ".join(models[m] for m in order[at : at + len(models)])
+
+
 def practice_of(seed, part, models, rounds, draw, kind, number):
     stream = Stream(seed, "schedule", "part", part, "practice", kind, str(number))
     for _ in range(rounds):
@@ -370,6 +380,7 @@ def main():
     what.add_argument("--constant", help="ID:LEVELS:REPETITIONS, levels by comma")
     what.add_argument("--practice", help="ids by comma, of a part with a criterion")
     what.add_argument("--similarity", help="such as a/b,a/c, pairs of different ones of a part")
+    what.add_argument("--ranking", help="ids by comma, of a part")
     what.add_argument("--adjustment", help="BELOW:ABOVE, the starts of each side by comma")
     parser.add_argument("--part", help="its id")
     parser.add_argument("--repetitions", type=int)
@@ -380,6 +391,7 @@ def main():
     parser.add_argument("--order-version", type=int, default=1, choices=[1, 2])
     parser.add_argument("--identical", default="", help="ids by comma, compared with themselves")
     parser.add_argument("--practice-pairs", "--practice-trials", type=int, default=0)
+    parser.add_argument("--practice-rankings", type=int, default=0)
     parser.add_argument("--rounds", type=int)
     parser.add_argument("--draw", default="rounds", choices=["rounds", "independent"])
     parser.add_argument("--kind", default="row", choices=["row", "pilot", "simulated"])
@@ -416,6 +428,13 @@ def main():
 
             how = (identical, a.practice_pairs, a.kind, number, of)
             return similarity_of(a.seed, a.part, different, *how)
+    elif a.ranking:
+        head, ranked = "set", a.ranking.split(",")
+
+        def lines(number):
+            own = order(len(ranked), a.kind, number)
+            how = (ranked, a.practice_rankings, own, a.kind, number)
+            return rankings_of(a.seed, a.part, *how)
     elif a.adjustment:
         head, sides = "start", [side.split(",") for side in a.adjustment.split(":")]
 

@@ -303,6 +303,7 @@ impl Runner {
                 None => error.to_string(),
             }),
             Ok((claimed, journal)) => {
+                self.took_time();
                 self.saver = Some(Saver::new(claimed.folder, journal, self.setup.threaded));
                 let identity = self.setup.device.identity();
                 Input::Claimed(Box::new(Claim {

@@ -47,6 +47,7 @@ pub(crate) fn values(text: &str) -> Result<Map<String, Json>, Error> {
         "mushra" => vec![(String::new(), mushra(input)?)],
         "identification" => vec![(String::new(), identification(input)?)],
         "similarity" => vec![(String::new(), similarity(input)?)],
+        "ranking" => vec![(String::new(), ranking(input)?)],
         "adjustment" => vec![(String::new(), adjustment(input)?)],
         other => return Err(Error::Unknown("the kind", other.to_owned())),
     };
@@ -527,6 +528,21 @@ fn similarity(input: &Settings) -> Result<Values, Error> {
     let none = analysis::Properties::new();
     let found = analysis::similarity(&rows, &none, (SEED, "table"));
     Ok(named("similarity", &found))
+}
+
+fn ranking(input: &Settings) -> Result<Values, Error> {
+    let rows = (input.rows()?.iter())
+        .map(|row| {
+            Ok(analysis::RankingRow {
+                participant: row.name("participant").unwrap_or_default(),
+                ranking: row.name("ranking").unwrap_or_default(),
+                realization: row.name("realization").unwrap_or_default(),
+                rank: row.number("rank")?,
+            })
+        })
+        .collect::<Result<Vec<_>, Error>>()?;
+    let found = analysis::ranking(&rows, (SEED, "table"));
+    Ok(named("ranking", &found))
 }
 
 fn adjustment(input: &Settings) -> Result<Values, Error> {

@@ -20,6 +20,7 @@ use study_haptics::identify::identification::{
     self, Identification, IdentificationError, Request, Source, Sources,
 };
 use study_haptics::identify::method::Progress;
+use study_haptics::identify::perceptual::{Weights, file};
 use study_haptics::recording::{Names, RecordingFault, force_curve};
 use study_report::identification::{Drawing, document, figures, page, text};
 use study_report::picture::png::Painter;
@@ -35,7 +36,10 @@ type OutputFile = (PathBuf, Vec<u8>);
 
 /// Identifies a grid of realizations, prints it and writes the files.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
-    let request = args.request();
+    let mut request = args.request();
+    request.weights = (args.weights.as_deref())
+        .map(|path| read_weights(path, console))
+        .transpose()?;
     request.options.methods().map_err(|e| refused(&e.into()))?;
     let names = args.names()?;
     let mut read = |paths: &[NamedPath]| -> Result<Vec<Source>, Failure> {
@@ -121,6 +125,20 @@ fn identify(
         bar.finish_and_clear();
     }
     found.map_err(|e| refused(&e))
+}
+
+/// Reads a file of weights; prints its warnings.
+fn read_weights(path: &Path, console: &mut Console) -> Result<Weights, Failure> {
+    let shown = path.display().to_string();
+    let bytes = read_capped(path, file::MAX_FILE_BYTES)
+        .map_err(|problem| Failure::input(format!("{shown}: {problem}")))?;
+    match file::parse(&shown, &String::from_utf8_lossy(&bytes)) {
+        (Some(weights), findings) => {
+            console.findings(&[findings]);
+            Ok(weights)
+        }
+        (None, findings) => Err(Failure::faults(vec![findings])),
+    }
 }
 
 fn refused(error: &IdentificationError) -> Failure {

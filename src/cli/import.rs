@@ -8,7 +8,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use study_base::hex::sha256;
 use study_base::text::counted;
-use study_haptics::recording::force_curve::{self as curve, Source, Stated, USUAL_RATE_HZ};
+use study_haptics::recording::force_curve::{
+    self as curve, LEAST_RATE_HZ, MOST_RATE_HZ, Source, Stated, USUAL_RATE_HZ,
+};
 
 /// A longer press is likelier a time in ms, s.
 const LONG_S: f64 = 1800.0;
@@ -59,8 +61,12 @@ struct ForceCurve {
     license: Option<String>,
 
     /// Rows a second of files without a time [default: 10]
-    #[arg(long, value_name = "HZ", value_parser = rate)]
+    #[arg(long, value_name = "HZ", value_parser = rate, allow_negative_numbers = true)]
     rate: Option<f64>,
+
+    /// Write the names of the files into the recording, as version 0.2 did: it is another recording then if they have other names
+    #[arg(long)]
+    file_names: bool,
 
     /// Accept a target that supplies energy: without this flag it is refused, because most likely the file is wrong
     #[arg(long)]
@@ -72,9 +78,9 @@ struct ForceCurve {
 }
 
 fn rate(given: &str) -> Result<f64, String> {
-    let rate = given.parse().ok();
-    rate.filter(|hz: &f64| *hz > 0.0 && hz.is_finite())
-        .ok_or_else(|| "a rate is a number above 0".to_owned())
+    let rate = given.trim().parse().ok();
+    rate.filter(|hz: &f64| (LEAST_RATE_HZ..=MOST_RATE_HZ).contains(hz))
+        .ok_or_else(|| format!("a rate is a number from {LEAST_RATE_HZ} to {MOST_RATE_HZ} Hz"))
 }
 
 /// A measurement cannot be made again.
@@ -180,6 +186,7 @@ fn force_curve(args: &ForceCurve, console: &mut Console) -> Result<(), Failure> 
         credit: args.credit.as_deref(),
         license: args.license.as_deref(),
         rate_hz: args.rate,
+        file_names: args.file_names,
     };
     let recording = curve::join(&sources, stated);
     write_file(&args.out, |sink| sink.write_all(&recording))?;

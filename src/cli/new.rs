@@ -48,6 +48,9 @@ const WITH_ANCHORS: [(&str, &str); 5] = [
     MODELS[2],
 ];
 
+/// Realizations that are ranked.
+const RANKED: [(&str, &str); 4] = [WITH_ANCHORS[1], MODELS[0], MODELS[1], MODELS[2]];
+
 /// Two factors with two levels each.
 const CROSSED: [(&str, &str); 4] = [
     (
@@ -95,6 +98,8 @@ enum TrialKind {
     Identification,
     /// How different two realizations are, for a map
     Similarity,
+    /// Ranks of several realizations
+    Ranking,
     /// A level that is set until it feels equal to a standard
     Adjustment,
     /// Yes or no, with catch trials
@@ -119,6 +124,7 @@ impl TrialKind {
             Self::Mushra => (include_str!("new/mushra.toml"), &WITH_ANCHORS),
             Self::Identification => (include_str!("new/identification.toml"), &CROSSED),
             Self::Similarity => (include_str!("new/similarity.toml"), &[STATIC]),
+            Self::Ranking => (include_str!("new/ranking.toml"), &RANKED),
             Self::Adjustment => (include_str!("new/adjustment.toml"), &[STATIC]),
             Self::YesNo => (include_str!("new/yesno.toml"), &[STATIC]),
             Self::Abx => (include_str!("new/abx.toml"), &[MODELS[0], MODELS[2]]),
@@ -376,6 +382,7 @@ fn write(dir: &Path, files: &Files) -> Result<(), Failure> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use study_plan::protocol::check;
 
     #[test]
     fn a_folder_name_becomes_a_study_id() {
@@ -397,6 +404,31 @@ mod tests {
         assert_eq!(twice, format!("{}-replication-2", "x".repeat(50)));
         assert!(once.len() == 64 && twice.len() == 64);
         assert_eq!(next(&format!("{}-y", "x".repeat(51)), 1, 2).0.len(), 63);
+    }
+
+    /// Nobody rates what was not felt, in any study that this program writes or ships.
+    #[test]
+    fn new_and_shipped_studies_have_a_least_exposure() {
+        use clap::ValueEnum as _;
+        let new = TrialKind::value_variants()
+            .iter()
+            .map(|kind| kind.files().0);
+        let mut texts: Vec<String> = new.map(str::to_owned).collect();
+        for folder in subfolders(&Path::new(env!("CARGO_MANIFEST_DIR")).join("protocols")).unwrap()
+        {
+            texts.push(fs::read_to_string(folder.join(load::FILE_NAME)).unwrap());
+        }
+        assert!(texts.len() > 20, "{}", texts.len());
+        for text in texts {
+            let parsed = file::parse(load::FILE_NAME, &text);
+            let shown = parsed.findings.render(false);
+            let protocol = parsed.protocol.unwrap_or_else(|| panic!("{shown}"));
+            let found = check::warnings(&protocol, &parsed.spans, &[]);
+            let unfelt = found
+                .iter()
+                .find(|fault| fault.message.contains("before anything was felt"));
+            assert!(unfelt.is_none(), "{}: {unfelt:?}", protocol.study.id);
+        }
     }
 
     #[test]

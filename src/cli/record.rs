@@ -35,7 +35,7 @@ pub(super) struct Args {
     out: Option<PathBuf>,
 
     /// Sampling rate
-    #[arg(long, value_name = "HZ", default_value_t = 1000.0, value_parser = rate)]
+    #[arg(long, value_name = "HZ", default_value_t = 1000.0, value_parser = rate, allow_negative_numbers = true)]
     rate: f64,
 
     /// The probe: simulated (with a simulated target), or on a serial port

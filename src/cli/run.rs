@@ -3,6 +3,7 @@
 mod ending;
 mod hurry;
 mod page;
+mod people;
 mod unrendered;
 mod unsaved;
 
@@ -21,12 +22,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use study_analysis::load;
 use study_base::text::{PartId, ParticipantId, Untrusted};
-use study_session::session::roster::Newcomer;
-use study_session::session::{Config, Ending, MAX_OPERATOR, Roster};
-use study_session::store::{
-    Copies, Frozen, Plan, SeatKind, SessionData, StudyFolder, check_new_id, layout, next_row,
-    next_session, participants,
-};
+use study_session::session::{Config, Ending, MAX_OPERATOR};
+use study_session::store::{Copies, Frozen, Plan, SeatKind, StudyFolder, check_new_id, layout};
 
 /// Arguments of `study run`.
 #[derive(Debug, clap::Args)]
@@ -211,6 +208,18 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     study.refresh(&loaded.protocol)?;
     let models = loaded.tables();
     let protocol = Arc::new(loaded.protocol);
+    let plan = Plan::of(&protocol, args.group.clone(), at.wall);
+    let rig = people::Rig {
+        kind: seats,
+        rows: args.rows.as_ref(),
+        plan: &plan,
+    };
+    let mut roster = people::roster(&known, &rig);
+    let within_h = protocol.session.resume_within_h;
+    if let Some(session) = people::interrupted(&known, &rig, within_h, |s| study.is_open(s)) {
+        let goes_on = people::goes_on(&session.history, &protocol);
+        roster.interrupted(session.participant.clone(), goes_on);
+    }
     let setup = Setup {
         protocol: protocol.clone(),
         orders: loaded.orders.map(Arc::new),
@@ -232,12 +241,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         participant: args.participant.clone().unwrap_or_default(),
         operator: args.operator.clone().unwrap_or_default(),
         front: front_name,
-        roster: Some(Arc::new(roster(
-            &known,
-            seats,
-            args.rows.as_ref(),
-            &Plan::of(&protocol, args.group.clone(), at.wall),
-        ))),
+        roster: Some(Arc::new(roster)),
         auto_identify: args.participant.is_some() && args.operator.is_some(),
     };
     let study = setup.study.clone();
@@ -287,37 +291,6 @@ fn protocol_here() -> Result<PathBuf, Failure> {
              `study new my-study` writes one",
         ),
     )
-}
-
-/// The participants so far, and what a new one becomes.
-fn roster(
-    sessions: &[SessionData],
-    kind: SeatKind,
-    rows: Option<&RangeInclusive<u32>>,
-    plan: &Plan,
-) -> Roster {
-    let newcomer = match kind {
-        SeatKind::Real => next_row(rows, sessions).map_or(Newcomer::NoRow, Newcomer::Row),
-        SeatKind::Pilot => Newcomer::Pilot,
-        SeatKind::Simulated => Newcomer::Simulated,
-    };
-    let mut roster = Roster::new(&participants(sessions), newcomer);
-    if let Some(search) = plan
-        .confirms
-        .as_ref()
-        .filter(|_| kind != SeatKind::Simulated)
-    {
-        roster.confirms(search.clone());
-    }
-    let of_one = sessions.chunk_by(|a, b| a.participant == b.participant);
-    for own in of_one.filter(|_| !plan.sessions.is_empty()) {
-        let own: Vec<&SessionData> = own.iter().collect();
-        let next = next_session(&own, plan);
-        if let Some(words) = next.of_finished(plan.sessions.len()) {
-            roster.comes_again(&own[0].participant, words);
-        }
-    }
-    roster
 }
 
 /// Says which of results folder and mirror was left behind.
@@ -457,8 +430,6 @@ mod tests {
     use std::cell::RefCell;
     use std::path::Path;
     use std::rc::Rc;
-    use study_plan::protocol::Seat;
-    use study_session::outcome::State;
     use study_session::store::StoreError;
 
     #[derive(Clone, Default)]
@@ -510,38 +481,6 @@ mod tests {
         assert!(failure.hint.unwrap().contains("--rebuild"));
         let text = String::from_utf8(out.0.borrow().clone()).unwrap();
         assert!(text.contains("Resume it with: study run X"), "{text}");
-    }
-
-    #[test]
-    fn the_first_screen_knows_everybody_and_the_next_row_of_this_rig() {
-        let study = StudyFolder::open(Path::new("results/turn-signal-example")).unwrap();
-        let mut sessions = study.sessions().unwrap();
-        sessions[0].seat = Some(Seat::Row(1));
-        sessions[1].history.standing.state = State::Unfinished;
-        sessions[2].history.standing.state = State::DroppedOut;
-        let of = |kind, rows: Option<RangeInclusive<u32>>| {
-            roster(&sessions, kind, rows.as_ref(), &Plan::default())
-        };
-        let all = of(SeatKind::Real, None);
-        assert_eq!(all.who("nobody-yet").unwrap(), "new, row 2");
-        assert_eq!(
-            of(SeatKind::Real, Some(40..=50)).who("N1").unwrap(),
-            "new, row 40"
-        );
-        assert_eq!(
-            of(SeatKind::Real, Some(1..=1)).who("N1").unwrap(),
-            "new, but no row is free"
-        );
-        assert_eq!(of(SeatKind::Pilot, None).who("N1").unwrap(), "new, a pilot");
-        for (id, who) in [
-            ("SIM001", "finished"),
-            ("SIM002", "unfinished, 15 of 15 trials saved"),
-            (" SIM003 ", "dropped-out"),
-            ("sim003", "too similar to SIM003"),
-        ] {
-            assert_eq!(all.who(id).unwrap(), who);
-        }
-        assert_eq!(all.who("../x"), None);
     }
 
     #[test]

@@ -293,6 +293,10 @@ fn csv(header: bool, plans: &[(u32, Vec<Trial>)]) -> Result<String, Failure> {
                     Stimuli::Track {
                         intervals, easy, ..
                     } => (parts::intervals(intervals), easy.to_string()),
+                    Stimuli::Set { set } => {
+                        let ids: Vec<&str> = set.iter().map(|m| m.as_str()).collect();
+                        (ids.join(" "), String::new())
+                    }
                     _ => (String::new(), String::new()),
                 };
                 let part = t

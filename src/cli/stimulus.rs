@@ -153,7 +153,7 @@ fn pack(args: &Pack, console: &mut Console) -> Result<(), Failure> {
                 "say it with --{key}, or in the header of the recording: # {key}: …"
             )),
             BundleError::Other(_) => failure.hint(
-                "every byte counts: a program that converts line ends or the encoding makes another recording of it",
+                "every byte counts: a program that converts line ends or the encoding makes another recording of it; a recording that `study import force-curve` of version 0.2 made needs its --file-names now",
             ),
             BundleError::Absent(_) => failure.hint("name every recording after the model file"),
             _ => failure,

@@ -34,7 +34,7 @@ pub(super) struct Args {
     out: Option<PathBuf>,
 
     /// Sampling rate, of the CSV and of the recording that is foretold
-    #[arg(long, value_name = "HZ", default_value_t = 1000.0, value_parser = rate)]
+    #[arg(long, value_name = "HZ", default_value_t = 1000.0, value_parser = rate, allow_negative_numbers = true)]
     rate: f64,
 
     /// Resolution of the encoder

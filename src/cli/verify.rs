@@ -35,7 +35,9 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         if let Some(copy) = &args.against {
             found.extend(study.verify_against(&copy_of(&study, copy)?)?);
         }
-        console.out(of_study(&study, &study.sessions()?, &found))?;
+        let sessions = study.sessions()?;
+        let not_checked = study.not_checked(&sessions, protocol.is_ok());
+        console.out(of_study(&study, &sessions, &found, &not_checked))?;
         problems += count_problems(&found);
     }
     match problems {
@@ -61,7 +63,12 @@ fn copy_of(study: &StudyFolder, dir: &Path) -> Result<PathBuf, Failure> {
     })
 }
 
-fn of_study(study: &StudyFolder, sessions: &[SessionData], found: &[Finding]) -> String {
+fn of_study(
+    study: &StudyFolder,
+    sessions: &[SessionData],
+    found: &[Finding],
+    not_checked: &[String],
+) -> String {
     let path = study.path().display().to_string();
     let mut out = String::new();
     for finding in found {
@@ -85,9 +92,9 @@ fn of_study(study: &StudyFolder, sessions: &[SessionData], found: &[Finding]) ->
         counted(sessions.len(), "session", "sessions"),
         counted(events, "event", "events"),
     ));
-    out.push_str(
-        "Not checked: the numbers in telemetry files of earlier releases (only their files and lines are counted) and analysis/.\n",
-    );
+    for what in not_checked {
+        out.push_str(&format!("Not checked: {what}.\n"));
+    }
     if found
         .iter()
         .any(|f| f.is_problem && layout::TABLES.contains(&f.place.as_str()))

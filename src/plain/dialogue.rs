@@ -7,7 +7,7 @@ use study_base::text::{QuestionId, Untrusted, sentence};
 use study_plan::protocol::phrases::{Phrase, Words};
 use study_plan::protocol::{Answer, Given, Question, Turn};
 use study_session::outcome::{Author, Choice};
-use study_session::page::{self, Does};
+use study_session::page::{self, Does, NOT_BEGUN};
 use study_session::session::view::{Correctable, DeviceState, Mirror, Telemetry};
 use study_session::session::{Input, Roster, Screen, View};
 
@@ -163,6 +163,12 @@ impl Dialogue {
 
     fn who(&self, page: &mut Page, participant: &str, operator: &str, roster: Option<&Roster>) {
         page.lines = vec!["Who takes part?".to_owned()];
+        if let Some((_, sentences)) = roster.and_then(Roster::unfinished)
+            && participant.is_empty()
+        {
+            page.lines.push(sentences.join(" "));
+        }
+        let proposed = preset(participant, roster);
         let known = |preset: &str, word: &str| match preset {
             "" => format!("Type {word}, then press Enter."),
             preset => format!(
@@ -171,7 +177,7 @@ impl Dialogue {
             ),
         };
         page.prompt = match &self.participant {
-            None => known(participant, "the participant's pseudonym, such as P01"),
+            None => known(&proposed, "the participant's pseudonym, such as P01"),
             Some(id) => {
                 let who = roster.and_then(|roster| roster.who(id));
                 let who = who.map_or_else(String::new, |who| format!(" {}: {who}.", Untrusted(id)));
@@ -252,7 +258,7 @@ impl Dialogue {
     fn command(&mut self, command: &str, rest: &str, view: &View) -> Reply {
         let begun = !matches!(view.screen, Screen::Who { .. });
         let text = || match (begun, rest.is_empty()) {
-            (false, _) => say("That is possible once the session has begun."),
+            (false, _) => say(NOT_BEGUN),
             (true, true) => say(&view
                 .words
                 .fill(Phrase::PlainOneLine, &[("command", &command)])),
@@ -300,9 +306,12 @@ impl Dialogue {
                 let reason = text()?;
                 Ok(vec![Input::MarkBad { reason }])
             }
-            "/pause" => Ok(vec![Input::Pause]),
-            "/replay" if view.can_replay => Ok(vec![Input::PlayAgain]),
-            "/replay" => say(view.words.get(Phrase::PlainNoReplay)),
+            "/pause" if begun => Ok(vec![Input::Pause]),
+            "/pause" => say(NOT_BEGUN),
+            "/replay" if view.can_replay || matches!(view.screen, Screen::Stopped { .. }) => {
+                Ok(vec![Input::PlayAgain])
+            }
+            "/replay" => say(page::why_not_again(view)),
             "/back" if self.at > 0 => {
                 self.at -= 1;
                 self.entered.truncate(self.at);
@@ -314,7 +323,10 @@ impl Dialogue {
                 self.repeat();
                 Ok(Vec::new())
             }
-            "/quit" => self.sure(view.words.get(Phrase::PlainLeave), vec![Input::Quit], view),
+            "/quit" => match page::before_leaving(view) {
+                Some(question) => self.sure(question, vec![Input::Quit], view),
+                None => Ok(vec![Input::Quit]),
+            },
             "/help" => Err(COMMANDS
                 .iter()
                 .map(|(c, what)| format!("{c}: {}.", view.words.get(*what)))
@@ -344,8 +356,11 @@ impl Dialogue {
                 participant,
                 operator,
                 claiming: false,
-                ..
-            } => self.identify(line.trim(), participant, operator),
+                roster,
+            } => {
+                let participant = preset(participant, roster.as_deref());
+                self.identify(line.trim(), &participant, operator)
+            }
             Screen::ResumeChoice { restart, .. } => match key.as_str() {
                 "b" if *restart => Ok(vec![Input::Resume(Choice::RestartBlock)]),
                 "c" => Ok(vec![Input::Resume(Choice::Continue)]),
@@ -510,6 +525,15 @@ impl Dialogue {
                 }])
             }
         }
+    }
+}
+
+/// The participant's id that Enter alone gives: the one of the command line, or that of whoever
+/// has not finished.
+fn preset(participant: &str, roster: Option<&Roster>) -> String {
+    match (participant, roster.and_then(Roster::unfinished)) {
+        ("", Some((unfinished, _))) => unfinished.to_string(),
+        _ => participant.to_owned(),
     }
 }
 

@@ -1,13 +1,16 @@
 //! Raters who compare intervals, pairs and tracks, who estimate magnitudes, who rate
-//! beside a reference, who say which label a realization has, and who rate how different two are.
+//! beside a reference, who say which label a realization has, who rate how different two are, and who rank several.
 //!
 //! Each interval is felt with normal noise of the rater's own, and the rater decides as an
 //! observer without memory would: the largest, the odd one, the nearer one, a distance
 //! beyond a criterion. Draws come from a stream of their own and their number never depends
 //! on the realizations.
 
+mod ranking;
+
 use super::adjusting::equal;
 use super::{Effect, Impression, MIDPOINT, Rater, Reference};
+use ranking::ranked;
 use std::collections::BTreeMap;
 use study_base::perception::FORCE_JND_N;
 use study_base::rng::Stream;
@@ -25,7 +28,7 @@ const NOISE_N: f64 = FORCE_JND_N;
 const DIFFERENT: f64 = 1.8;
 /// Criterion of "yes", in the same unit.
 const YES: f64 = 1.0;
-/// Difference of two opinions below which a pair is a tie, in the same unit.
+/// Difference of two opinions below which a pair is a tie, and two of a ranking have the same rank, in the same unit.
 const TIE: f64 = 0.5;
 /// Median exponent of magnitude estimates, and the standard deviation of its logarithm.
 const EXPONENT: (f64, f64) = (0.8, 0.2);
@@ -224,6 +227,8 @@ pub(super) struct Comparing {
     /// Logarithm of the rater's number for level 1, and the exponent of their numbers.
     modulus: f64,
     exponent: f64,
+    /// The ranks of the intervals of the trial that is ranked.
+    ranks: Vec<i64>,
 }
 
 impl Comparing {
@@ -236,6 +241,7 @@ impl Comparing {
             stream,
             modulus: libm::log(10.0) + scale.normal(),
             exponent: EXPONENT.0 * libm::exp(EXPONENT.1 * scale.normal()),
+            ranks: Vec::new(),
         }
     }
 
@@ -310,6 +316,11 @@ impl Rater {
         percepts: &Percepts,
     ) -> Option<Answer> {
         let part = trial.part.as_ref()?;
+        if let Some((part, own)) = ranked(protocol, trial) {
+            let asked = own.asked(&part.asks);
+            let interval = asked.iter().position(|id| *id == question.id)?;
+            return self.ranked(interval, (part, own), models, percepts);
+        }
         if part.as_str() != question.id.as_str() {
             return None;
         }
@@ -349,7 +360,10 @@ impl Rater {
             _ => {}
         }
         let method = match &trial.stimuli {
-            Stimuli::One { .. } | Stimuli::Rated { .. } | Stimuli::Adjusted { .. } => return None,
+            Stimuli::One { .. }
+            | Stimuli::Rated { .. }
+            | Stimuli::Set { .. }
+            | Stimuli::Adjusted { .. } => return None,
             Stimuli::Pair { .. } | Stimuli::Search { .. } => None,
             Stimuli::Track { track, .. } => Some(protocol.track(track)?.method),
         };

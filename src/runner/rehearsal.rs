@@ -105,6 +105,7 @@ pub fn run_one(
             trial: runner.presented(),
         };
         let inputs = plan.turn(&view, rater, &felt, clock);
+        runner.took_time();
         if let Some(ended) = runner.step(inputs) {
             let why = match ended.unsaved {
                 None => return Ok(ended.ending),

@@ -201,7 +201,7 @@ fn statistics(all: Vec<Declared>) -> Vec<(String, &'static str, bool)> {
 }
 
 /// What stands for names of the data.
-const NAMES: [&str; 18] = [
+const NAMES: [&str; 19] = [
     "M",
     "R",
     "D",
@@ -215,6 +215,7 @@ const NAMES: [&str; 18] = [
     "GIVEN",
     "K",
     "PROPERTY",
+    "N",
     "GROUP",
     "PARAMETER",
     "ITEM",

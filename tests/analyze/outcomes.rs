@@ -3,6 +3,7 @@
 //! `outcomes/outcomes.R` writes two tables of simulated trials, `outcomes/*.csv`, and what R 4.2.2 says of
 //! them, `outcomes/*.txt`: afex 1.2.1 (`aov_ez`), emmeans 1.8.4.1, lme4 1.1.31 with pbkrtest 0.5.2, `p.adjust`.
 //! Tolerance: 10⁻⁹ of the value, 10⁻⁷ of p, and 2·10⁻⁵ of the intervals of the mixed model.
+//! `outcomes/models.R` does so for generalized mixed models (lme4 1.1.31); tolerance 2·10⁻⁴.
 #![allow(clippy::unwrap_used)]
 
 use crate::parts::study;
@@ -10,7 +11,9 @@ use std::collections::BTreeMap;
 use std::fs;
 use study_analysis::analyze::{Analysis, Rules, Value, analyze};
 use study_base::text::QuestionId;
-use study_plan::protocol::{BetterEnd, Clock, Crossing, Factor, Measure, OutcomeRules, Transform};
+use study_plan::protocol::{
+    BetterEnd, Clock, Crossing, Factor, Measure, OutcomeFamily, OutcomeRules, Transform,
+};
 use study_session::outcome::ratings::{Measured, Ratings};
 
 fn rules(id: &str, clock: Clock, transform: Transform) -> OutcomeRules {
@@ -19,6 +22,8 @@ fn rules(id: &str, clock: Clock, transform: Transform) -> OutcomeRules {
         measure: Measure::Clock(clock),
         better: Some(BetterEnd::Lower),
         transform,
+        model: None,
+        of: None,
     }
 }
 
@@ -228,6 +233,97 @@ fn what_has_no_logarithm_or_was_not_measured_is_counted() {
     );
 }
 
+/// Errors, hits of ten and times in 2 × 3 conditions, with their generalized mixed models.
+fn modeled() -> (Ratings, Rules) {
+    let table = include_str!("outcomes/models.csv");
+    let mut ratings = Ratings::read_csv("t.csv", table.as_bytes(), None).unwrap();
+    let names = ["errors", "hits", "time"];
+    ratings.measured = names
+        .map(|id| Measured {
+            id: id.to_owned(),
+            values: column(table, id),
+        })
+        .into();
+    let of = |id: &str, family: OutcomeFamily, of: Option<u32>| OutcomeRules {
+        model: Some(family),
+        of,
+        ..rules(id, Clock::Exploration, Transform::Identity)
+    };
+    let rules = Rules {
+        outcomes: vec![
+            of("errors", OutcomeFamily::Poisson, None),
+            of("hits", OutcomeFamily::Binomial, Some(10)),
+            of("time", OutcomeFamily::Gamma, None),
+        ],
+        crossing: Some(crossing()),
+        ..Rules::default()
+    };
+    (ratings, rules)
+}
+
+#[test]
+fn generalized_mixed_models_are_those_of_r_and_decide_nothing() {
+    let (ratings, rules) = modeled();
+    let found = analyze(&ratings, &rules);
+    let number = |id: &str| found.values.number(id).unwrap_or_else(|| panic!("{id}"));
+    let expected = include_str!("outcomes/models.txt");
+    for line in expected.lines() {
+        let (id, value) = line.split_once(' ').unwrap();
+        let (own, value) = (number(id), value.parse::<f64>().unwrap());
+        assert!(
+            (own - value).abs() <= 2e-4 * value.abs(),
+            "{id}: {own}, and R {value}"
+        );
+    }
+    assert_eq!(expected.lines().count(), 32);
+    // Simulated with a dispersion of 1/8 and a ratio of e^½.
+    assert!((0.09..0.17).contains(&number("outcomes/time/model/dispersion")));
+    assert!((1.4..1.9).contains(&number("outcomes/time/model/effect/friction/ratio")));
+    // Everything else is as without the models.
+    let without = |o: &OutcomeRules| OutcomeRules {
+        model: None,
+        of: None,
+        ..o.clone()
+    };
+    let plain = Rules {
+        outcomes: rules.outcomes.iter().map(without).collect(),
+        ..rules.clone()
+    };
+    let alone = analyze(&ratings, &plain);
+    let others = (found.values.iter()).filter(|v| !v.0.contains("/model/"));
+    assert!(others.collect::<Vec<_>>() == alone.values.iter().collect::<Vec<_>>());
+    for (own, other) in found.outcomes.iter().zip(&alone.outcomes) {
+        assert_eq!(own.findings, other.findings);
+    }
+}
+
+#[test]
+fn a_generalized_mixed_model_without_an_estimate_says_why() {
+    let (mut ratings, rules) = modeled();
+    let soft = ratings.models.iter().position(|m| m.id == "high-soft");
+    for (i, value) in ratings.measured[0].values.iter_mut().enumerate() {
+        if ratings.model[i].map(|m| m as usize) == soft {
+            *value = Some(0.0);
+        }
+    }
+    ratings.measured[1].values[0] = Some(11.0);
+    let found = analyze(&ratings, &rules);
+    for (id, told) in [
+        ("outcomes/errors/model/loglik", "an estimate is infinite"),
+        ("outcomes/hits/model/loglik", "no number of this kind"),
+    ] {
+        match found.values.get(id) {
+            Some(Value::Undefined(why)) => assert!(why.contains(told), "{why}"),
+            other => panic!("{id}: {other:?}"),
+        }
+    }
+    assert!(
+        (found.values)
+            .number("outcomes/time/model/loglik")
+            .is_some()
+    );
+}
+
 /// From a protocol to the report: the page, the tables and the figure have the outcomes.
 #[test]
 fn a_study_with_outcomes_reports_them() {
@@ -244,7 +340,7 @@ fn a_study_with_outcomes_reports_them() {
         let text = text.replace("study-protocol/1", "study-protocol/3");
         let text = text.replace("study-protocol/2", "study-protocol/3");
         let outcomes = "\n[[outcomes]]\nid = \"time\"\nfrom = \"clock\"\nunit = \"s\"\nbetter = \"lower\"\n\
-                        transform = \"log\"\n\n[[outcomes]]\nid = \"thinking\"\nfrom = \"clock\"\nmeasure = \"response\"\n";
+                        transform = \"log\"\n\n[[outcomes]]\nid = \"thinking\"\nfrom = \"clock\"\nmeasure = \"response\"\nmodel = \"gamma\"\n";
         fs::write(&path, text + outcomes).unwrap();
         run(&["check", "x"]);
         run(&["preregister", "x"]);
@@ -271,7 +367,8 @@ fn a_study_with_outcomes_reports_them() {
         for told in [
             "Measured outcomes by realization, in the order of",
             "Tests of the measured outcomes",
-            "Measured besides: time (exploration time, s, lower is better, log) and thinking (response time, s).",
+            "Measured besides: time (exploration time, s, lower is better, log) and thinking (response time, s, gamma model besides).",
+            "A gamma mixed model",
         ] {
             assert!(page.contains(told), "{told}");
         }
@@ -283,6 +380,8 @@ fn a_study_with_outcomes_reports_them() {
         let tests = read("outcome_tests.csv");
         let expected = if kind == "factorial" { 6 } else { 2 };
         assert_eq!(tests.lines().count(), 1 + expected, "{tests}");
+        let head = tests.lines().next().unwrap().trim_end();
+        assert!(head.ends_with(",model_chi2,model_df,model_p"), "{tests}");
         assert!(analysis.join("figures/outcomes.svg").is_file());
         // One of them in place of the rating.
         let alone = run(&[

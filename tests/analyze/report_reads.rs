@@ -311,6 +311,8 @@ fn headings_are_in_order_and_tables_have_heads() {
                 "{}: {tag}",
                 path.display()
             );
+            let head = &page[at..at + page[at..].find("</th").unwrap()];
+            assert!(other || !head.ends_with('>'), "{}: {head}", path.display());
         }
     }
 }

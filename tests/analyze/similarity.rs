@@ -82,6 +82,7 @@ fn the_colors_of_ekman_are_a_circle() {
         ("dimensions/3/ratio_stress", 0.073_346_799_81, 1e-7),
         // Of one participant: the mean of 31.
         ("map_dimensions", 2.0, 0.0),
+        ("map_in_proportion", 0.0, 0.0),
         ("map_stress", 0.023_102_506_1, 5e-5),
     ] {
         let found = number(id);
@@ -97,6 +98,63 @@ fn the_colors_of_ekman_are_a_circle() {
         .collect();
     let one_way = turns.iter().all(|t| *t > 0.0) || turns.iter().all(|t| *t < 0.0);
     assert!(one_way, "{turns:?}");
+}
+
+/// The order of few differences fits without stress, and would say no more than an order: the map is in proportion to them.
+#[test]
+fn places_of_few_realizations_are_in_proportion() {
+    let folder = tempfile::tempdir().unwrap();
+    let places = [("a", 0), ("b", 10), ("c", 40), ("d", 50), ("e", 90)];
+    let mut table = "participant,first,second,rating\n".to_owned();
+    for who in ["P1", "P2"] {
+        for (i, (one, x)) in places.iter().enumerate() {
+            for (other, y) in &places[i + 1..] {
+                writeln!(table, "{who},{one},{other},{}", y - x).unwrap();
+            }
+        }
+    }
+    let arguments = ["--task", "similarity", "--json"];
+    let found = values(&mut analyze(folder.path(), &table, &arguments));
+    let number = |id: &str| found[format!("similarity/{id}")].as_f64().unwrap();
+    assert_eq!(number("map_dimensions"), 1.0);
+    assert_eq!(number("map_in_proportion"), 1.0);
+    assert_eq!(number("dimensions/1/stress"), 0.0);
+    let at = |name: &str| number(&format!("map/{name}/x"));
+    for (name, x) in places {
+        let apart = (at(name) - at("a")).abs();
+        assert!((apart - f64::from(x)).abs() < 1e-6, "{name}: {apart}");
+    }
+}
+
+/// Who rates which pairs does not move the realizations: half of the people rate near pairs of a line, the others far ones, with numbers
+/// twice as large.
+#[test]
+fn people_who_rate_other_pairs_have_a_map_in_common() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut table = "participant,first,second,rating\n".to_owned();
+    for person in 0..4 {
+        for first in 0..6 {
+            for second in first + 1..6 {
+                let (apart, far) = (second - first, person % 2 == 1);
+                let rates = if far { apart >= 2 } else { apart <= 2 };
+                if rates {
+                    let rating = if far { 16 * apart } else { 8 * apart };
+                    writeln!(table, "P{person},m{first},m{second},{rating}").unwrap();
+                }
+            }
+        }
+    }
+    let arguments = ["--task", "similarity", "--json"];
+    let found = values(&mut analyze(folder.path(), &table, &arguments));
+    let number = |id: &str| found[format!("similarity/{id}")].as_f64().unwrap();
+    for second in 1..6 {
+        let rescaled = number(&format!("pair/m0|m{second}/rescaled"));
+        // Eight and sixteen points a step are twelve on average.
+        assert!(
+            (rescaled - 12.0 * f64::from(second)).abs() < 1e-6,
+            "{second}: {rescaled}"
+        );
+    }
 }
 
 /// Fewer than four realizations, one participant, ratings that are all 0, and pairs that do not connect all realizations: each
@@ -132,7 +190,7 @@ fn similarity_without_a_map_says_why() {
         (
             of(&two, &pairs(&five, &|_, _| 0)),
             "structure/p",
-            "there are no ratings of two different realizations",
+            "no two different realizations were rated as different",
         ),
         (
             of(&two, &halves),
@@ -143,6 +201,16 @@ fn similarity_without_a_map_says_why() {
             of(&two[..1], &pairs(&five, &apart)),
             "agreement/mean_correlation",
             "there is one participant",
+        ),
+        (
+            of(&two, &pairs(&five[..2], &apart)),
+            "agreement/kendall_w",
+            "one pair was rated",
+        ),
+        (
+            of(&two, &pairs(&five, &|_, _| 50)),
+            "dimensions/1/predicted",
+            "the pairs of the others do not connect all realizations, or each participant's ratings are all equal",
         ),
         (
             of(&two[..1], &pairs(&five, &apart)),

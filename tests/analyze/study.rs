@@ -50,6 +50,11 @@ primary = "realism"
 
 /// A study in `results` with one finished session, as another process left it.
 fn study(results: &Path, id: &str) -> PathBuf {
+    study_with(results, id, &[])
+}
+
+/// The same, with these events in the session.
+fn study_with(results: &Path, id: &str, more: &[Event]) -> PathBuf {
     let text = PROTOCOL.replace("ID", id);
     let parsed = study_plan::protocol::file::parse("protocol.toml", &text);
     let protocol = parsed
@@ -65,7 +70,9 @@ fn study(results: &Path, id: &str) -> PathBuf {
     let folder = StudyFolder::open_or_create(results, &frozen, at(0)).unwrap();
     let mut claimed = folder.claim(&real("P01")).unwrap();
     let mut journal = claimed.folder.journal().unwrap();
-    for (n, event) in session("P01", 1, claimed.seat).iter().enumerate() {
+    let mut all = session("P01", 1, claimed.seat);
+    all.splice(3..3, more.iter().cloned());
+    for (n, event) in all.iter().enumerate() {
         let mut event = event.clone();
         if let Event::SessionStarted(start) = &mut event {
             id.clone_into(&mut start.study);
@@ -123,6 +130,21 @@ fn json_of_a_study_writes_nothing_and_agrees_with_its_own_table() {
     let table = folder.join("ratings.csv");
     let of_table = values(&said(analyze(&table).args(["--json", "--scale", "1..7"])));
     assert_eq!(of_study, of_table);
+}
+
+/// Dates that are wrong are said, and those that a time server corrected are not.
+#[test]
+fn a_clock_that_jumped_is_warned_of() {
+    for (by_s, warned) in [(172_800.0, true), (-1.728e9, true), (-2.5, false)] {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = study_with(dir.path(), "small", &[Event::ClockStepped { by_s }]);
+        let json = said(analyze(&folder).arg("--json"));
+        assert_eq!(json.contains("clock-jumped"), warned, "{by_s}: {json}");
+        let page = said(&mut analyze(&folder));
+        let words: Vec<&str> = page.split_whitespace().collect();
+        let told = words.join(" ").contains("clock of the computer jumped");
+        assert_eq!(told, warned, "{by_s}: {page}");
+    }
 }
 
 #[test]

@@ -276,6 +276,15 @@ fn tracks_and_estimates_are_declared() {
             ],
         ),
         (
+            "ranking",
+            &[
+                "rankings of 4 realizations, all felt one after another, 2 trials, order williams, no ties",
+                "Part `order`: Do participants rank the realizations alike? Decided by: permutation test of the ranks within participants",
+                "Part `order`: Is one realization ranked above each other one? Decided by: t test, participants as clusters, Holm's correction over 6 pairs",
+                "Power was not computed:",
+            ],
+        ),
+        (
             "adjustment",
             &[
                 "a level of `detent` is set 3 times from below and as often from above, one step of its 21 levels at a time, until it feels equal to 1; where it starts is drawn",

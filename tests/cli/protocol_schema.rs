@@ -243,6 +243,7 @@ fn the_templates_of_parts_are_valid_and_broken_ones_are_not() {
         "mushra",
         "identification",
         "similarity",
+        "ranking",
         "adjustment",
         "yesno",
         "abx",

@@ -174,6 +174,7 @@ fn studies(home: &Path) -> Vec<(PathBuf, &'static [&'static str])> {
         several("mushra", 6),
         several("identification", 6),
         several("similarity", 6),
+        several("ranking", 6),
         several("adjustment", 6),
     ]
 }

@@ -230,6 +230,15 @@ fn the_headline_of_groups_and_sessions_is_that_of_the_analysis() {
             ],
         ),
         (
+            "ranking",
+            "",
+            &[
+                "ranking/agreement/w",
+                "ranking/realization/spring/mean_rank",
+                "ranking/pair/lambda-0.9991|spring/above",
+            ],
+        ),
+        (
             "adjustment",
             "",
             &[

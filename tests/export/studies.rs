@@ -263,6 +263,8 @@ pub(crate) fn factorial_with_groups(home: &Path) -> PathBuf {
     text += &(third("low") + &third("high"));
     text += "\n[[parts]]\nid = \"rating\"\nkind = \"rating\"\nrepetitions = 2\norder = \"blocked\"\n\
              [groups]\n[[groups.list]]\nid = \"novices\"\n[[groups.list]]\nid = \"experts\"\nshare = 2\n";
+    // Full strokes are counted, and R fits their model too.
+    text += "\n[[outcomes]]\nid = \"presses\"\nfrom = \"telemetry\"\nmeasure = \"strokes\"\nmodel = \"poisson\"\n";
     fs::write(protocol, text).unwrap();
     folder
 }

@@ -76,6 +76,14 @@ fn the_three_layouts_of_a_curve_are_the_same_recording() {
         tidy.header_line("resolution:"),
         Some("x 5.000e-3 mm, F 9.807e-4 N")
     );
+    // the name of the file does not matter, unless it is asked for
+    let [renamed, again] = ["Akko (1).csv", "again.csv"].map(|name| dir.path().join(name));
+    fs::copy(dir.path().join("tidy.csv"), &renamed).unwrap();
+    let other = imported(&renamed, &again, &[]);
+    assert_eq!(other.sha256, tidy.sha256);
+    let named = imported(&renamed, &again, &["--file-names"]);
+    let source = named.header_line("source:").unwrap();
+    assert!(source.starts_with("Akko (1).csv, sha256 "), "{source}");
     // twice as many rows a second are half the time
     let file = dir.path().join("tidy.csv");
     let fast = imported(&file, &out, &["--rate", "20", "--target", "Mine"]);
@@ -94,6 +102,18 @@ fn what_is_no_curve_is_refused_with_file_and_line() {
         .stderr(contains(
             "bad.csv: line 3: displacement is `x`, which is not a number",
         ));
+    // a measured curve, of which the copy ended within a row
+    let whole = fs::read_to_string(CLICKIEZ).unwrap();
+    let row = whole.lines().nth(2000).unwrap();
+    let at = whole.find(&format!("\n{row}")).unwrap() + 1;
+    let cut = row.match_indices(',').nth(1).unwrap().0;
+    fs::write(&bad, &whole[..at + cut - 1]).unwrap();
+    study(&["import", "force-curve", &bad, "-o", &out])
+        .code(1)
+        .stderr(
+            contains("2 of 4 fields: the file ends within this row")
+                .and(contains("bad.csv: line ")),
+        );
     assert!(!Path::new(&out).exists());
     study(&["import", "force-curve", CLICKIEZ, CLICKIEZ, "-o", &out])
         .code(1)
@@ -135,6 +155,36 @@ fn what_is_no_curve_is_refused_with_file_and_line() {
     study(&["import", "force-curve", CLICKIEZ, "-o", folder, "--force"])
         .code(1)
         .stderr(contains("is no regular file"));
+}
+
+/// The range is told, and nothing is read or written.
+#[test]
+fn a_rate_that_no_instrument_has_is_refused_with_the_range() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("out.csv");
+    let to = out.to_str().unwrap();
+    let of_curves = "a rate is a number from 0.001 to 1000000 Hz";
+    let of_probes = "a sampling rate is from 10 to 40000 Hz";
+    for (command, range) in [
+        (
+            &["import", "force-curve", CLICKIEZ, "-o", to][..],
+            of_curves,
+        ),
+        (&["record", "missing.toml", "--out", to], of_probes),
+        (&["trajectory", "missing.toml", "--out", to], of_probes),
+    ] {
+        for rate in ["1e300", "1e-300", "0", "-5", "-1e300", "nan", "inf", "-inf"] {
+            let rate = format!("--rate={rate}");
+            let told = study(&[command, &[rate.as_str()]].concat()).code(2);
+            let told = String::from_utf8(told.get_output().stderr.clone()).unwrap();
+            assert!(told.contains(range), "{rate}: {told}");
+            assert_eq!(told.matches("error: ").count(), 1, "{rate}: {told}");
+        }
+        study(&[command, &["--rate", "-5"]].concat())
+            .code(2)
+            .stderr(contains(range));
+    }
+    assert!(!out.exists());
 }
 
 /// Measured curves with their rows and columns in other orders: the release first is the same recording, and the rest is refused with its cause.

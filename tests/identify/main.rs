@@ -22,4 +22,5 @@ mod stimulus;
 mod switches;
 mod terms;
 mod trajectory;
+mod weights;
 mod words;

@@ -32,10 +32,13 @@ fn repository(path: &str) -> String {
     format!("{}/{path}", env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Imports and packs a switch in a folder of its own, as a lab does; returns the bundle.
+/// Imports and packs a switch in a folder of its own, as a lab does, from a file with a name of its own; returns the bundle.
 fn packed(lab: &Path, (id, curve): (&str, &str)) -> PathBuf {
     fs::create_dir_all(lab).unwrap();
-    let curve = repository(&format!("tests/data/switches/{curve}.csv"));
+    let shared = repository(&format!("tests/data/switches/{curve}.csv"));
+    let whose = lab.file_name().unwrap().to_string_lossy();
+    let curve = format!("{curve}-{whose}.csv");
+    fs::copy(shared, lab.join(&curve)).unwrap();
     let model = repository(&format!("protocols/keyboard/models/{id}.toml"));
     let recording = format!("{id}.csv");
     let import = ["import", "force-curve", &curve, "-o", &recording, "--force"];

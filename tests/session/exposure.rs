@@ -56,6 +56,16 @@ impl Operator for Patient {
 
 /// The events of a session in which everything is felt for this long.
 fn session(exposure: Exposure, clock: VirtualClock, operator: &mut dyn Operator) -> Vec<Event> {
+    sitting(&MemoryDisk::new(), exposure, clock, operator)
+}
+
+/// The same, of a session that may have been left before.
+fn sitting(
+    disk: &MemoryDisk,
+    exposure: Exposure,
+    clock: VirtualClock,
+    operator: &mut dyn Operator,
+) -> Vec<Event> {
     let mut loaded = load(Path::new(&repository("protocols/turn-signal"))).unwrap();
     loaded.protocol.trial.exposure = exposure;
     loaded.protocol.intake.clear();
@@ -65,7 +75,7 @@ fn session(exposure: Exposure, clock: VirtualClock, operator: &mut dyn Operator)
         files: &loaded.files,
         fingerprints: &loaded.fingerprints,
     };
-    let disk = Arc::new(MemoryDisk::new());
+    let disk = Arc::new(disk.clone());
     let folder = Path::new("results");
     let study = StudyFolder::open_or_create_on(disk, folder, &frozen, clock.now()).unwrap();
     let mut options = Options::default();
@@ -193,4 +203,54 @@ fn a_playback_in_which_the_computer_stood_still_does_not_count() {
     };
     assert!(detail.contains("stood still for 20.0 s"), "{detail}");
     assert_eq!(queue[0], 1, "it comes next");
+}
+
+/// How many trials were felt again, of a session that is left at its first rating and resumed 40 s
+/// later, if the computer then stands still for so long at the rating.
+fn felt_again_after(standstill: Duration) -> usize {
+    let clock = VirtualClock::starting_at(first_day());
+    let disk = MemoryDisk::new();
+    let patient = |rated| Patient {
+        clock: clock.clone(),
+        left_s: Vec::new(),
+        rated,
+    };
+    let own = || clock.clone();
+    sitting(&disk, exactly(FELT_S), own(), &mut patient(3));
+    clock.advance(Duration::from_secs(40));
+    let mut operator = Absent {
+        patient: patient(2),
+        standstill,
+    };
+    let events = sitting(&disk, exactly(FELT_S), own(), &mut operator);
+    let again = |event: &&Event| match event {
+        Event::AttemptFailed { detail, .. } => detail.starts_with("felt again"),
+        _ => false,
+    };
+    events.iter().filter(again).count()
+}
+
+/// The program does not run for a while when somebody is about to rate.
+struct Absent {
+    patient: Patient,
+    standstill: Duration,
+}
+
+impl Operator for Absent {
+    fn next(&mut self, view: &View, timeout: Duration) -> Result<Vec<Input>, OperatorError> {
+        if matches!(view.screen, Screen::Form { .. }) {
+            let standstill = std::mem::take(&mut self.standstill);
+            self.patient.clock.advance(standstill);
+        }
+        self.patient.next(view, timeout)
+    }
+}
+
+/// A stopped process, or a suspended computer whose clock goes on, is a pause like the one for which
+/// the program was left.
+#[test]
+fn a_rating_waits_no_longer_than_a_pause_may_be_while_the_program_stands_still() {
+    assert_eq!(felt_again_after(Duration::ZERO), 0);
+    assert_eq!(felt_again_after(Duration::from_secs(15)), 0);
+    assert_eq!(felt_again_after(Duration::from_secs(25)), 1);
 }

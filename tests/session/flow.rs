@@ -14,6 +14,7 @@ mod part_rig;
 mod parts;
 mod pauses;
 mod random;
+mod ranking;
 mod refused;
 mod resume;
 mod rig;

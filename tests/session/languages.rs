@@ -166,29 +166,39 @@ fn texts(page: &serde_json::Value, all: &mut Vec<String>) {
 #[test]
 fn nothing_of_a_participants_page_stays_english() {
     let f = KeyCode::F;
-    let dialogs: [&[KeyCode]; 7] = [
+    let dialogs: [&[KeyCode]; 10] = [
         &[],
         &[KeyCode::Enter],
         &[f(1)],
+        &[f(2)],
         &[f(6)],
         &[f(6), KeyCode::Enter],
+        &[f(6), f(7)],
         &[f(10)],
         &[f(10), KeyCode::Char('x')],
+        &[f(1), f(6)],
     ];
     for lang in ["ja", "zh-Hans", "ar"] {
         let words = Arc::new(Words::new(Some(lang), &BTreeMap::new()));
         let mut all = pages_of_a_session(&words);
         all.retain(|(name, _)| *name != "rating");
         all.extend(questions_of_a_pilot(&words));
-        for (name, view) in all {
+        for (name, mut view) in all {
             for keys in dialogs {
                 let full = page(&view, keys);
                 assert_eq!(latin(&full), [""; 0], "{lang} {name} {keys:?}\n{full}");
             }
+            view.can_replay = false;
+            for has_replays in [false, true] {
+                view.has_replays = has_replays;
+                let full = page(&view, &[f(7)]);
+                assert_eq!(latin(&full), [""; 0], "{lang} {name}\n{full}");
+            }
             let mut dialogue = Dialogue::new(true, false);
             let mut plain = dialogue.follow(&view).lines;
             for typed in [
-                "", "?", "99", "/help", "/back", "/decline", "/says", "/what", "/quit", "x",
+                "", "?", "99", "/help", "/back", "/decline", "/says", "/what", "/replay", "/quit",
+                "x",
             ] {
                 plain.extend(dialogue.line(typed, &view).1);
             }
@@ -292,8 +302,8 @@ fn the_first_line_has_room_for_the_banner_and_the_progress() {
     }
 }
 
-/// What is said of answers is in the language of the study, also when they are corrected; a
-/// break says nothing of a device, which may be none.
+/// What is said of answers is in the language of the study, also when they are corrected, by keys
+/// and in lines; a break says nothing of a device, which may be none.
 #[test]
 fn corrections_and_breaks_are_in_every_language() {
     let english = Words::default();
@@ -327,6 +337,31 @@ fn corrections_and_breaks_are_in_every_language() {
                 assert!(
                     shown.contains(words.get(Phrase::CorrectTitle)),
                     "{lang}\n{shown}"
+                );
+            }
+        }
+        // In lines as well.
+        let mut dialogue = Dialogue::new(true, false);
+        dialogue.follow(&view);
+        for typed in ["/correct", "99", "1", "2", ""] {
+            let said = dialogue.line(typed, &view).1.join("\n");
+            for phrase in [
+                Phrase::WhichCorrect,
+                Phrase::WhichOfList,
+                Phrase::NewAnswer,
+                Phrase::PlainWhy,
+                Phrase::PlainDeclineIt,
+                Phrase::Slip,
+            ] {
+                assert!(
+                    !said.contains(english.get(phrase)),
+                    "{lang} {typed}\n{said}"
+                );
+            }
+            if typed == "/correct" {
+                assert!(
+                    said.contains(words.get(Phrase::WhichCorrect)),
+                    "{lang}\n{said}"
                 );
             }
         }

@@ -19,6 +19,7 @@ mod exposure;
 mod flow;
 mod front;
 mod groups;
+mod idle_keys;
 #[path = "../support/json_schema.rs"]
 mod json_schema;
 mod kill;
@@ -30,6 +31,7 @@ mod mirror;
 mod parts_by_keys;
 mod plain;
 mod programs;
+mod ranking_by_keys;
 mod rehearsed;
 mod releases;
 mod screen;

@@ -152,8 +152,10 @@ fn play_until(
             let events = events(folder);
             let attempt = events.iter().rfind(|e| of(e, "attempt_started")).unwrap();
             let answer = observer(attempt).0;
-            // An option is marked, a number is read back.
-            let shown = if page.contains("choose") {
+            // A slider gets its marker, an option is marked, a number is read back.
+            let shown = if page.contains("0–9: choose") {
+                "●"
+            } else if page.contains("choose") {
                 "(●)"
             } else {
                 "= "

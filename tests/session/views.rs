@@ -135,10 +135,12 @@ pub(crate) fn view(screen: Screen) -> View {
     };
     View {
         can_replay: false,
+        has_replays: false,
         can_go_back: false,
         remarks: vec!["the motor hums".to_owned()],
         force: true,
         has_reference: false,
+        numbered: false,
         adjusting: None,
         progress: before.then_some(Progress {
             practice: false,

@@ -287,6 +287,41 @@ fn verify_misses_telemetry_that_the_journal_counts_and_says_what_it_does_not_che
     insta::assert_snapshot!(desk.said);
 }
 
+/// Every file of a new study has its checksum: nothing is said to be left out but what is there and
+/// is not checked.
+#[test]
+fn verify_of_a_new_study_says_that_something_is_not_checked_only_where_it_is() {
+    let results = tempfile::tempdir().unwrap();
+    let folder = results.path();
+    let protocol = crate::support::repository("protocols/turn-signal");
+    let run = |words: &[&str], code: i32| {
+        let (got, out, err) = study(words, folder);
+        assert_eq!(got, code, "{out}{err}");
+        out
+    };
+    let verify = |code| {
+        let out = run(&["verify", "new"], code);
+        let lines = out.lines().filter(|line| line.starts_with("Not checked"));
+        lines.map(str::to_owned).collect::<Vec<_>>()
+    };
+    let rehearse = [
+        "rehearse",
+        protocol.as_str(),
+        "--participants",
+        "2",
+        "--out",
+        "new",
+    ];
+    run(&rehearse, 0);
+    assert_eq!(verify(0), [""; 0]);
+    run(&["analyze", "new"], 0);
+    let analysis = "Not checked: analysis/, which `study analyze` writes again.";
+    assert_eq!(verify(0), [analysis]);
+    fs::write(folder.join("new/turn-signal/protocol/1/protocol.toml"), "x").unwrap();
+    let tables = "Not checked: the derived tables, tracks, searches, ends of practice and steps of adjustments, because the frozen protocol cannot be read.";
+    assert_eq!(verify(4), [tables, analysis]);
+}
+
 #[test]
 fn an_analysis_is_printed_although_its_tables_have_no_place() {
     let mut desk = Desk::new();

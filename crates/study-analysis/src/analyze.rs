@@ -36,6 +36,7 @@ mod missing;
 mod mixed;
 mod order;
 mod ordinal;
+mod outcome_model;
 mod outcomes;
 mod overflow;
 mod pairs;

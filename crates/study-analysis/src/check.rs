@@ -19,7 +19,6 @@ use std::path::Path;
 use study_base::diagnostic::{Findings, Severity};
 use study_base::text::ModelId;
 use study_haptics::model::Realization;
-use study_haptics::model::coverage::Coverage;
 use study_haptics::safe_play::{self, Danger};
 use study_plan::protocol::fingerprint::Fingerprints;
 use study_plan::protocol::{DeviceKind, Protocol, check};
@@ -230,8 +229,7 @@ const MUCH_FASTER: f64 = 4.0;
 /// What a hand may do beyond the recordings of a realization.
 fn beyond(realization: &Realization) -> Vec<String> {
     let mut found = Vec::new();
-    let coverage = realization.provenance.coverage.as_ref();
-    let trained = coverage.map_or(realization.trained.v_mm_s, Coverage::top_mm_s);
+    let trained = realization.trained.v_mm_s;
     let factor = HAND_MM_S / trained;
     if factor > MUCH_FASTER {
         let digits = if trained < 10.0 { 2 } else { 0 };
@@ -239,7 +237,7 @@ fn beyond(realization: &Realization) -> Vec<String> {
             "trained up to {trained:.digits$} mm/s; a hand of {HAND_MM_S} mm/s is {factor:.0} times as fast"
         ));
     }
-    let Some(coverage) = coverage else {
+    let Some(coverage) = &realization.provenance.coverage else {
         return found;
     };
     let stretches = |held: &[[f64; 2]]| {

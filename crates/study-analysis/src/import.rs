@@ -74,6 +74,7 @@ impl Kind {
                 &["participant", "realization", "target", "answer"]
             }
             Self::Task(TableKind::Similarity) => &["participant", "first", "second", "rating"],
+            Self::Task(TableKind::Ranking) => &["participant", "ranking", "realization", "rank"],
             Self::Task(TableKind::Adjustment) => &["participant", "start", "level", "standard"],
         }
     }
@@ -84,6 +85,7 @@ impl Kind {
             Self::Ratings => &["subject", "model", "rating"],
             Self::Task(TableKind::Trials(_)) => &["participant"],
             Self::Task(TableKind::Identification) => &["participant", "target", "answer"],
+            Self::Task(TableKind::Ranking) => &["participant", "realization", "rank"],
             Self::Task(TableKind::Adjustment) => &["participant", "start", "level"],
             Self::Task(_) => self.columns(),
         }
@@ -97,6 +99,7 @@ impl Kind {
             Self::Task(TableKind::Pairs | TableKind::Identification) => &["answer"],
             Self::Task(TableKind::Magnitude) => &["estimate"],
             Self::Task(TableKind::Mushra | TableKind::Similarity) => &["rating"],
+            Self::Task(TableKind::Ranking) => &["rank"],
             Self::Task(TableKind::Adjustment) => &["level"],
         }
     }

@@ -27,6 +27,7 @@ use study_plan::protocol::{DeviceKind, FileOrders, ModelEntry, Order, Protocol, 
 use study_session::store::disk::read_capped;
 use study_session::store::layout;
 
+mod errors;
 mod families;
 mod frozen;
 mod join;
@@ -35,6 +36,7 @@ mod spaces;
 
 use spaces::Judged;
 
+pub use errors::ComponentErrors;
 pub use frozen::{FrozenError, changes, damage, frozen, frozen_version, frozen_versions};
 pub use recordings::{Deliveries, RecordingError, deliveries};
 

@@ -29,6 +29,7 @@ pub use pool::Pool;
 pub use source::{Site, SiteDevice, Source};
 pub use traces::Trace;
 
+use crate::analyze::psychophysics::perceptual::{Errors, Weighing, weighings};
 use crate::analyze::psychophysics::search::{Exploration, explorations};
 use crate::analyze::psychophysics::{PartAnalysis, StudyData, parts, searchers_of};
 use crate::analyze::{
@@ -247,6 +248,12 @@ impl Study {
         self.with_data(|data| explorations(data, include))
     }
 
+    /// What the choices of each part with pairs or a search tell of what is weighed in errors; none of a study without
+    /// such a part.
+    pub fn weigh(&self, include: Include, errors: &Errors) -> Vec<Weighing> {
+        self.with_data(|data| weighings(data, include, errors))
+    }
+
     fn with_data<T>(&self, what: impl FnOnce(&StudyData<'_>) -> T) -> T {
         let sessions: Vec<_> = self.sessions.iter().map(|s| &s.history).collect();
         let data = StudyData {
@@ -439,17 +446,9 @@ fn analyzed(ratings: &Ratings, rules: &Rules, progress: Option<&Progress>) -> An
 }
 
 /// Whether the primary question is analyzed as a rating: numbers other than estimates of
-/// magnitude, ratings of two realizations and levels that were set, or the share of an answer.
+/// magnitude, ranks, levels that were set and ratings of two realizations, or the share of an answer.
 pub fn is_rated(protocol: &Protocol) -> bool {
-    let primary = &protocol.analysis.primary;
-    let estimated = (protocol.parts.iter()).any(|part| {
-        let own = matches!(
-            part.task,
-            Task::Magnitude(_) | Task::Similarity(_) | Task::Adjustment(_)
-        );
-        own && part.asks.first() == Some(primary)
-    });
-    !estimated && question(protocol, None).is_ok()
+    !protocol.has_other_numbers(&protocol.analysis.primary) && question(protocol, None).is_ok()
 }
 
 /// Adds hidden duplicates, and covariates from the model files.

@@ -39,6 +39,7 @@ pub mod grid;
 pub mod identification;
 pub mod lanes;
 pub mod method;
+pub mod perceptual;
 pub mod plan;
 mod problem;
 pub mod repetition;

@@ -139,7 +139,8 @@ impl Profile {
 pub struct Trained {
     /// Lowest and highest position, mm.
     pub x_mm: [f64; 2],
-    /// Highest speed, mm/s.
+    /// Highest speed in either direction, mm/s: certificates hold up to it or a multiple of it, and all that says how
+    /// fast the recordings were means this one.
     pub v_mm_s: f64,
 }
 

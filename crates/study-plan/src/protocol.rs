@@ -35,6 +35,7 @@ pub mod presentations;
 pub mod procedures;
 pub mod question;
 pub mod questionnaires;
+pub mod ranking;
 pub mod relative;
 pub mod rules;
 pub mod scale;
@@ -52,7 +53,9 @@ pub use factors::{Crossing, Factor};
 pub use groups::{Assign, Assigned, GroupRules, Groups, SessionPlan};
 pub use identification::{Criterion, Drawn, Feedback, Identification, Label};
 pub use kinds::QuestionKind;
-pub use outcomes::{Answers, BetterEnd, Clock, Measure, OutcomeRules, Telemetry, Transform};
+pub use outcomes::{
+    Answers, BetterEnd, Clock, Measure, OutcomeFamily, OutcomeRules, Telemetry, Transform,
+};
 pub use pairs::{IntervalOrder, Pairs};
 pub use parts::{
     Compared, Exposure, FamilyRules, FitRules, Interval, Method, Part, Task, TrackRules, Vary,
@@ -61,6 +64,7 @@ pub use plan::{Seat, Stimuli, Trial};
 pub use presentations::{Magnitude, Mushra, Presentations, Standard};
 pub use question::Question;
 pub use questionnaires::{Inventory, Questionnaire};
+pub use ranking::Ranking;
 pub use relative::Relative;
 pub use rules::Exclusion;
 pub use scale::Scale;
@@ -228,8 +232,8 @@ pub struct SessionRules {
     pub entry: Entry,
     /// Longest interruption, h, after which a session resumes without a question.
     pub resume_within_h: f64,
-    /// Longest pause between feeling and answering, s; after a longer one the trial is felt
-    /// again. Absent from the fingerprints of protocols that do not say it.
+    /// Longest pause between feeling and answering, or between two intervals, s; after a longer
+    /// one the trial is felt again. Absent from the fingerprints of protocols that do not say it.
     #[serde(skip_serializing_if = "is_usual_pause")]
     pub longest_pause_s: f64,
 }

@@ -23,6 +23,7 @@ pub mod constraints;
 mod inclusion;
 pub mod orders;
 mod pairs;
+mod ranking;
 mod requeue;
 mod search;
 mod sequence;
@@ -33,8 +34,7 @@ pub use crate::protocol::{Seat, Trial};
 pub use requeue::{Felt, Requeued, breaks_constraint, requeue};
 
 use crate::protocol::{
-    Adjustment, Drawn, FileOrders, Identification, Magnitude, Mushra, PartsOrder, Protocol,
-    Similarity, Stimuli, Task,
+    Drawn, FileOrders, Identification, Magnitude, Mushra, PartsOrder, Protocol, Stimuli, Task,
 };
 use adjustment::AdjustmentOrders;
 use constraints::Violation;
@@ -242,10 +242,8 @@ struct PartOrders {
     seed: u64,
     /// Felt before each realization.
     reference: Option<ModelId>,
-    /// Whose practice has pairs that are drawn.
-    similarity: Option<Similarity>,
-    /// Whose practice has starts that are drawn.
-    adjustment: Option<Adjustment>,
+    /// What it is about, if its practice is drawn from that.
+    drawn: Option<Task>,
     kind: Kind,
 }
 
@@ -255,6 +253,7 @@ enum Kind {
     Pairs(PairOrders),
     Tracks(TrackOrders),
     Search(SearchOrders),
+    Ranking(Sequence),
     Adjustment(AdjustmentOrders),
 }
 
@@ -285,8 +284,7 @@ impl Planner {
                 rounds: None,
                 seed,
                 reference: None,
-                similarity: None,
-                adjustment: None,
+                drawn: None,
                 kind: Kind::Rating(Sequence::of_models(
                     seed,
                     None,
@@ -328,6 +326,13 @@ impl Planner {
                 Task::Similarity(own) => {
                     Kind::Pairs(PairOrders::new(seed, &part.id, &own.pairs(), &design)?)
                 }
+                Task::Ranking(own) => Kind::Ranking(Sequence::of_models(
+                    seed,
+                    id,
+                    &design,
+                    own.models.clone(),
+                    None,
+                )?),
                 Task::Adjustment(own) => {
                     Kind::Adjustment(AdjustmentOrders::new(seed, &part.id, own))
                 }
@@ -340,11 +345,12 @@ impl Planner {
                     .map(|criterion| (criterion.rounds, criterion.draw)),
                 seed,
                 reference: part.task.reference().cloned(),
-                similarity: match &part.task {
-                    Task::Similarity(own) => Some(own.clone()),
-                    _ => None,
-                },
-                adjustment: part.task.adjustment().cloned(),
+                drawn: Some(part.task.clone()).filter(|task| {
+                    matches!(
+                        task,
+                        Task::Similarity(_) | Task::Ranking(_) | Task::Adjustment(_)
+                    )
+                }),
                 kind,
             })
         };
@@ -407,7 +413,7 @@ impl Planner {
     /// constraint.
     pub fn verify(&self, participants: u32) -> Result<(), ScheduleError> {
         self.parts.iter().try_for_each(|part| match &part.kind {
-            Kind::Rating(sequence) => sequence.verify(participants),
+            Kind::Rating(sequence) | Kind::Ranking(sequence) => sequence.verify(participants),
             Kind::Pairs(_) | Kind::Tracks(_) | Kind::Search(_) | Kind::Adjustment(_) => Ok(()),
         })
     }
@@ -421,6 +427,7 @@ impl PartOrders {
             Kind::Pairs(pairs) => pairs.plan(seat)?,
             Kind::Tracks(tracks) => tracks.plan(seat),
             Kind::Search(search) => search.plan(seat),
+            Kind::Ranking(sequence) => ranking::ranked(sequence, seat)?,
             Kind::Adjustment(adjustment) => adjustment.plan(seat),
         };
         let last = |of: fn(&Trial) -> u32, practice: bool| {
@@ -461,11 +468,17 @@ impl PartOrders {
 impl PartOrders {
     /// What the practice trials present, in their order for a seat.
     fn practiced(&self, seat: Seat) -> Vec<Stimuli> {
-        if let (Some(own), Some(part)) = (&self.similarity, &self.part) {
-            return similarity::practiced(self.seed, part, own, seat);
-        }
-        if let (Some(own), Some(part)) = (&self.adjustment, &self.part) {
-            return adjustment::practiced(self.seed, part, own, seat);
+        match (&self.drawn, &self.part) {
+            (Some(Task::Similarity(own)), Some(part)) => {
+                return similarity::practiced(self.seed, part, own, seat);
+            }
+            (Some(Task::Ranking(own)), Some(part)) => {
+                return ranking::practiced(self.seed, part, own, seat);
+            }
+            (Some(Task::Adjustment(own)), Some(part)) => {
+                return adjustment::practiced(self.seed, part, own, seat);
+            }
+            _ => {}
         }
         let models = self.practiced_models(seat);
         let rated = models

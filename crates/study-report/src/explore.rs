@@ -1,5 +1,7 @@
 //! What a search found, as text and as tables. There are no p values: a search decides nothing.
 
+pub mod weights;
+
 use crate::part_answers::included;
 use std::fmt::Write as _;
 use study_analysis::analyze::psychophysics::search::{Exploration, Explored};

@@ -16,6 +16,7 @@ mod means;
 mod outcomes;
 mod pairs;
 mod parts;
+mod rankings;
 mod rendering;
 mod similarity;
 mod strips;

@@ -51,6 +51,9 @@ fn answer(part: &PartAnalysis, f: &PartFinding) -> Option<Answer> {
     if f.question == PartQuestion::Dimensions {
         answer.main.extend(dimensions(part));
     }
+    if f.question == PartQuestion::RankedAlike {
+        answer.main.extend(ranks(part));
+    }
     if f.question == PartQuestion::Starts {
         answer.main.extend(settings(part));
     }
@@ -59,7 +62,10 @@ fn answer(part: &PartAnalysis, f: &PartFinding) -> Option<Answer> {
     }
     if matches!(
         f.question,
-        PartQuestion::Preferred | PartQuestion::Thresholds | PartQuestion::Magnitudes
+        PartQuestion::Preferred
+            | PartQuestion::Thresholds
+            | PartQuestion::Magnitudes
+            | PartQuestion::RankedFirst
     ) {
         answer.main.extend(different(part));
     }
@@ -128,13 +134,18 @@ pub(super) fn results(part: &PartAnalysis) -> String {
     text.extend(information(part));
     text.extend(agreement(part));
     text.extend(identical(part));
+    text.extend(ranks(part));
     text.extend(settings(part));
     let tested = part.findings.iter().filter(|f| f.test.is_some());
     text.extend(tested.filter_map(|f| wording::of_part(part, f).paper()));
     text.extend(dimensions(part));
     text.extend(retest(part));
     let pairs = part.findings.iter().any(|f| {
-        let of_conditions = [PartQuestion::Thresholds, PartQuestion::Magnitudes];
+        let of_conditions = [
+            PartQuestion::Thresholds,
+            PartQuestion::Magnitudes,
+            PartQuestion::RankedFirst,
+        ];
         f.is_yes() && of_conditions.contains(&f.question)
     });
     text.extend(different(part).filter(|_| pairs));
@@ -236,9 +247,22 @@ fn agreement(part: &PartAnalysis) -> Option<String> {
         _ => String::new(),
     };
     Some(format!(
-        "Agreement: the ratings of two participants correlate by {} on average{w}.{order}",
+        "Agreement: the mean correlation of the ratings of two participants is {}{w}.{order}",
         apa::two(correlation)
     ))
+}
+
+/// The mean ranks, the first first, as many as a sentence lists.
+fn ranks(part: &PartAnalysis) -> Option<String> {
+    let found = part.results.over.ranking.as_ref()?;
+    let mut means: Vec<(&str, f64)> = (found.items.iter())
+        .filter_map(|(name, item)| Some((name.as_str(), item.mean_rank.number()?)))
+        .collect();
+    means.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let listed: Vec<String> = (means.iter().take(MAX_LISTED))
+        .map(|(name, mean)| format!("{name} {}", apa::two(*mean)))
+        .collect();
+    (!listed.is_empty()).then(|| format!("Mean ranks: {}.", listed.join(", ")))
 }
 
 /// Where levels feel equal, and how much settings scatter.
@@ -280,18 +304,22 @@ fn dimensions(part: &PartAnalysis) -> Option<String> {
     let each: Vec<String> = (found.dimensions.iter())
         .filter_map(|(k, own)| {
             let predicted = apa::two(own.predicted.number()?);
-            Some(format!("{} {predicted}", k.as_str()))
+            Some(format!("{predicted} with {}", k.as_str()))
         })
         .collect();
     let shown = counted(chosen as usize, "dimension", "dimensions");
     let stress = apa::two(found.map_stress.number()?);
+    let how = match found.map_in_proportion.is_set() {
+        true => "; in proportion to the differences, because their order alone fits without stress",
+        false => "",
+    };
     Some(match each.is_empty() {
         true => format!(
-            "The map has {shown} (stress {stress}): without other participants no number of dimensions predicts better."
+            "The map has {shown} (stress {stress}{how}): without other participants no number of dimensions predicts better."
         ),
         false => format!(
-            "The map has {shown} (stress {stress}): the fewest that predict the ratings of a participant who was left out as well as \
-             any, within one standard error. Correlations by number of dimensions: {}.",
+            "The map has {shown} (stress {stress}{how}): the fewest that predict the ratings of a participant who was left out as well as \
+             any, within one standard error. Correlation by the number of dimensions: {}.",
             each.join(", ")
         ),
     })
@@ -438,12 +466,21 @@ pub(super) fn methods(part: &PartAnalysis) -> String {
     }
     if over.similarity.is_some() {
         text.push(
-            "Each participant's ratings of a pair were averaged over both orders and divided by the mean over that participant's \
-             pairs; their mean over participants was scaled by majorization of Kruskal's (1964) stress 1 on the order of the \
-             dissimilarities, from the classical map and from random starts. Stress was compared with that after each participant's \
+            "Each participant's ratings of a pair were averaged over both orders and brought to the same mean by a factor of the \
+             participant's; their mean over participants was scaled by majorization of Kruskal's (1964) stress 1 on the order of the \
+             dissimilarities, or in proportion to them where their order fits without stress, from the classical map and from random starts. Stress was compared with that after each participant's \
              ratings were dealt to the pairs at random. The number of dimensions is the smallest whose maps of all others predict the ratings of \
              a participant as well as any, within one standard error. Standard errors of positions are by resampling participants; \
              properties of the realizations were laid on the map by Procrustes' rotation and tested over the orders of the realizations."
+                .to_owned(),
+        );
+    }
+    if over.ranking.is_some() {
+        text.push(
+            "Whether participants rank alike was tested by Kendall's (1939) W of their mean ranks, corrected for ties, over the orders of each \
+             participant's ranks. Worths are those of the model of Plackett (1975) and Luce (1959) with ties of any order (Turner et al., \
+             2020), by maximum likelihood; their differences were tested by t with participants as clusters and Holm's correction, \
+             and a realization is above each other one if all of its differences are significant."
                 .to_owned(),
         );
     }

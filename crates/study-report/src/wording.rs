@@ -277,6 +277,8 @@ analysis = { primary = "better" }
             PartQuestion::Structure,
             PartQuestion::Dimensions,
             PartQuestion::MapFollows("VAF".to_owned()),
+            PartQuestion::RankedAlike,
+            PartQuestion::RankedFirst,
             PartQuestion::Adjusted,
             PartQuestion::Starts,
             PartQuestion::Groups,

@@ -372,6 +372,26 @@ pub fn same_page(a: &Screen, b: &Screen) -> bool {
     }
 }
 
+/// What is said of a request that is possible only in a session.
+pub const NOT_BEGUN: &str = "That is possible once the session has begun.";
+
+/// What is asked before the program is left; `None` where nothing is under way any more.
+pub fn before_leaving(view: &View) -> Option<&str> {
+    match view.screen {
+        Screen::Who { .. } => Some("No session has begun. Leave?"),
+        Screen::End { .. } => None,
+        _ => Some(view.words.get(Phrase::PlainLeave)),
+    }
+}
+
+/// Why nothing is presented again now, and when it can be.
+pub fn why_not_again(view: &View) -> &str {
+    view.words.get(match view.has_replays {
+        true => Phrase::PlainNoReplay,
+        false => Phrase::NeverReplay,
+    })
+}
+
 /// The names of what is not saved as lines of safe text; the last one counts those for
 /// which there is no room.
 pub fn unsaved_lines(names: &[String], most: usize, columns: usize) -> Vec<String> {

@@ -19,7 +19,8 @@
 //!   [`Effect::Limp`].
 //! * After a stop, a pause or a fault nothing is loaded or started until somebody
 //!   requests it again.
-//! * Nothing is answered after a longer pause than the protocol allows: it is felt again.
+//! * Nothing is answered after a longer pause than the protocol allows, nor compared over one: it is
+//!   felt again.
 //!
 //! Effects must be carried out in order. [`Effect::Limp`] also cancels a load: no
 //! [`Input::DeviceLoaded`] for it may follow.
@@ -233,7 +234,7 @@ impl Session {
             Input::DeviceLost(what) => self.device_gone(&what, at),
             Input::PlaybackLost(what) => self.playback_lost(&what, at),
             Input::DeviceReady => self.device_ready(),
-            Input::StoodStill { seconds } => self.stood_still(seconds, at),
+            Input::StoodStill { seconds } => self.did_not_run(seconds, at),
             Input::Identify {
                 participant,
                 operator,

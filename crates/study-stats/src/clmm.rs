@@ -19,7 +19,7 @@
 //! it is not positive and no σ > 0 has a higher likelihood, the estimate is 0.
 
 mod crossed;
-mod hermite;
+pub(crate) mod hermite;
 mod laplace;
 mod mode;
 mod quadrature;

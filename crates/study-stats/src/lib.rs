@@ -6,6 +6,7 @@
 //! |---|---|
 //! | Means, standard deviations, quantiles | [`describe`] |
 //! | Do the realizations differ? | [`anova`], [`friedman`] (rank test), [`lmm`] (unbalanced data), [`clm`] and [`clmm`] (ordered categories) |
+//! | The same of counts, shares and positive numbers, with random effects | [`glmm`] |
 //! | Which factors of a crossed design have effects, and which interact? | [`factorial`] (also by aligned ranks, and with groups) |
 //! | Do groups of subjects differ, or does a difference depend on the group? | [`between`] (equal variances), [`between::welch`] (variances of their own) |
 //! | Do the ratings follow a given order? | [`friedman::page`] |
@@ -22,7 +23,9 @@
 //! | At which level is a stimulus felt? | [`psychometric`] |
 //! | How well are two stimuli told apart? | [`detection`] |
 //! | Which is preferred, in pairs? | [`pairs`] |
+//! | Which is preferred, in rankings, and do participants agree? | [`ranking`] |
 //! | Which is preferred in a space of stimuli, and which pair tells most? | [`preference_gp`] |
+//! | Which components of an error decide what is preferred? | [`choice_weights`] |
 //! | How do estimated magnitudes grow? | [`magnitude`] |
 //! | How well are several stimuli identified, and which are confused? | [`identification`] |
 //! | How different do stimuli seem, and along which dimensions? | [`similarity`] |
@@ -38,7 +41,7 @@
 //!   slice of rows of equal length, one row for each subject (or target, or unit).
 //! * A result that is not defined for its input is `None`: too few numbers, no variation,
 //!   unequal lengths, an overflow. No function returns NaN, an infinity or an invented
-//!   0 or 1. [`lmm`], [`clm`] and [`clmm`] give the reason as an error. Input has to be
+//!   0 or 1. [`lmm`], [`glmm`], [`clm`] and [`clmm`] give the reason as an error. Input has to be
 //!   finite.
 //! * Estimates are in the units of the input, variances in their squares. p values are
 //!   two-sided unless the name says otherwise; intervals are (lower, upper) with 95 %
@@ -57,6 +60,7 @@ pub mod bayes;
 pub mod between;
 pub mod bootstrap;
 pub mod carry_over;
+pub mod choice_weights;
 pub mod clm;
 pub mod clmm;
 pub mod correlation;
@@ -66,6 +70,7 @@ pub mod disagreement;
 pub mod distribution;
 pub mod factorial;
 pub mod friedman;
+pub mod glmm;
 pub mod grim;
 pub mod identification;
 pub mod level;
@@ -85,6 +90,7 @@ mod quadrature;
 pub mod questionnaire;
 pub mod random;
 pub mod rank;
+pub mod ranking;
 pub mod regression;
 pub mod sequential;
 pub mod similarity;

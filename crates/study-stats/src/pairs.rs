@@ -7,7 +7,7 @@
 //! Bradley & Terry (1952), and the probability of the first is
 //! 1/(1 + exp(−(a_i − a_j + δ))).
 
-mod existence;
+pub(crate) mod existence;
 
 use super::clm::newton::{Evaluation, maximize};
 use super::distribution::{normal_cdf, normal_density, normal_upper};
@@ -70,6 +70,9 @@ pub enum NoAbilities {
     /// Nobody preferred anything.
     #[error("every comparison is a tie")]
     AllTied,
+    /// Sets of tied items that are too many to count; only of rankings.
+    #[error("so many items can be tied in so many ways that the likelihood is not computed")]
+    TooManySets,
     /// The search found no maximum.
     #[error("the likelihood has no maximum that was found")]
     NotFound,
@@ -109,7 +112,7 @@ pub struct Abilities {
     pub order: Option<Effect>,
     /// ln ν, if the model has it and there are ties.
     pub tie: Option<Effect>,
-    /// 2·(saturated − fitted), over the pairs in each order.
+    /// 2·(saturated − fitted), over the pairs in each order; of rankings over single choices.
     pub deviance: f64,
     /// Its degrees of freedom.
     pub df: usize,
@@ -217,7 +220,7 @@ impl Abilities {
 }
 
 /// Ability `i` as a linear function of the parameters: the last one is minus the sum.
-fn ability(i: usize, items: usize, size: usize) -> Vec<f64> {
+pub(crate) fn ability(i: usize, items: usize, size: usize) -> Vec<f64> {
     let mut vector = vec![0.0; size];
     if i + 1 < items {
         vector[i] = 1.0;
@@ -242,9 +245,9 @@ fn quadratic(m: &SymmetricMatrix, v: &[f64]) -> f64 {
 
 /// One row of data as outcomes: how often, and the weight as a function of the
 /// parameters.
-struct Row {
-    cluster: usize,
-    outcomes: Vec<(f64, Vec<f64>)>,
+pub(crate) struct Row {
+    pub(crate) cluster: usize,
+    pub(crate) outcomes: Vec<(f64, Vec<f64>)>,
 }
 
 impl Row {
@@ -253,7 +256,7 @@ impl Row {
     }
 
     /// Probability of each outcome.
-    fn probabilities(&self, link: Link, at: &[f64]) -> Vec<f64> {
+    pub(crate) fn probabilities(&self, link: Link, at: &[f64]) -> Vec<f64> {
         let weights: Vec<f64> = self.outcomes.iter().map(|o| dot(&o.1, at)).collect();
         if link == Link::Thurstone {
             let x = weights[0] - weights[1];
@@ -347,9 +350,35 @@ pub fn abilities(
             }
         })
         .collect();
+    let of_pairs = |at: &[f64]| {
+        let (deviance, cells) = deviance(&rows, comparisons, model.link, at);
+        (deviance, cells * (1 + usize::from(with_ties)))
+    };
+    Ok(fitted(items, &rows, model, size, of_pairs)?.abilities)
+}
+
+/// What maximizes a likelihood.
+pub(crate) struct Fitted {
+    pub(crate) abilities: Abilities,
+    /// The parameters after the abilities and the order effect.
+    pub(crate) ties: Vec<Effect>,
+    pub(crate) log_likelihood: f64,
+}
+
+/// The maximum of the likelihood of rows with `size` parameters: the abilities but the last, the order effect, if the
+/// model has it, and those of ties. `deviance` gives that of the rows at the parameters, and the number of free outcomes.
+pub(crate) fn fitted(
+    items: usize,
+    rows: &[Row],
+    model: Model,
+    size: usize,
+    deviance: impl FnOnce(&[f64]) -> (f64, usize),
+) -> Result<Fitted, NoAbilities> {
+    let order_place = items - 1;
+    let tie_place = order_place + usize::from(model.order);
     let evaluate = |at: &[f64]| {
         let mut sum = Evaluation::zero(size);
-        for row in &rows {
+        for row in rows {
             row.add(model.link, at, &mut sum);
         }
         sum.value.is_finite().then_some(sum)
@@ -363,21 +392,27 @@ pub fn abilities(
     let covariance = inverse(&factor, size);
     let vectors: Vec<Vec<f64>> = (0..items).map(|i| ability(i, items, size)).collect();
     let effect = |place: usize| Effect::new(found.at[place], covariance.get(place, place));
-    let (deviance, cells) = deviance(&rows, comparisons, model.link, &found.at);
-    let clusters = by_cluster(&rows, model.link, &found.at);
-    Ok(Abilities {
+    let (deviance, free) = deviance(&found.at);
+    let clusters = by_cluster(rows, model.link, &found.at);
+    let ties: Vec<Effect> = (tie_place..size).map(effect).collect();
+    let abilities = Abilities {
         abilities: vectors.iter().map(|v| dot(v, &found.at)).collect(),
         ses: (vectors.iter())
             .map(|v| quadratic(&covariance, v).sqrt())
             .collect(),
         order: model.order.then(|| effect(order_place)),
-        tie: with_ties.then(|| effect(tie_place)),
+        tie: ties.first().copied(),
         deviance,
-        df: (cells * (1 + usize::from(with_ties))).saturating_sub(size),
+        df: free.saturating_sub(size),
         model,
         clustered: sandwich(&clusters, &factor),
         information: (clusters.iter()).map(|own| own.hessian.negated()).collect(),
         covariance: Covariance(covariance),
+    };
+    Ok(Fitted {
+        abilities,
+        ties,
+        log_likelihood: found.value,
     })
 }
 

@@ -30,7 +30,7 @@
 mod best;
 mod kernel;
 mod mode;
-mod probit;
+pub(crate) mod probit;
 
 pub use kernel::{Candidate, Kernel, MAX_POINTS, candidates};
 

@@ -14,6 +14,10 @@ use super::describe;
 use super::friedman::friedman;
 use super::random::RandomSource;
 
+/// Most rounds of [`Dissimilarities::in_common`], and the change of a factor after which there is none more.
+const ROUNDS: usize = 1_000;
+const CLOSE: f64 = 1e-12;
+
 /// The dissimilarities of the pairs of some objects: 0 if two are alike.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dissimilarities {
@@ -63,11 +67,7 @@ impl Dissimilarities {
     /// much as the others. `None` without a dissimilarity above 0.
     pub fn rescaled(&self) -> Option<Self> {
         let mean = describe::mean(&self.known()).filter(|mean| *mean > 0.0)?;
-        let values = self.values.iter();
-        Some(Self {
-            objects: self.objects,
-            values: values.map(|value| Some((*value)? / mean)).collect(),
-        })
+        Some(self.divided(mean))
     }
 
     /// The mean of each pair over those who rated it; all have the same objects. `None` of nobody.
@@ -81,6 +81,56 @@ impl Dissimilarities {
             objects,
             values: (0..pairs(objects).count()).map(of_pair).collect(),
         })
+    }
+
+    /// What some have in common: the mean of each pair over those who rated it, after each one's were divided by a factor. Where
+    /// all rated the same pairs the factors are 1, and this is [`Self::mean`]. Otherwise the mean of all that one rated says which
+    /// pairs they were, too, so that a factor is the sum of what one rated over that of the common values of the same pairs, found by turns
+    /// (iterative proportional fitting, Deming & Stephan 1940). `None` of nobody.
+    ///
+    /// ```
+    /// # use study_stats::similarity::Dissimilarities;
+    /// let near = Dissimilarities::from_fn(4, |a, b| (b - a < 3).then_some((b - a) as f64));
+    /// let far = Dissimilarities::from_fn(4, |a, b| (b - a > 1).then_some(5.0 * (b - a) as f64));
+    /// let found = Dissimilarities::in_common([near, far].iter()).unwrap();
+    /// let ratio = found.get(0, 3).unwrap() / found.get(0, 1).unwrap();
+    /// assert!((ratio - 3.0).abs() < 1e-9);
+    /// ```
+    pub fn in_common<'a>(all: impl Iterator<Item = &'a Self> + Clone) -> Option<Self> {
+        let people: Vec<&Self> = all.clone().collect();
+        let mut common = Self::mean(all)?;
+        let whole = |own: &&Self| own.values.iter().all(Option::is_some);
+        if people.iter().all(whole) {
+            return Some(common);
+        }
+        let mut factors = vec![1.0; people.len()];
+        for _ in 0..ROUNDS {
+            let mut most: f64 = 0.0;
+            for (own, factor) in people.iter().zip(&mut factors) {
+                let (rated, expected) = own.common(&common);
+                let found = rated.iter().sum::<f64>() / expected.iter().sum::<f64>();
+                if let Some(found) = super::finite(found).filter(|found| *found > 0.0) {
+                    most = most.max((found / *factor - 1.0).abs());
+                    *factor = found;
+                }
+            }
+            let divided: Vec<Self> = (people.iter().zip(&factors))
+                .map(|(own, factor)| own.divided(*factor))
+                .collect();
+            common = Self::mean(divided.iter())?;
+            if most < CLOSE {
+                break;
+            }
+        }
+        Some(common)
+    }
+
+    fn divided(&self, by: f64) -> Self {
+        let values = self.values.iter();
+        Self {
+            objects: self.objects,
+            values: values.map(|value| Some((*value)? / by)).collect(),
+        }
     }
 
     /// Those that two have both, in the same order.
@@ -101,7 +151,7 @@ impl Dissimilarities {
 pub struct Agreement {
     /// Mean over all pairs of participants of the correlation of their dissimilarities. `None` if no two have one.
     pub mean_correlation: Option<f64>,
-    /// Kendall's W (1939) of the participants who rated every pair, corrected for ties. `None` with fewer than two.
+    /// Kendall's W (1939) of the participants who rated every pair that anybody rated, corrected for ties. `None` with fewer than two.
     pub kendall_w: Option<f64>,
     /// Participants on whom W rests.
     pub complete: usize,
@@ -121,8 +171,13 @@ pub fn agreement(participants: &[Dissimilarities]) -> Agreement {
     let correlations: Vec<f64> = pairs(participants.len())
         .filter_map(|(a, b)| participants[a].correlation(&participants[b]))
         .collect();
+    // Pairs that nobody was to rate are missing to nobody.
+    let all = participants.first().map_or(0, |own| own.values.len());
+    let rated: Vec<usize> = (0..all)
+        .filter(|pair| participants.iter().any(|own| own.values[*pair].is_some()))
+        .collect();
     let complete: Vec<Vec<f64>> = (participants.iter())
-        .filter_map(|own| own.values.iter().copied().collect())
+        .filter_map(|own| rated.iter().map(|pair| own.values[*pair]).collect())
         .collect();
     Agreement {
         mean_correlation: describe::mean(&correlations),
@@ -135,7 +190,7 @@ pub fn agreement(participants: &[Dissimilarities]) -> Agreement {
 pub fn with_the_others(participants: &[Dissimilarities]) -> Vec<Option<f64>> {
     let of = |(own, mine): (usize, &Dissimilarities)| {
         let others = (participants.iter().enumerate()).filter(|(at, _)| *at != own);
-        let mean = Dissimilarities::mean(others.map(|(_, other)| other))?;
+        let mean = Dissimilarities::in_common(others.map(|(_, other)| other))?;
         mine.correlation(&mean)
     };
     participants.iter().enumerate().map(of).collect()

@@ -32,7 +32,7 @@ pub(in crate::cli) struct Args {
     #[arg(long, value_name = "N", default_value_t = 200)]
     times: u32,
     /// Servo periods per second
-    #[arg(long, value_name = "HZ", default_value_t = 4000)]
+    #[arg(long, value_name = "HZ", default_value_t = 4000, value_parser = clap::value_parser!(u32).range(500..=20_000))]
     rate: u32,
     /// A device on this port instead of the simulated one
     #[cfg(unix)]

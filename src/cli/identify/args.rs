@@ -182,6 +182,10 @@ pub(in crate::cli) struct Args {
     #[arg(long)]
     pub(super) active: bool,
 
+    /// Weights of the components of errors, which `study explore --reference` writes: perceptual VAF is shown beside VAF, and methods are compared by it
+    #[arg(long, value_name = "FILE")]
+    pub(super) weights: Option<PathBuf>,
+
     /// Estimator [default: all are compared, and one is recommended; with an option of the recursion ewls, with another one of an estimator passive]
     #[arg(long, value_parser = estimators())]
     pub(super) method: Option<String>,
@@ -412,7 +416,7 @@ impl Args {
         self.lever.map(|lever_mm| (units, lever_mm))
     }
 
-    /// What is asked of the identification.
+    /// What is asked of the identification, without what files contain.
     pub(super) fn request(&self) -> Request {
         Request {
             options: Options {
@@ -449,6 +453,7 @@ impl Args {
                 m_kg: self.mass_kg,
                 b_n_s_per_mm: self.damping_n_s_per_mm,
             },
+            weights: None,
         }
     }
 }

@@ -32,27 +32,59 @@ struct Line<'a> {
     event: &'a Event,
 }
 
-/// Where the unsaved events of a session may be kept: the home folder survives a
-/// restart, the folder for temporary files may be on another disk.
-pub(super) fn places() -> Vec<PathBuf> {
-    let home = std::env::home_dir().filter(|home| home.is_absolute());
-    home.into_iter().chain([std::env::temp_dir()]).collect()
+/// A place for the unsaved events of a session.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Place {
+    folder: PathBuf,
+    /// Whether it is in memory: a computer whose only disk dies has no other.
+    volatile: bool,
+}
+
+impl Place {
+    fn new(folder: PathBuf, volatile: bool) -> Self {
+        Self { folder, volatile }
+    }
+}
+
+/// Where the events may be kept: the home folder survives a restart, the folder for temporary
+/// files may be on another disk, and those of Linux in memory are on none.
+pub(super) fn places() -> Vec<Place> {
+    let on_disk = std::env::home_dir()
+        .into_iter()
+        .chain([std::env::temp_dir()]);
+    let of_user = std::env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from);
+    let in_memory = of_user.into_iter().chain([PathBuf::from("/dev/shm")]);
+    let on_disk = on_disk.map(|folder| Place::new(folder, false));
+    let all = on_disk.chain(in_memory.map(|folder| Place::new(folder, true)));
+    all.filter(|place| place.folder.is_absolute()).collect()
+}
+
+/// Where a copy of the events is.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) struct Kept {
+    path: PathBuf,
+    volatile: bool,
 }
 
 /// Writes the events to a new file in the first of `places` that takes it, and returns
-/// when they are on the medium: its path, or why each place did not take it.
+/// when they are on the medium: where it is, or why each place did not take it.
 pub(super) fn keep(
     unsaved: &Unsaved,
     participant: &str,
     results: &Path,
-    places: &[PathBuf],
-) -> Result<PathBuf, NoPlace> {
+    places: &[Place],
+) -> Result<Kept, NoPlace> {
     let text = content(unsaved, participant, results);
     let mut refusals = Vec::new();
-    for place in places {
-        match write(place, &name(unsaved, participant, results), &text) {
-            Ok(path) => return Ok(path),
-            Err(e) => refusals.push(format!("{}: {}", place.display(), plain(&e))),
+    for Place { folder, volatile } in places {
+        match write(folder, &name(unsaved, participant, results), &text) {
+            Ok(path) => {
+                return Ok(Kept {
+                    path,
+                    volatile: *volatile,
+                });
+            }
+            Err(e) => refusals.push(format!("{}: {}", folder.display(), plain(&e))),
         }
     }
     Err(NoPlace(refusals.join("; ")))
@@ -105,7 +137,7 @@ fn write(folder: &Path, name: &str, text: &str) -> std::io::Result<PathBuf> {
 /// The message at the end of a session: what is not saved, why, and where it is kept.
 pub(super) fn failure(
     unsaved: &Unsaved,
-    kept: &Result<PathBuf, NoPlace>,
+    kept: &Result<Kept, NoPlace>,
     folder: &Path,
     resume: &str,
 ) -> Failure {
@@ -120,10 +152,14 @@ pub(super) fn failure(
     );
     let next = "repair the disk, then resume the session and enter what is asked again";
     let hint = match kept {
-        Ok(path) => format!(
-            "a copy of what is not saved is in {}; {next}: {resume}",
-            path.display()
-        ),
+        Ok(Kept { path, volatile }) => {
+            let lost = match volatile {
+                true => " (in memory: copy it before the computer is turned off)",
+                false => "",
+            };
+            let path = path.display();
+            format!("a copy of what is not saved is in {path}{lost}; {next}: {resume}")
+        }
         Err(refusals) => format!(
             "no copy could be written ({refusals}): write down the lines above; {next}: {resume}"
         ),
@@ -149,12 +185,13 @@ mod tests {
     #[test]
     fn the_first_place_that_takes_the_events_gets_them() {
         let home = tempfile::tempdir().unwrap();
-        let (none, some) = (home.path().join("none"), home.path().to_owned());
+        let none = Place::new(home.path().join("none"), false);
+        let some = Place::new(home.path().to_owned(), false);
         let results = Path::new("results/x");
         let first = keep(&unsaved(), "P01", results, &[none.clone(), some.clone()]).unwrap();
         let second = keep(&unsaved(), "P01", results, &[some]).unwrap();
-        assert!(first.starts_with(home.path()));
-        let text = std::fs::read_to_string(&first).unwrap();
+        assert!(first.path.starts_with(home.path()));
+        let text = std::fs::read_to_string(&first.path).unwrap();
         let lines: Vec<serde_json::Value> = text
             .lines()
             .map(|line| serde_json::from_str(line).unwrap())
@@ -167,11 +204,41 @@ mod tests {
         assert_ne!(first, second, "a file is never written twice");
         let refused = keep(&unsaved(), "P01", results, std::slice::from_ref(&none));
         let words = refused.as_ref().unwrap_err().to_string();
-        assert!(words.starts_with(&none.display().to_string()), "{words}");
+        assert!(
+            words.starts_with(&none.folder.display().to_string()),
+            "{words}"
+        );
         let failure = failure(&unsaved(), &refused, results, "study run x");
         assert_eq!(failure.exit_code(), 4);
         let hint = failure.hint.unwrap();
         assert!(hint.contains("no copy could be written"), "{hint}");
+    }
+
+    /// A computer whose only disk dies has no other place, and a copy there ends with it.
+    #[cfg(unix)]
+    #[test]
+    fn the_last_place_is_in_memory_and_the_message_says_so() {
+        let places = places();
+        let first_in_memory = places.iter().position(|place| place.volatile).unwrap();
+        assert!(first_in_memory > 0 && places[first_in_memory..].iter().all(|p| p.volatile));
+        let home = tempfile::tempdir().unwrap();
+        let results = Path::new("results/x");
+        for volatile in [false, true] {
+            let places = [
+                Place::new(home.path().join("none"), false),
+                Place::new(home.path().to_owned(), volatile),
+            ];
+            let kept = keep(&unsaved(), "P01", results, &places);
+            let hint = failure(&unsaved(), &kept, results, "study run x")
+                .hint
+                .unwrap();
+            assert!(hint.contains("study-unsaved-x-P01-"), "{hint}");
+            assert_eq!(
+                hint.contains("before the computer is turned off"),
+                volatile,
+                "{hint}"
+            );
+        }
     }
 
     #[cfg(unix)]
@@ -179,9 +246,9 @@ mod tests {
     fn only_the_owner_can_read_the_copy() {
         use std::os::unix::fs::PermissionsExt as _;
         let home = tempfile::tempdir().unwrap();
-        let places = [home.path().to_owned()];
-        let path = keep(&unsaved(), "P01", Path::new("results/x"), &places).unwrap();
-        let mode = std::fs::metadata(path).unwrap().permissions().mode();
+        let places = [Place::new(home.path().to_owned(), false)];
+        let kept = keep(&unsaved(), "P01", Path::new("results/x"), &places).unwrap();
+        let mode = std::fs::metadata(kept.path).unwrap().permissions().mode();
         assert_eq!(mode & 0o777, 0o600);
     }
 }

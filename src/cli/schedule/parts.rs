@@ -8,7 +8,7 @@ use study_base::text::{ModelId, PartId, Untrusted, counted};
 use study_plan::procedure::{Rule, Staircase};
 use study_plan::protocol::{
     Adjustment, Identification, Interval, IntervalOrder, Magnitude, Mushra, Pairs, Part,
-    PartsOrder, Protocol, SearchTask, Stimuli, Task, TrackRules, Trial,
+    PartsOrder, Protocol, Ranking, SearchTask, Stimuli, Task, TrackRules, Trial,
 };
 use study_report::study::search_rule;
 
@@ -86,6 +86,7 @@ pub(super) fn render(protocol: &Protocol, plans: &Plans, width: usize) -> String
                 }
                 pairs(&mut out, protocol, part, &task.pairs(), &own, width);
             }
+            Task::Ranking(task) => ranking(&mut out, protocol, part, task, &own, width),
             Task::Adjustment(task) => adjustment(&mut out, protocol, task, &own, width),
         }
     }
@@ -183,6 +184,50 @@ fn pairs(
         }
     };
     let _ = writeln!(out, "\n{words}");
+}
+
+/// The order within each trial, and how balanced it is: a trial is a block of what is felt in it.
+fn ranking(
+    out: &mut String,
+    protocol: &Protocol,
+    part: &Part,
+    task: &Ranking,
+    plans: &Plans,
+    width: usize,
+) {
+    let trials = counted(task.repetitions as usize, "trial", "trials");
+    let _ = writeln!(
+        out,
+        "{trials}, in each of which all are felt: a block below"
+    );
+    if task.practice > 0 {
+        let trials = counted(task.practice as usize, "trial", "trials");
+        let _ = writeln!(
+            out,
+            "Practice, before every order: {trials}, in orders that are drawn"
+        );
+    }
+    let felt = |(row, plan): &(u32, Vec<Trial>)| {
+        let mut felt: Vec<Trial> = Vec::new();
+        for trial in plan.iter().filter(|t| !t.practice) {
+            let Stimuli::Set { set } = &trial.stimuli else {
+                continue;
+            };
+            for model in set {
+                felt.push(Trial {
+                    position: u32::try_from(felt.len() + 1).unwrap_or(u32::MAX),
+                    stimuli: Stimuli::One {
+                        model: model.clone(),
+                    },
+                    ..trial.clone()
+                });
+            }
+        }
+        (*row, felt)
+    };
+    let felt: Vec<(u32, Vec<Trial>)> = plans.iter().map(felt).collect();
+    let design = protocol.design_of(Some(&part.id));
+    section(out, protocol, (&design, None), &task.models, &felt, width);
 }
 
 /// Which point of each pair comes first; the pairs themselves follow from the answers.

@@ -10,6 +10,7 @@ use study_base::text::QuestionId;
 use study_plan::protocol::phrases::{Phrase, Words};
 use study_plan::protocol::{Answer, Question, Turn};
 use study_session::outcome::Choice;
+use study_session::page::{self, NOT_BEGUN};
 use study_session::session::{Input, Roster, Screen, View};
 
 impl UiState {
@@ -21,6 +22,9 @@ impl UiState {
                 return vec![Input::Stop];
             }
             Key::Char(' ') if view.armed && !self.is_text() => return vec![Input::Stop],
+            Key::Quit if self.dialogs.is_empty() && page::before_leaving(view).is_none() => {
+                return vec![Input::Quit];
+            }
             Key::Quit => {
                 let quit = Dialog::Confirm(Confirm::Quit);
                 self.dialogs.retain(|open| *open != quit);
@@ -31,10 +35,18 @@ impl UiState {
                 self.suspend = true;
                 return vec![Input::Pause];
             }
+            Key::Pause if matches!(view.screen, Screen::Who { .. }) => {
+                return self.notify(NOT_BEGUN);
+            }
             Key::Pause => return vec![Input::Pause],
             Key::Help if self.dialog() != Some(&Dialog::Help) => {
                 self.dialogs.push(Dialog::Help);
                 return Vec::new();
+            }
+            // The help names the keys of the page below it.
+            key if is_command(key) && self.dialog() == Some(&Dialog::Help) => {
+                self.dialogs.pop();
+                return self.press(key, view);
             }
             _ => {}
         }
@@ -84,9 +96,7 @@ impl UiState {
         let not_begun = matches!(view.screen, Screen::Who { .. });
         Some(match key {
             Key::Char('?') if !self.is_text() => Ok(Dialog::Help),
-            Key::Remark | Key::Correct | Key::MarkBad if not_begun => {
-                Err("That is possible once the session has begun.".to_owned())
-            }
+            Key::Remark | Key::Correct | Key::MarkBad if not_begun => Err(NOT_BEGUN.to_owned()),
             Key::Remark => Ok(Dialog::remark()),
             Key::Correct if view.correctable.is_empty() => {
                 Err(view.words.get(Phrase::NothingToCorrect).to_owned())
@@ -105,6 +115,11 @@ impl UiState {
                 }),
                 _ => Err(view.words.get(Phrase::PlainNoQuestion).to_owned()),
             },
+            Key::Replay => match &view.screen {
+                Screen::Form { .. } if view.can_replay => return None,
+                Screen::Stopped { .. } => return None,
+                _ => Err(page::why_not_again(view).to_owned()),
+            },
             _ => return None,
         })
     }
@@ -114,6 +129,9 @@ impl UiState {
             return Vec::new();
         };
         match dialog.key(key, view) {
+            DialogResult::Open(Handled::No) if is_command(key) => {
+                self.notify(view.words.get(Phrase::FinishFirst))
+            }
             DialogResult::Open(handled) => {
                 self.show_notice(handled, &view.words);
                 Vec::new()
@@ -157,10 +175,10 @@ impl UiState {
                 Key::Enter => self.notify(view.words.get(Phrase::ChooseYesOrNo)),
                 _ => Vec::new(),
             },
-            Screen::Form { .. } if key == Key::Replay => match view.can_replay {
-                true => vec![Input::PlayAgain],
-                false => Vec::new(),
-            },
+            // Elsewhere it is explained.
+            Screen::Form { .. } | Screen::Stopped { .. } if key == Key::Replay => {
+                vec![Input::PlayAgain]
+            }
             Screen::Form { questions, .. } => self.press_form(key, questions, view),
             Screen::Message { .. } | Screen::End { .. } | Screen::Break { .. } => {
                 self.press_reading(key, view)
@@ -205,7 +223,7 @@ impl UiState {
             Key::Tab | Key::BackTab | Key::Up | Key::Down => who.on_operator = !who.on_operator,
             Key::Enter if who.participant.is_blank() => {
                 who.on_operator = false;
-                match roster.and_then(Roster::next_id) {
+                match roster.and_then(Roster::proposed) {
                     // The id that is proposed; another Enter goes on with it.
                     Some(id) => who.participant = Editor::line(id.as_str()),
                     None => return self.notify("Type the participant's id first."),
@@ -220,7 +238,7 @@ impl UiState {
             }
             // The id that is proposed.
             Key::Right if !who.on_operator && who.participant.text().is_empty() => {
-                if let Some(id) = roster.and_then(Roster::next_id) {
+                if let Some(id) = roster.and_then(Roster::proposed) {
                     who.participant = Editor::line(id.as_str());
                 }
             }
@@ -323,6 +341,14 @@ impl UiState {
         self.notice = Some(what.to_owned());
         Vec::new()
     }
+}
+
+/// Whether a key asks for something of the page and has no other meaning in a dialog.
+fn is_command(key: Key) -> bool {
+    matches!(
+        key,
+        Key::Remark | Key::Correct | Key::MarkBad | Key::Decline | Key::Replay
+    )
 }
 
 /// What a key changes where a level is set.

@@ -22,6 +22,8 @@ pub struct DialogView<'a> {
     pub dialog: &'a Dialog,
     /// Whether Esc also stops a loaded or playing device.
     pub armed: bool,
+    /// What is asked before the program is left.
+    pub leave: &'a str,
     /// What is in memory only because saving has failed.
     pub unsaved: &'a [String],
     /// The fixed sentences that a participant reads.
@@ -73,7 +75,7 @@ impl DialogView<'_> {
     fn place(&self, area: Rect) -> (String, Rect) {
         let (title, width, height) = match self.dialog {
             Dialog::Help => (self.words.get(Phrase::Help), 76, 18),
-            Dialog::Remark { .. } => ("Remark", 68, 11),
+            Dialog::Remark { .. } => (self.words.get(Phrase::Remark), 68, 11),
             Dialog::Correct(correct) => {
                 let title = self.words.get(Phrase::CorrectTitle);
                 match &correct.step {
@@ -311,8 +313,8 @@ impl DialogView<'_> {
         let names = unsaved_lines(self.unsaved, 5, columns);
         left_all(buf, rows(inside, 2, 5), &names, self.theme.strong());
         let words = "Enter on the page below tries to save it again. If you quit, it is tried \
-                     once more; what still cannot be saved is written to a file in your home \
-                     folder or the folder for temporary files, and the program says which.";
+                     once more; what still cannot be saved is written to a file elsewhere, in \
+                     your home folder if that can be written, and the program says where.";
         let lines = wrap::paragraph(words, columns.max(1), 4);
         left_all(buf, rows(inside, 8, 4), &lines, self.theme.text());
         self.keys(buf, inside, &[("y", "quit"), ("n", "back")]);
@@ -356,10 +358,7 @@ impl Widget for &DialogView<'_> {
             Dialog::Confirm(confirm) => {
                 let back = self.words.get(Phrase::Back);
                 let (words, yes) = match confirm {
-                    Confirm::Quit => (
-                        self.words.get(Phrase::PlainLeave),
-                        self.words.get(Phrase::Quit),
-                    ),
+                    Confirm::Quit => (self.leave, self.words.get(Phrase::Quit)),
                     Confirm::DropOut => (
                         "Does the participant drop out? This ends their part in the study.",
                         "drop out",

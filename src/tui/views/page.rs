@@ -110,6 +110,7 @@ impl<'a> Page<'a> {
         Some(DialogView {
             dialog: self.state.dialog()?,
             armed: self.view.armed,
+            leave: page::before_leaving(self.view).unwrap_or_default(),
             words: &self.view.words,
             unsaved: &self.view.unsaved,
             theme: self.theme,

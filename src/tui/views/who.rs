@@ -2,7 +2,9 @@
 
 use crate::tui::theme::Theme;
 use crate::tui::ui_state::Who;
-use crate::tui::widgets::{TextField, center, frame, left, left_all, middle, row, rows, styled};
+use crate::tui::widgets::{
+    TextField, center, center_all, frame, left, left_all, middle, row, rows, styled,
+};
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 use ratatui::widgets::Widget;
@@ -27,6 +29,8 @@ pub struct WhoView<'a> {
 const WIDE: u16 = 56;
 /// Rows of the title and the two boxed fields with their lines.
 const ROWS: u16 = 10;
+/// Rows below the title that say who is proposed and why.
+const PROPOSAL: u16 = 2;
 
 impl WhoView<'_> {
     /// The title, the line below, the text and the box of each field.
@@ -46,13 +50,13 @@ impl WhoView<'_> {
                 "Participant",
                 who.unwrap_or_else(|| "a pseudonym, such as P01".to_owned()),
                 field(participant, false),
-                rows(place, 2, 3),
+                rows(place, 2 + self.proposal(), 3),
             ),
             (
                 "Operator",
                 "your initials or a code".to_owned(),
                 field(operator, true),
-                rows(place, 6, 3),
+                rows(place, 6 + self.proposal(), 3),
             ),
         ]
     }
@@ -62,10 +66,16 @@ impl WhoView<'_> {
         recent.map(|(id, who)| format!("{id:<12} {who}")).collect()
     }
 
+    /// Rows of the sentences about somebody who has not finished; what is typed moves nothing.
+    fn proposal(&self) -> u16 {
+        let unfinished = self.roster.and_then(Roster::unfinished);
+        unfinished.map_or(0, |_| PROPOSAL)
+    }
+
     fn place(&self, area: Rect) -> Rect {
         let recent = u16::try_from(self.recent().len()).unwrap_or(0);
         let more = if recent > 0 { recent + 2 } else { 0 };
-        middle(area, WIDE, ROWS + more)
+        middle(area, WIDE, ROWS + self.proposal() + more)
     }
 
     /// The text of a boxed field: its bar is the left side of the box.
@@ -95,7 +105,18 @@ impl Widget for &WhoView<'_> {
         };
         let title = styled(title, self.theme.strong());
         center(buf, row(place, 0), &title);
-        let next = self.roster.and_then(|roster| roster.next_id());
+        if let Some((_, sentences)) = self.roster.and_then(Roster::unfinished)
+            && self.who.participant.is_blank()
+        {
+            // A long id may need more than the width of the fields.
+            let below = Rect {
+                x: area.x,
+                width: area.width,
+                ..rows(place, 1, PROPOSAL)
+            };
+            center_all(buf, below, &sentences, self.theme.notice());
+        }
+        let next = self.roster.and_then(Roster::proposed);
         for (label, hint, field, at) in self.fields(area) {
             let border = match field.focused {
                 true => self.theme.focus(),
@@ -130,7 +151,7 @@ impl Widget for &WhoView<'_> {
         }
         let recent = self.recent();
         if !recent.is_empty() {
-            let list = rows(place, ROWS + 1, place.height);
+            let list = rows(place, ROWS + self.proposal() + 1, place.height);
             let title = styled("Last participants", self.theme.quiet());
             left(buf, row(list, 0), &title);
             left_all(buf, rows(list, 1, list.height), &recent, self.theme.quiet());

@@ -186,6 +186,26 @@ fn a_stopped_level_goes_on() {
     assert!((set - (1.0 + 0.05 * first as f64)).abs() < 1e-9, "{set}");
 }
 
+/// A level is not compared with what was felt before a long pause: the trial then begins again.
+#[test]
+fn a_level_that_was_stopped_for_long_begins_again() {
+    for (seconds, again) in [(40.0, false), (62.0, true)] {
+        let mut rig = Rig::new(adjustment("standard = 2.0"));
+        rig.until("Playing");
+        does(&mut rig, Input::Advance);
+        let first = start(&rig);
+        does(&mut rig, Input::Adjust(Turn::Higher));
+        assert_eq!(step(&rig), first + 1);
+        rig.send(Input::Stop).wait(seconds);
+        rig.send(Input::PlayAgain).wait(2.0);
+        let failed = |e: &Event| matches!(e, Event::AttemptFailed { failure, .. } if *failure == Failure::Interrupted);
+        assert_eq!(rig.count(failed), usize::from(again), "{seconds} s");
+        rig.until("Playing");
+        let expected = if again { STANDARD } else { first + 1 };
+        assert_eq!(step(&rig), expected, "{seconds} s");
+    }
+}
+
 /// Towards the standard, one step at a time, and a fault and a stop on the way.
 fn hand(rig: &mut Rig) {
     match rig.view().screen {

@@ -62,6 +62,7 @@ fn a_realization_is_felt_again_before_it_is_rated_and_that_is_recorded() {
     rig.playback.strokes = 2;
     rig.send(Input::PlayAgain).until("Form");
     assert!(!rig.view().can_replay, "once only");
+    assert!(rig.view().has_replays, "but at the next trial");
     rig.answer_page().until_reference(2);
     let row = &rig.session.history().rating_rows(&protocol)[0];
     assert_eq!((row.replays, row.attempt), (Some(1), Some(1)));

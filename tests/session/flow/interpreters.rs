@@ -3,7 +3,7 @@
 //! docs/page.md, and none has the name of a realization.
 
 use super::part_rig::{
-    adjustment, beside_a_reference, identification, pairs, read, similarity, track,
+    adjustment, beside_a_reference, identification, pairs, ranking, read, similarity, track,
 };
 use super::rig::{DeviceMood, Rig, StoreMood};
 use super::studies::{MODELS, PRACTICE, question, rich};
@@ -59,6 +59,7 @@ repetitions = 1
             "practice = [\"KJW-3\", \"XQZ-7\"]\nfeedback = \"always\"\ncriterion = { correct = 2, of = 3, rounds = 3 }",
         ),
         similarity("identical = true\npractice = 2"),
+        ranking("ties = true\npractice = 1\nrepetitions = 2\nexposure = { replays = 1 }"),
         adjustment("standard = 2.0\npractice = 1"),
     ]
 }

@@ -146,6 +146,28 @@ repetitions = 2
     parsed.protocol.unwrap_or_else(|| panic!("{shown}"))
 }
 
+/// Three realizations that are ranked; `more` is added to the part.
+pub(super) fn ranking(more: &str) -> Protocol {
+    let text = format!(
+        r#"
+[analysis]
+primary = "order"
+[[parts]]
+id = "order"
+kind = "ranking"
+prompt = "Which rank has number {{n}}?"
+first = "best"
+last = "worst"
+models = ["XQZ-7", "KJW-3", "VVB-9"]
+{more}
+"#
+    );
+    let head = HEAD.replace("study-protocol/2", "study-protocol/3");
+    let parsed = parse("p", &format!("{head}{text}"));
+    let shown = parsed.findings.render(false);
+    parsed.protocol.unwrap_or_else(|| panic!("{shown}"))
+}
+
 /// A level of damping that is set, from 1.5 and 2.5; `more` is added to the part.
 pub(super) fn adjustment(more: &str) -> Protocol {
     let text = format!(

@@ -222,6 +222,7 @@ fn a_trial_is_replayed_as_often_as_the_part_permits_and_never_after_an_answer() 
     let mut rig = Rig::new(pairs("exposure = { replays = 1 }"));
     until(&mut rig, 0, answering);
     assert!(rig.view().can_replay);
+    assert!(rig.view().has_replays);
     rig.send(Input::PlayAgain);
     assert!(!answering(&rig.view().screen));
     until(&mut rig, 0, answering);
@@ -235,7 +236,7 @@ fn a_trial_is_replayed_as_often_as_the_part_permits_and_never_after_an_answer() 
     assert_eq!(row.exploration_s, Some(12.0), "four times 3 s");
     let mut rig = Rig::new(pairs(""));
     until(&mut rig, 0, answering);
-    assert!(!rig.view().can_replay);
+    assert!(!rig.view().can_replay && !rig.view().has_replays);
 }
 
 #[test]
@@ -326,6 +327,7 @@ fn the_pages_of_a_trial_are_the_same_whatever_it_presents() {
         magnitudes(),
         identification("feedback = \"never\""),
         similarity("identical = true"),
+        ranking("ties = true\nrepetitions = 3"),
         track("2ifc", STAIRCASE, "easy = 0.3"),
         track("3ifc", STAIRCASE, "easy = 0.3"),
         track("abx", QUEST, ""),

@@ -44,6 +44,17 @@ fn a_pause_stops_the_playback_first() {
     }
 }
 
+#[test]
+fn a_session_that_is_over_is_not_paused_and_says_so() {
+    let mut rig = Rig::new(plain());
+    rig.until("End");
+    let before = rig.journal.len();
+    rig.send(Input::Pause);
+    let why = rig.view().notice.unwrap();
+    assert!(why.contains("the session is over"), "{why}");
+    assert_eq!(rig.journal.len(), before);
+}
+
 /// Between Enter and the confirmation of the device.
 #[test]
 fn a_pause_while_the_device_stops_is_kept() {
@@ -124,7 +135,10 @@ fn paused_s(rig: &Rig) -> Option<f64> {
 
 #[test]
 fn after_a_long_pause_a_trial_is_felt_again() {
-    let pauses: [(&str, Does); 3] = [
+    let pauses: [(&str, Does); 4] = [
+        ("a process that was stopped", |rig| {
+            rig.send(Input::StoodStill { seconds: 61.0 });
+        }),
         ("a pause", |rig| {
             rig.send(Input::Pause).wait(61.0).send(Input::Advance);
         }),
@@ -163,6 +177,86 @@ fn a_short_pause_is_recorded() {
     rig.send(Input::Advance).answer_page();
     assert_eq!(forgotten(&rig), []);
     assert!((paused_s(&rig).unwrap() - 20.0).abs() < 1e-6);
+}
+
+/// The pause has measured the standstill already.
+#[test]
+fn a_standstill_during_a_pause_counts_once() {
+    let mut rig = Rig::new(plain());
+    rig.until("Form").send(Input::Pause).wait(40.0);
+    rig.send(Input::StoodStill { seconds: 40.0 });
+    rig.send(Input::Advance);
+    assert_eq!(screen(&rig), "Form");
+    rig.answer_page();
+    assert!((paused_s(&rig).unwrap() - 40.0).abs() < 1e-6);
+}
+
+/// Two intervals are compared with each other, not one of them with a memory.
+#[test]
+fn after_a_long_pause_between_two_intervals_both_are_felt_again() {
+    /// A pause of so many seconds, and its end.
+    type Between = (&'static str, Input, fn(&mut Rig, f64), fn(&mut Rig));
+    let between: [Between; 3] = [
+        (
+            "a pause",
+            Input::Pause,
+            |rig, seconds| {
+                rig.wait(seconds);
+            },
+            |rig| {
+                rig.send(Input::Advance);
+            },
+        ),
+        (
+            "a disk that does not write",
+            Input::SaveFailed("disk full".to_owned()),
+            |rig, seconds| {
+                rig.wait(seconds);
+            },
+            |rig| {
+                let all = rig.all_on_disk();
+                rig.send(all);
+            },
+        ),
+        (
+            "a suspended computer",
+            Input::Tick,
+            |rig, seconds| {
+                rig.now.wall += TimeDelta::milliseconds((seconds * 1e3) as i64);
+                rig.wait(0.1);
+            },
+            |_| (),
+        ),
+    ];
+    for (what, begin, pause, end) in between {
+        for (seconds, again) in [(40.0, false), (62.0, true)] {
+            let mut rig = Rig::new(pairs("gap_s = 1.0"));
+            rig.until("Playing");
+            rig.device = DeviceMood::Silent;
+            let playback = rig.playback;
+            rig.send(Input::Advance).send(begin.clone());
+            rig.store = StoreMood::Slow;
+            rig.send(Input::DeviceStopped(playback))
+                .send(Input::DeviceLoaded);
+            pause(&mut rig, seconds);
+            rig.effects.clear();
+            end(&mut rig);
+            rig.wait(2.0);
+            let shown = format!("{what} of {seconds} s");
+            assert_eq!(!rig.effects.contains(&Effect::Start), again, "{shown}");
+            let found = forgotten(&rig);
+            let failed: Vec<(u32, u32)> = found.iter().map(|(t, a, _)| (*t, *a)).collect();
+            let expected: &[(u32, u32)] = if again { &[(1, 1)] } else { &[] };
+            assert_eq!(failed, expected, "{shown}");
+            if again {
+                assert!(rig.effects.contains(&Effect::Limp), "{shown}");
+                assert_eq!(screen(&rig), "Reference", "{shown}");
+                assert!(found[0].2 > Some(60.0), "{shown}: {found:?}");
+            }
+            rig.finish();
+            assert_eq!(rig.closed().len(), rig.schedule().len(), "{shown}");
+        }
+    }
 }
 
 #[test]

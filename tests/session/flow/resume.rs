@@ -386,6 +386,10 @@ fn after_a_long_gap_the_operator_chooses() {
     let before = rig.journal.len();
     rig.send(Input::Advance);
     assert_eq!(screen(&rig), "ResumeChoice", "Enter does not choose");
+    rig.send(Input::Pause);
+    let why = rig.view().notice.unwrap();
+    assert!(why.contains("once the session goes on"), "{why}");
+    assert_eq!(rig.journal.len(), before, "there is no pause");
     rig.send(Input::Resume(Choice::Continue));
     assert!(matches!(
         &rig.journal[before].event,

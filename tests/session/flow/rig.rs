@@ -365,7 +365,7 @@ impl Rig {
             return Vec::new();
         };
         let answer = |q: &Question| match q.kind.control() {
-            Control::Boxes { .. } => Answer::Rating(4),
+            Control::Boxes { from, to, .. } => Answer::Rating(4_i64.clamp(from, to)),
             Control::Track { from, .. } => Answer::Number(from),
             Control::Digits { .. } => Answer::Number(21.5),
             Control::List { options, .. } => Answer::Choice(options[..1].to_vec()),

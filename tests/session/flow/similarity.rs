@@ -23,10 +23,16 @@ fn rate(rig: &mut Rig) {
     rig.send(Input::Answer(vec![(asked(), rating)]));
 }
 
+/// Steps until a screen after so many trials. A gap passes by itself: a step would also end the interval after it.
 fn rate_until(rig: &mut Rig, trials: usize, screen: fn(&Screen) -> bool) {
     while done(rig) < trials || !screen(&rig.view().screen) {
         assert_eq!(rig.ending, None);
-        rate(rig);
+        match rig.view().screen {
+            Screen::Loading { .. } => {
+                rig.wait(1.0);
+            }
+            _ => rate(rig),
+        }
     }
 }
 

@@ -108,6 +108,10 @@ pub enum TestKind {
     PermutationMonteCarlo,
     /// Stress after each participant's ratings were dealt to the pairs at random.
     StressPermutation,
+    /// Kendall's W over all orders of each participant's ranks.
+    RanksExact,
+    /// Kendall's W over random orders of each participant's ranks.
+    RanksMonteCarlo,
     /// F of the interaction of participants and realizations, against the variance within
     /// cells.
     Interaction,
@@ -157,6 +161,8 @@ impl TestKind {
             Self::PermutationExact => "permutation-exact",
             Self::PermutationMonteCarlo => "permutation-monte-carlo",
             Self::StressPermutation => "stress-permutation",
+            Self::RanksExact => "ranks-exact",
+            Self::RanksMonteCarlo => "ranks-monte-carlo",
             Self::Interaction => "interaction",
             Self::SlopesDiffer => "slopes-differ",
             Self::SlopeT => "slope-t",

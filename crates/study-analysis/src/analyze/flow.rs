@@ -33,6 +33,8 @@ pub struct Flow {
     pub recorded: Share,
     /// Without a trial that counts, by the reason of most of their trials, of equally many the one of the first. Untrusted.
     pub left_out: BTreeMap<String, Share>,
+    /// All trials of participants who have one that counts.
+    pub staying: Share,
     /// Trials that do not count, of participants who have others, by reason. Untrusted.
     pub trials_left_out: BTreeMap<String, Share>,
     /// Trials that count and have no rating.
@@ -96,13 +98,15 @@ fn flow<'a>(group: Option<String>, participants: impl Iterator<Item = &'a Own<'a
     };
     for one in participants {
         let left_out: usize = one.left_out.iter().map(|(_, trials)| trials).sum();
-        flow.recorded.add(one.rated + one.unrated + left_out);
+        let all = one.rated + one.unrated + left_out;
+        flow.recorded.add(all);
         if one.rated + one.unrated == 0 {
             if let Some(reason) = one.main_reason() {
                 flow.left_out.entry(reason).or_default().add(left_out);
             }
             continue;
         }
+        flow.staying.add(all);
         // Reasons that read the same are one.
         let mut by_reason: BTreeMap<String, usize> = BTreeMap::new();
         for (reason, trials) in &one.left_out {
@@ -169,6 +173,7 @@ mod tests {
         let reasons: Vec<(&str, Share)> = all.left_out.iter().map(|(r, s)| (&**r, *s)).collect();
         let rule = Reason::Rule(Exclusion::ConstantRater).to_string();
         assert_eq!(reasons, [(&*rule, share(1, 3)), ("withdrawn", share(1, 2))]);
+        assert_eq!(all.staying, share(3, 9));
         assert_eq!(all.trials_left_out, BTreeMap::new());
         assert_eq!(all.without_rating, share(1, 2));
         assert_eq!(all.analyzed, share(3, 7));
@@ -212,6 +217,7 @@ mod tests {
         assert_eq!(all.trials_left_out["pilot"], share(1, 1));
         assert_eq!(all.left_out["withdrawn"], share(1, 2));
         assert_eq!(all.analyzed, share(4, 9));
+        assert_eq!(all.staying, share(4, 12));
         let places = all.left_out.values().chain(all.trials_left_out.values());
         let left_out: usize = places.map(|s| s.trials).sum();
         let others = all.without_rating.trials + all.analyzed.trials;

@@ -75,6 +75,8 @@ names! {
     DimensionsName = "K",
     /// A set of properties of realizations.
     PropertyName = "PROPERTY",
+    /// How many realizations have the same rank.
+    TiedName = "N",
     /// The name of a measured outcome.
     OutcomeName = "OUTCOME",
     /// The name of an effect: its factors, joined by `:`.

@@ -2,7 +2,7 @@
 
 use super::effects::Anova;
 use super::factorial::FactorialTests;
-use super::record::{Interval, OutcomeName, RealizationName, Stat, statistics};
+use super::record::{EffectName, Interval, OutcomeName, RealizationName, Stat, statistics};
 use std::collections::BTreeMap;
 
 statistics! {
@@ -64,6 +64,40 @@ statistics! {
         ci95: Interval,
     }
 
+    /// The effect by the ratio of the likelihoods with and without it.
+    pub struct OutcomeModelTest {
+        /// the likelihood ratio
+        chi2: Stat,
+        /// fixed effects that are left out
+        df: Stat,
+        /// of `chi2`, of this test alone; too small with few participants
+        p: Stat,
+        /// of a factor with two levels: the mean at the second over that at the first, of a binomial model the odds
+        ratio: Option<Stat>,
+        /// its interval, by the standard error of its logarithm
+        ratio_ci95: Option<Interval>,
+    }
+
+    /// A generalized mixed model of the numbers of the trials ([statistics-mixed.md](statistics-mixed.md#8-counts-shares-and-positive-numbers)), with intercepts of participants and, where numbers repeat in them or are counts, of the cells of participant and realization; with these by Laplace's approximation, else by quadrature. It decides nothing.
+    pub struct OutcomeModel {
+        /// trials of test realizations
+        n: Stat,
+        /// log-likelihood
+        loglik: Stat,
+        /// Akaike's criterion
+        aic: Stat,
+        /// standard deviation of the participants, on the scale of the link
+        sd_participant: Stat,
+        /// standard deviation of the cells, on the scale of the link
+        sd_cell: Option<Stat>,
+        /// variance over squared mean, of a gamma model
+        dispersion: Option<Stat>,
+        /// of the realizations, in a study without factors
+        differ: Option<OutcomeModelTest>,
+        /// by effect
+        effects: BTreeMap<EffectName, OutcomeModelTest> as "effect",
+    }
+
     /// A measured outcome, in the trials whose rating is analyzed. It decides no question of the study.
     pub struct MeasuredOutcome {
         /// trials in which it was measured
@@ -84,5 +118,7 @@ statistics! {
         vaf: Option<OutcomeVaf>,
         /// of a time with what else was measured: speed and accuracy
         pairs: BTreeMap<OutcomeName, OutcomePair> as "with",
+        /// where the study asks for one, as a second opinion
+        model: Option<OutcomeModel>,
     }
 }

@@ -12,7 +12,7 @@ use super::measured::{MeasuredOutcome, OutcomeMean, OutcomePair, OutcomeTest, Ou
 use super::record::{Interval, Number as _, OutcomeName, RealizationName, Stat};
 use super::results::{AdjustedCells, FactorialTests};
 use super::warning::Warning;
-use super::{Better, Rules, effects, factorial};
+use super::{Better, Rules, effects, factorial, outcome_model};
 use std::collections::BTreeMap;
 use study_base::text::counted;
 use study_plan::protocol::{BetterEnd, Measure, OutcomeRules, Transform};
@@ -89,6 +89,10 @@ fn one(
     }
     let counts = Counts::of(used, own, transform);
     let has_factors = tests.is_some();
+    // Of the numbers themselves, also where their logarithms are compared.
+    let numbers: Vec<(usize, f64)> = trials(used, own)
+        .filter_map(|(i, value)| Some((i, value?)))
+        .collect();
     let record = MeasuredOutcome {
         n: Stat::count(counts.measured),
         n_missing: Stat::count(counts.missing),
@@ -102,6 +106,7 @@ fn one(
         factorial: tests,
         vaf: with_vaf(&cells, &adjusted),
         pairs: BTreeMap::new(),
+        model: outcome_model::model(used, &numbers, outcome, rules.crossing.as_ref()),
     };
     let answer = OutcomeAnswer {
         order: order(&means, outcome.better),

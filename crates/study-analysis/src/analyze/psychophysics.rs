@@ -1,8 +1,9 @@
 //! Statistics of thresholds and comparisons: tracks, psychometric functions, detection,
-//! paired preferences, magnitude estimation, MUSHRA, identification, similarity, adjustment. Each function takes what was
+//! paired preferences, magnitude estimation, MUSHRA, identification, similarity, ranking, adjustment. Each function takes what was
 //! answered and returns statistics as records; `docs/statistics-psychophysics.md`
 //! defines them.
 
+mod abilities;
 mod adjustment;
 mod again;
 mod counting;
@@ -16,13 +17,16 @@ mod identification;
 mod marginal;
 mod of_adjustment;
 mod of_identification;
+mod of_ranking;
 mod of_scales;
 mod of_similarity;
 mod over_participants;
 mod part_data;
+pub mod perceptual;
 mod population;
 mod preferences;
 mod questionnaires;
+mod ranking;
 pub mod results;
 mod scales;
 pub mod search;
@@ -44,6 +48,7 @@ pub use over_participants::Measured;
 pub use part_data::{LevelData, PartAnalysis, PartData, StudyData};
 pub(crate) use part_data::{asked, sessions_of};
 pub use preferences::{Choice, Preference, preferences};
+pub use ranking::{RankingRow, ranking};
 pub use scales::{MagnitudeRow, MushraRoles, MushraRow, magnitude, mushra};
 pub use similarity::{Properties, SimilarityRow, similarity};
 pub use study::parts;

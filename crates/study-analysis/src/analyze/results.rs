@@ -20,7 +20,10 @@ pub use super::headline::{
     VarianceShares,
 };
 pub use super::influence::Influence;
-pub use super::measured::{MeasuredOutcome, OutcomeMean, OutcomePair, OutcomeTest, OutcomeVaf};
+pub use super::measured::{
+    MeasuredOutcome, OutcomeMean, OutcomeModel, OutcomeModelTest, OutcomePair, OutcomeTest,
+    OutcomeVaf,
+};
 pub use super::memory::{Covariates, Line, LogMemory, Quadratic};
 pub use super::missing::{AllMoved, MissingOf, MissingRatings, Moved};
 pub use super::mixed::{

@@ -242,6 +242,55 @@ if (enough) {
   value["lmm_vaf_crossed/sigma2"] <- of("Residual")
 }
 
+#' ## Generalized mixed models of measured outcomes
+#'
+#' Counts (Poisson) and successes in trials (binomial), with random intercepts of participants and
+#' of their cells; each effect is tested by the ratio of the likelihoods with and without it, with
+#' contrasts that sum to zero. The modes are found more precisely than by default.
+
+precise <- glmerControl(optimizer = "bobyqa", optCtrl = list(rhobeg = 0.2, rhoend = 1e-8, maxfun = 1e5),
+                        tolPwrss = 1e-12, check.conv.singular = "ignore", check.conv.grad = "ignore",
+                        check.conv.hess = "ignore", calc.derivs = FALSE)
+generalized <- function(id) {
+  d <- tested[!is.na(tested[[setting(paste("column of", id))]]), ]
+  d$number <- d[[setting(paste("column of", id))]]
+  of <- as.numeric(setting(paste("trials of", id)))
+  by <- if (length(factors) > 0) d[factors] else d["model"]
+  if (length(factors) > 0 && !is.na(setting("group is a factor"))) {
+    by$group <- factor(participants$group[match(d$participant, participants$participant)])
+    d <- d[!is.na(by$group), ]
+    by <- by[!is.na(by$group), , drop = FALSE]
+  }
+  names_of <- names(by)
+  names(by) <- paste0("f", seq_along(by))
+  by[] <- lapply(by, droplevels)
+  terms <- terms(as.formula(paste("~", paste(names(by), collapse = " * "))))
+  x <- model.matrix(terms, by, contrasts.arg = lapply(by, function(f) "contr.sum"))
+  repeats <- anyDuplicated(d[c("participant", "model")]) > 0
+  cells <- is.na(of) || of > 1 || repeats
+  left <- if (is.na(of)) "number" else "cbind(number, of - number)"
+  right <- paste("0 + x + (1 | participant)", if (cells) "+ (1 | participant:model)")
+  d$of <- of
+  fitted <- function(columns) {
+    d$x <- x[, columns, drop = FALSE]
+    glmer(as.formula(paste(left, "~", right)), data = d, nAGQ = if (cells) 1 else 25,
+          family = if (is.na(of)) poisson else binomial, control = precise)
+  }
+  full <- fitted(seq_len(ncol(x)))
+  print(summary(full))
+  for (k in seq_along(labels <- attr(terms, "term.labels"))) {
+    own <- attr(x, "assign") == k
+    chi2 <- max(0, 2 * as.numeric(logLik(full) - logLik(fitted(which(!own)))))
+    places <- as.integer(sub("f", "", strsplit(labels[k], ":")[[1]]))
+    name <- if (length(factors) > 0) paste0("effect/", paste(names_of[places], collapse = ":")) else "differ"
+    found <- c(chi2 = chi2, df = sum(own), p = pchisq(chi2, sum(own), lower.tail = FALSE))
+    value[paste0("outcomes/", id, "/model/", name, "/", names(found))] <<- found
+  }
+}
+for (id in if (has_ratings) kept("modeled")) {
+  tryCatch(generalized(id), error = function(e) cat(id, ": no model, ", conditionMessage(e), "\n", sep = ""))
+}
+
 #' ## Ordinal mixed model
 #'
 #' The ratings as ordered categories. `clmm` needs the standardized VAF: with the raw one
@@ -619,7 +668,8 @@ for (part in kept("identification")) {
 #' ## Similarity
 #'
 #' Each participant's ratings of a pair are averaged, over both orders, and divided by the mean of
-#' that participant's pairs; their mean over participants is scaled. What is computed here again are these
+#' that participant's pairs, and where some did not rate every pair by a factor of the participant's; their mean
+#' over participants is scaled. What is computed here again are these
 #' means, the agreement of the participants (mean correlation; Kendall's W), the asymmetry of the two orders, and
 #' the share of classical scaling (`cmdscale`). Ordinal maps have random starts and are in `values.json` only.
 
@@ -655,13 +705,23 @@ for (part in kept("similarity")) {
   other <- as_table(order_mean(ends[2, ], ends[1, ]))
   both <- ifelse(is.na(one), other, ifelse(is.na(other), one, (one + other) / 2))
   own_mean <- rowMeans(both, na.rm = TRUE)
-  points <- mean(own_mean)
   known <- both[own_mean > 0, , drop = FALSE]
   unit <- known / rowMeans(known, na.rm = TRUE)
+  # What they have in common: each participant has a factor, over the pairs that they rated.
+  over_own <- function(x, values) as.vector((!is.na(x)) %*% ifelse(is.finite(values), values, 0))
+  factors <- rep(1, nrow(unit))
   mean_unit <- colMeans(unit, na.rm = TRUE)
+  for (round in seq_len(1000)) {
+    found <- rowSums(unit, na.rm = TRUE) / over_own(unit, mean_unit)
+    moved <- max(0, abs(found / factors - 1))
+    factors <- found
+    mean_unit <- colMeans(unit / factors, na.rm = TRUE)
+    if (moved < 1e-12) break
+  }
+  points <- mean(rowSums(both, na.rm = TRUE) / over_own(both, mean_unit))
   print(round(colMeans(both, na.rm = TRUE), 2))
   put("similarity/n", nrow(rated))
-  put("similarity/mean", points)
+  put("similarity/mean", mean(own_mean))
   put("similarity/n_participants", nrow(unit))
   for (i in seq_along(pair)) {
     id <- paste0("similarity/pair/", pair[i], "/")
@@ -675,7 +735,8 @@ for (part in kept("similarity")) {
   if (nrow(unit) > 1) {
     correlations <- suppressWarnings(cor(t(unit), use = "pairwise.complete.obs"))
     put("similarity/agreement/mean_correlation", mean(correlations[lower.tri(correlations)], na.rm = TRUE))
-    whole <- unit[stats::complete.cases(unit), , drop = FALSE]
+    asked <- unit[, colSums(!is.na(unit)) > 0, drop = FALSE]
+    whole <- asked[stats::complete.cases(asked), , drop = FALSE]
     if (nrow(whole) > 1) {
       ranks <- t(apply(round(whole, 10), 1, rank))
       m <- nrow(ranks)
@@ -693,7 +754,7 @@ for (part in kept("similarity")) {
     own <- tapply(same$value, same$who, mean)
     put("similarity/identical/n", nrow(same))
     put("similarity/identical/mean", mean(own))
-    put("similarity/identical/share", mean(own) / mean(own_mean[names(own)]))
+    put("similarity/identical/share", mean(own) / mean(own_mean[names(own)], na.rm = TRUE))
   }
   if (length(items) > 3 && length(items) <= 30 && all(is.finite(mean_unit))) {
     full <- matrix(0, length(items), length(items))
@@ -702,6 +763,130 @@ for (part in kept("similarity")) {
     for (k in seq_len(min(3, (length(items) - 2) %/% 2))) {
       put(paste0("similarity/dimensions/", k, "/classical"), sum(pmax(values[1:k], 0)) / sum(abs(values)))
     }
+  }
+}
+
+#' ## Rankings
+#'
+#' Ranks are those of one ranking, ties in the middle; the mean ranks of each participant have Kendall's W. Worths are those of
+#' the model of Plackett and Luce with ties (Turner and others 2020), as a log-linear model: each ranking is a sequence of choices of
+#' the set with the smallest rank from those that are left, and the logarithm of a set's weight is the mean of those of its
+#' worths and, of a tie, a constant for its size. The logarithms of the worths sum to zero.
+
+for (part in kept("ranking")) {
+  put <- of_part(part)
+  answers <- ratings[ratings$included & ratings$part == part, ]
+  first <- setting(paste("ranking", part))
+  felt <- read_table("intervals")
+  key <- function(data) paste(data$participant, data$session, data$trial, data$attempt, sep = "\r")
+  felt <- felt[key(felt) %in% key(answers), ]
+  if (nrow(felt) == 0) next
+  items <- sorted(as.character(felt$model))
+  # Rankings by items.
+  ranks <- matrix(NA, nrow(answers), length(items), dimnames = list(NULL, items))
+  for (interval in seq_len(max(felt$interval))) {
+    column <- if (interval == 1) first else paste0(first, "-", interval)
+    own <- felt[felt$interval == interval, ]
+    model <- as.character(own$model)[match(key(answers), key(own))]
+    for (i in which(!is.na(model))) ranks[i, model[i]] <- answers[[column]][i]
+  }
+  keep <- rowSums(!is.na(ranks)) > 1
+  ranks <- ranks[keep, , drop = FALSE]
+  who <- as.character(answers$participant)[keep]
+  if (nrow(ranks) == 0) next
+  people <- sorted(who)
+  put("ranking/n", nrow(ranks))
+  put("ranking/n_participants", length(people))
+  whole <- stats::complete.cases(ranks)
+  means <- t(sapply(intersect(people, who[whole]), function(one) {
+    colMeans(t(apply(ranks[whole & who == one, , drop = FALSE], 1, rank)))
+  }))
+  put("ranking/agreement/n", nrow(means))
+  if (nrow(means) > 1 && length(items) > 1) {
+    again_ranked <- t(apply(round(means, 10), 1, rank))
+    m <- nrow(again_ranked)
+    k <- ncol(again_ranked)
+    ties <- sum(apply(again_ranked, 1, function(x) sum(table(x)^3 - table(x))))
+    spread <- sum((colSums(again_ranked) - m * (k + 1) / 2)^2)
+    put("ranking/agreement/df", k - 1)
+    if (m * (k^3 - k) > ties) {
+      w <- 12 * spread / (m^2 * (k^3 - k) - m * ties)
+      put("ranking/agreement/w", w)
+      put("ranking/agreement/chi2", m * (k - 1) * w)
+      put("ranking/agreement/p_chi2", pchisq(m * (k - 1) * w, k - 1, lower.tail = FALSE))
+    }
+  }
+  best <- apply(ranks, 1, min, na.rm = TRUE)
+  for (item in items) {
+    id <- paste0("ranking/realization/", item, "/")
+    here <- !is.na(ranks[, item])
+    put(paste0(id, "n"), sum(here))
+    if (nrow(means) > 0) put(paste0(id, "mean_rank"), mean(means[, item]))
+    if (nrow(means) > 1) put(paste0(id, "sd"), sd(means[, item]))
+    if (any(here)) put(paste0(id, "first"), mean(ranks[here, item] == best[here]))
+  }
+  for (i in seq_along(items)) for (j in seq_along(items)) if (j > i) {
+    id <- paste0("ranking/pair/", items[i], "|", items[j], "/")
+    both <- !is.na(ranks[, i]) & !is.na(ranks[, j])
+    put(paste0(id, "n"), sum(both))
+    if (any(both)) {
+      put(paste0(id, "above"), mean(ranks[both, i] < ranks[both, j]))
+      put(paste0(id, "tied"), mean(ranks[both, i] == ranks[both, j]))
+    }
+  }
+  choices <- unlist(lapply(seq_len(nrow(ranks)), function(row) {
+    own <- ranks[row, ]
+    places <- sort(unique(own[!is.na(own)]))
+    lapply(places, function(place) list(taken = which(own == place), left = which(own >= place)))
+  }), recursive = FALSE)
+  choices <- Filter(function(choice) length(choice$left) > 1, choices)
+  sizes <- setdiff(sort(unique(lengths(lapply(choices, function(choice) choice$taken)))), 1)
+  outcomes <- do.call(rbind, lapply(seq_along(choices), function(at) {
+    left <- choices[[at]]$left
+    sets <- unlist(lapply(intersect(c(1, sizes), seq_along(left)), function(size) {
+      combn(length(left), size, function(some) list(unname(left[some])))
+    }), recursive = FALSE)
+    weights <- t(sapply(sets, function(set) {
+      own <- tabulate(set, length(items)) / length(set)
+      c(own[-length(items)] - own[length(items)], (sizes == length(set)) + 0)
+    }))
+    # With one column the sets are the columns.
+    if (ncol(weights) != length(items) - 1 + length(sizes)) weights <- t(weights)
+    taken <- sapply(sets, function(set) setequal(set, choices[[at]]$taken))
+    cbind(weights, taken + 0, at)
+  }))
+  own <- seq_len(length(items) - 1 + length(sizes))
+  stratum <- model.matrix(~ factor(outcomes[, ncol(outcomes)]) - 1)
+  fit <- tryCatch(
+    glm.fit(cbind(outcomes[, own, drop = FALSE], stratum), outcomes[, length(own) + 1], family = poisson(),
+            control = list(epsilon = 1e-14, maxit = 100)),
+    warning = function(why) NULL, error = function(why) NULL)
+  if (is.null(fit) || !fit$converged) {
+    cat("part ", part, ": the worths have no estimate\n", sep = "")
+    next
+  }
+  covariance <- chol2inv(fit$qr$qr[seq_along(fit$coefficients), , drop = FALSE])
+  covariance <- covariance[order(fit$qr$pivot), order(fit$qr$pivot)][own, own, drop = FALSE]
+  estimate <- fit$coefficients[own]
+  contrast <- cbind(rbind(diag(length(items) - 1), -1), matrix(0, length(items), length(sizes)))
+  worth <- as.vector(contrast %*% estimate)
+  spread <- contrast %*% covariance %*% t(contrast)
+  print(data.frame(item = items, log_worth = worth, se = sqrt(diag(spread))))
+  for (i in seq_along(items)) {
+    id <- paste0("ranking/realization/", items[i], "/")
+    put(paste0(id, "worth"), exp(worth[i]) / sum(exp(worth)))
+    put(paste0(id, "log_worth"), worth[i])
+    put(paste0(id, "log_worth_se"), sqrt(spread[i, i]))
+    for (j in seq_along(items)) if (j > i) {
+      group <- paste0("ranking/pair/", items[i], "|", items[j])
+      put(paste0(group, "/difference"), worth[i] - worth[j])
+      put(paste0(group, "/se"), sqrt(spread[i, i] + spread[j, j] - 2 * spread[i, j]))
+    }
+  }
+  for (size in seq_along(sizes)) {
+    at <- length(items) - 1 + size
+    put(paste0("ranking/ties/", sizes[size], "/log_delta"), estimate[[at]])
+    put(paste0("ranking/ties/", sizes[size], "/log_delta_se"), sqrt(covariance[at, at]))
   }
 }
 

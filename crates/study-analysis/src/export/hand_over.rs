@@ -13,13 +13,13 @@ use headline::{of_part, of_ratings};
 use std::borrow::Cow;
 use std::collections::BTreeSet;
 use study_base::hex::sha256;
-use study_base::text::PartId;
-use study_plan::protocol::Protocol;
+use study_base::text::{PartId, QuestionId};
 use study_plan::protocol::columns::UsedColumn;
 use study_plan::protocol::parts::{Task, TrackRules};
+use study_plan::protocol::{Measure, OutcomeFamily, OutcomeRules, Protocol, Telemetry};
 use study_session::outcome::RatingRow;
 use study_session::outcome::cell::Cell;
-use study_session::outcome::ratings::Ratings;
+use study_session::outcome::ratings::{Motions, Ratings};
 
 /// The script. Lines that begin with `#'` are the text of the document. No text of a
 /// study is in it: it reads all of them from the tables.
@@ -127,17 +127,14 @@ impl Format for R {
     }
 }
 
-/// The analysis of the exported rows; `None` if the primary question has no numbers, has
-/// estimates of magnitude or levels that were set, or nothing was rated.
+/// The analysis of the exported rows; `None` if the primary question has no numbers or other ones than
+/// ratings of a realization, or nothing was rated.
 fn analysis(job: &Job<'_>) -> Option<Analysis> {
     let protocol = job.source.protocol;
     let question = protocol.primary()?;
     let share_of = protocol.analysis.share_of(&question.id);
-    let estimated = (protocol.parts.iter()).any(|part| {
-        let own = matches!(part.task, Task::Magnitude(_) | Task::Adjustment(_));
-        own && part.asks.first() == Some(&question.id)
-    });
-    if estimated || !(question.kind.scale().is_number() || share_of.is_some()) {
+    let other = protocol.has_other_numbers(&question.id);
+    if other || !(question.kind.scale().is_number() || share_of.is_some()) {
         return None;
     }
     let mut ratings = Ratings::from_rows(&job.selected.rows, &question.id, share_of);
@@ -146,6 +143,10 @@ fn analysis(job: &Job<'_>) -> Option<Analysis> {
         let original = m.duplicate_of.as_ref()?;
         Some((m.id.as_str(), original.as_str()))
     }));
+    let outcomes: Vec<OutcomeRules> = (modeled(protocol).into_iter())
+        .map(|(outcome, _)| outcome.clone())
+        .collect();
+    ratings.set_measured(&job.selected.rows, &outcomes, &Motions::new());
     // All rows are of one kind, whichever it is.
     let include = Include {
         pilot: true,
@@ -153,6 +154,21 @@ fn analysis(job: &Job<'_>) -> Option<Analysis> {
     };
     let rules = Rules::of(protocol, question.id.as_str(), include);
     (!ratings.is_empty()).then(|| analyze(&ratings, &rules))
+}
+
+/// The outcomes of which R fits the generalized mixed model too, with the columns of their numbers.
+fn modeled(protocol: &Protocol) -> Vec<(&OutcomeRules, &str)> {
+    fn column(outcome: &OutcomeRules) -> Option<&str> {
+        match (&outcome.measure, outcome.model?) {
+            // R's glmer does not maximize the likelihood of gamma.
+            (_, OutcomeFamily::Gamma) | (Measure::Clock(_), _) => None,
+            (Measure::Telemetry(what), _) => (*what == Telemetry::Strokes).then_some("strokes"),
+            (Measure::Answers(answers), _) => answers.questions.first().map(QuestionId::as_str),
+        }
+    }
+    (protocol.outcomes.iter())
+        .filter_map(|outcome| Some((outcome, column(outcome)?)))
+        .collect()
 }
 
 /// The analyses of the parts.
@@ -287,6 +303,14 @@ fn settings(
             put("group is a factor", "true");
         }
     }
+    for (outcome, column) in modeled(protocol) {
+        let id = &outcome.id;
+        put(&format!("modeled {id}"), "true");
+        put(&format!("column of {id}"), column);
+        if let Some(of) = outcome.of {
+            put(&format!("trials of {id}"), &of.to_string());
+        }
+    }
     for part in parts.iter().filter_map(|own| protocol.part(&own.part)) {
         let question = asked(protocol, part).map_or("", |q| q.as_str());
         let kind = match part.task {
@@ -298,6 +322,7 @@ fn settings(
             Task::Discrimination { .. } => "tracks",
             Task::Search(_) => "search",
             Task::Similarity(_) => "similarity",
+            Task::Ranking(_) => "ranking",
             Task::Adjustment(_) => "adjustment",
         };
         put(&format!("{kind} {}", part.id), question);
@@ -347,7 +372,11 @@ fn settings(
                     put(&format!("standard {}", part.id), &level.to_string());
                 }
             }
-            Task::Rating(_) | Task::Mushra(_) | Task::Search(_) | Task::Similarity(_) => {}
+            Task::Rating(_)
+            | Task::Mushra(_)
+            | Task::Search(_)
+            | Task::Similarity(_)
+            | Task::Ranking(_) => {}
         }
     }
     for (path, sum) in sums {

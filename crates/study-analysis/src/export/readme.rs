@@ -110,6 +110,11 @@ pub(super) fn methods(job: &Job<'_>) -> String {
                 ),
                 counted(own.repetitions as usize, "time", "times")
             ),
+            Task::Ranking(own) => format!(
+                "{} felt one after another and ranked {}",
+                counted(own.models.len(), "realization was", "realizations were"),
+                counted(own.repetitions as usize, "time", "times")
+            ),
             Task::Adjustment(own) => format!(
                 "a level of {} was set {} from below and as often from above, until it felt {}",
                 own.family,

@@ -69,8 +69,12 @@ pub fn deliveries(loaded: &Loaded) -> Result<Deliveries, RecordingError> {
             ));
         } else if (vaf::score(model, &recording).vaf - stated).abs() > SAME_VAF {
             notices.push(format!(
-                "{id}: {shown} gives another VAF than its model file, which was validated with a filter: \
-                 no delivered VAF"
+                "{id}: {shown} gives another VAF than its model file, which was validated with a filter{}: \
+                 no delivered VAF",
+                match model.elements {
+                    Some(_) => ", or before springs that relax were estimated at the first sample",
+                    None => "",
+                }
             ));
         } else if let Some(delivery) = Delivery::of(model, &recording, &recorded_n) {
             all.insert(id.clone(), delivery);

@@ -9,7 +9,7 @@ use study_plan::protocol::pairs::Pairs;
 use study_plan::protocol::parts::{Part, Task, TrackRules};
 use study_plan::protocol::presentations::Presentations;
 use study_plan::protocol::{
-    Adjustment, Answer, GroupRules, ModelEntry, Protocol, Role, Scale, Similarity,
+    Adjustment, Answer, GroupRules, ModelEntry, Protocol, Ranking, Role, Scale, Similarity,
 };
 use study_session::outcome::ratings::{Ratings, Realization, Row, Subject};
 use study_session::outcome::{IntervalRow, RatingRow};
@@ -190,6 +190,7 @@ impl Made<'_> {
             // It has no test.
             Task::Search(_) => {}
             Task::Similarity(own) => self.similarity(part, own, who),
+            Task::Ranking(own) => self.ranking(part, own, who),
             Task::Adjustment(own) => self.adjustment(part, own, who),
         }
     }
@@ -304,15 +305,37 @@ impl Made<'_> {
                 let Some(question) = part.asks.first() else {
                     return;
                 };
-                let row = self.row(part, who, answer, question);
-                let trial = row.trial;
+                let trial = self.row(part, who, answer, question).trial;
                 for (interval, model) in (1..).zip([first, 1 - first]) {
-                    let presented = (trial, interval);
-                    self.intervals
-                        .push(interval_of(part, who, presented, &pair[model]));
+                    self.felt(part, who, (trial, interval), &pair[model]);
                 }
             }
         }
+    }
+
+    /// Ranks in an order that is drawn, without ties.
+    fn ranking(&mut self, part: &Part, own: &Ranking, who: Who<'_>) {
+        for _ in 0..own.repetitions {
+            let mut ranks: Vec<usize> = (1..=own.models.len()).collect();
+            self.draws.shuffle(&mut ranks);
+            let mut answers = (own.asked(&part.asks).iter())
+                .zip(ranks)
+                .map(|(question, rank)| (question.clone(), Answer::Rating(rank as i64)));
+            let Some((question, answer)) = answers.next() else {
+                return;
+            };
+            let row = self.row(part, who, answer, &question);
+            row.answers.extend(answers);
+            let trial = row.trial;
+            for (interval, model) in (1..).zip(&own.models) {
+                self.felt(part, who, (trial, interval), model);
+            }
+        }
+    }
+
+    fn felt(&mut self, part: &Part, who: Who<'_>, presented: (u32, u32), model: &ModelId) {
+        self.intervals
+            .push(interval_of(part, who, presented, model));
     }
 
     /// The share of correct answers rises along the ladder.

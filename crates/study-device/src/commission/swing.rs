@@ -258,7 +258,8 @@ impl SwingSpring {
     }
 }
 
-/// What a motor told of itself.
+/// What a motor told of itself, in the keys of the record of a commissioning. They are those of
+/// `study_haptics::swing::Swing`, which no file has: its travel only judges what is left of the motion.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SelfWeighing {
     /// Mass of the handle over the gain of the motor, kg.

@@ -6,7 +6,7 @@ use crate::recording::force_curve::{self, Source, Stated as OfCurve};
 const MODEL_FILE: &str = include_str!("../../tests/data/akko-blue.toml");
 const CURVE: &[u8] = include_bytes!("../../../../tests/data/switches/Akko_Blue_V2.csv");
 
-/// The recording of which protocols/keyboard/identify.sh made the model file.
+/// The recording of which protocols/keyboard/identify.sh made the model file then, with the name of the curve's file in its header.
 fn recording() -> Vec<u8> {
     let curve = force_curve::read(&String::from_utf8_lossy(CURVE)).unwrap();
     let source = Source {
@@ -16,6 +16,7 @@ fn recording() -> Vec<u8> {
     };
     let stated = OfCurve {
         credit: Some("measured by ThereminGoat (theremingoat.com)"),
+        file_names: true,
         ..OfCurve::default()
     };
     force_curve::join(&[source], stated)

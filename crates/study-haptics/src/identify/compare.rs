@@ -4,13 +4,15 @@
 //! once more without each fold of a blocked cross-validation ([`super::folds`]), which gives its
 //! accuracy. dx, δ and λ are chosen by the same folds. A candidate fails if a constant force
 //! predicts the data left out better, or if its certificate does not pass; of the others the one
-//! with the least residual is recommended, or one before it in the list whose residual is hardly larger.
+//! with the least residual is recommended, or one before it in the list whose residual is hardly larger. With weights of
+//! components the root of what perceptual VAF misses takes the place of the residual.
 
 use super::folds::{FOLDS, Folds, LeftOut};
 use super::friction::Friction;
 use super::grid::{self, Cell, Plan};
 use super::method::{Candidacy, Claim, Delta, Progress, Setting, State, Terms};
 use super::passive::Passive;
+use super::perceptual::Weights;
 use super::vaf::{self, Score};
 use super::{ESTIMATORS, IdentifyError, Method, Training, direction_state, evidence};
 use crate::model::Realization;
@@ -95,6 +97,17 @@ pub struct Comparison {
     pub noise_n: Option<f64>,
     /// Whether whole strokes were left out, and not parts of them.
     pub whole_strokes: bool,
+    /// Whether candidates were compared by their perceptual VAF, and not by their residual.
+    pub by_perceptual: bool,
+}
+
+/// What candidates are compared by: their residual on data left out, N, or the root of what perceptual VAF misses there.
+fn loss(candidate: &Candidate, by_perceptual: bool) -> f64 {
+    let of = |left_out: LeftOut| match left_out.perceptual {
+        Some(vaf) if by_perceptual => (1.0 - vaf).max(0.0).sqrt(),
+        _ => left_out.rms_n,
+    };
+    candidate.left_out.map_or(f64::INFINITY, of)
 }
 
 impl Comparison {
@@ -111,10 +124,10 @@ impl Comparison {
 
     /// The recommended candidate, or the one of least residual if all fail.
     pub fn best(&self) -> Option<&Candidate> {
-        let residual = |c: &Candidate| c.left_out.map_or(f64::INFINITY, |l| l.rms_n);
+        let loss = |c: &Candidate| loss(c, self.by_perceptual);
         match self.recommended {
             Some(i) => self.candidates.get(i),
-            None => (self.candidates.iter()).min_by(|a, b| residual(a).total_cmp(&residual(b))),
+            None => (self.candidates.iter()).min_by(|a, b| loss(a).total_cmp(&loss(b))),
         }
     }
 }
@@ -130,6 +143,21 @@ pub fn run(
     recordings: &[&Recording],
     step: impl Fn(Progress) + Sync,
 ) -> Result<Comparison, IdentifyError> {
+    run_weighed(training, lookup, recordings, None, step)
+}
+
+/// The same with weights of the components of errors. The increments and direction states of a method are chosen by the
+/// residual nevertheless.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_weighed(
+    training: &Training<'_>,
+    lookup: Lookup,
+    recordings: &[&Recording],
+    weights: Option<&Weights>,
+    step: impl Fn(Progress) + Sync,
+) -> Result<Comparison, IdentifyError> {
     let samples: usize = training.recordings.iter().map(|r| r.len()).sum();
     let folds = Folds::new(&training.recordings);
     let trials = Trials::new(training, &folds, samples.div_ceil(ENOUGH), lookup);
@@ -142,7 +170,7 @@ pub fn run(
             Candidacy::With(method, dx_mm) => {
                 match one(training, method, dx_mm, lookup, recordings, &step) {
                     Ok(cell) => candidates.push(Candidate {
-                        left_out: trials.left_out(&cell, method, dx_mm),
+                        left_out: trials.left_out(&cell, method, dx_mm, weights),
                         cell,
                     }),
                     // another target, for whatever method
@@ -155,7 +183,9 @@ pub fn run(
             }
         }
     }
-    let residual = |i: usize| candidates[i].left_out.map_or(f64::INFINITY, |l| l.rms_n);
+    let mut left_out = candidates.iter().filter_map(|c: &Candidate| c.left_out);
+    let by_perceptual = weights.is_some() && left_out.all(|l| l.perceptual.is_some());
+    let residual = |i: usize| loss(&candidates[i], by_perceptual);
     let mut sound: Vec<usize> = (0..candidates.len())
         .filter(|i| candidates[*i].failure().is_none())
         .collect();
@@ -169,6 +199,7 @@ pub fn run(
         not_tried,
         noise_n: evidence::white_noise_n(&training.recordings),
         whole_strokes: folds.whole_strokes,
+        by_perceptual,
     })
 }
 
@@ -273,32 +304,41 @@ impl<'t, 'r> Trials<'t, 'r> {
     }
 
     /// The accuracy of a method on what it was identified without.
-    fn left_out(&self, whole: &Cell, method: Method, dx_mm: f64) -> Option<LeftOut> {
-        self.left_out_of(method, |method, rest| {
+    fn left_out(
+        &self,
+        whole: &Cell,
+        method: Method,
+        dx_mm: f64,
+        weights: Option<&Weights>,
+    ) -> Option<LeftOut> {
+        let identify = |method: Method, rest: &Training<'r>| {
             let setting = Setting::new(dx_mm, self.lookup);
             method.identify_part(whole.fitted.as_deref(), rest, setting)
-        })
+        };
+        self.left_out_of(method, identify, weights)
     }
 
     fn left_out_of(
         &self,
         mut method: Method,
         identify: impl Fn(Method, &Training<'r>) -> Option<Realization> + Sync,
+        weights: Option<&Weights>,
     ) -> Option<LeftOut> {
         if let Some(terms) = method.terms_mut() {
             // each fold identifies the same terms
             *terms = self.terms;
         }
         let of_fold = |fold: usize| identify(method, self.rest[fold].as_ref()?);
-        self.folds.left_out(of_fold)
+        self.folds.left_out(of_fold, weights)
     }
 
     /// The rms error of a method on data left out, N; infinite where it cannot be identified.
     pub(super) fn rms_n(&self, method: Method, dx_mm: f64) -> f64 {
-        let left_out = self.left_out_of(method, |method, rest| {
+        let identify = |method: Method, rest: &Training<'r>| {
             let found = rest.identify(method, dx_mm, self.lookup).ok()?;
             Some(found.realization)
-        });
+        };
+        let left_out = self.left_out_of(method, identify, None);
         left_out.map_or(f64::INFINITY, |left_out| left_out.rms_n)
     }
 

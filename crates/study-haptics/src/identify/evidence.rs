@@ -27,7 +27,8 @@
 //! * *Found.* The recordings show a term if blocks of samples that are left out are predicted better with it, and θ exceeds four errors (a search over two
 //!   terms and many recordings meets three by chance). Where twice the bound would be found, it is enough that θ exceeds four errors without that
 //!   of the model, and is above 0 in all models that fit nearly as well; or that it exceeds 2.326 errors (99 %), and the squared
-//!   error on the blocks is a fifth larger without it.
+//!   error on the blocks is a fifth larger without it. In any case it exceeds two errors with that of the model, which are those that are printed: a
+//!   table may take up a term that is shown in all models, but these differ too much to say how large it is, and it has its bound.
 //! * *Bound.* The upper bound is the largest m that a test does not reject, (m − θ)² ≤ 2.576² V(m) (Fieller's limit), or half the mass that
 //!   exceeds (4 + 1.881) √V(m), and is therefore found with a probability of 97 %, if that is larger; the error of the model counts
 //!   twice there, because a term changes it. Fieller's limit does not exist if Σ w a is not 2.7 times what the noise of a makes of
@@ -124,7 +125,7 @@ pub struct Evidence {
     pub value: f64,
     /// The standard error of the estimate, with that of the model.
     pub standard_error: f64,
-    /// Whether the recordings show the term.
+    /// Whether the recordings show the term: the estimate is at least two standard errors.
     pub found: bool,
     /// What the term is at most, with a confidence of 99 %; `None` if the recordings do not bound it.
     pub upper_bound: Option<f64>,
@@ -249,7 +250,7 @@ pub(super) fn beside(
             let reference = Reference::new(&whole, Force::Unknown, range(&ends), true)?;
             let [mass, damping] = found_in(&reference)?;
             // What the known force lacks is the same in strokes that are alike, and would be taken for a damping; a mass alone turns twice in each stroke.
-            match mass.is_found() || mass.shows {
+            match mass.is_shown() || mass.shows {
                 true => [mass, damping],
                 false => [held()?[0], damping],
             }
@@ -274,7 +275,7 @@ fn has_enough_strokes(recordings: &[&Recording]) -> bool {
 fn found_in(reference: &Reference) -> Option<[Found; 2]> {
     each_beside_the_other(
         |kept, term| reference.evidence(kept, term),
-        Found::is_found,
+        Found::is_shown,
         |found| found.value / found.standard_error,
     )
 }

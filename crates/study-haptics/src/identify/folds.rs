@@ -8,8 +8,10 @@
 //! the travel.
 //!
 //! A prediction runs over the whole recording, because its state depends on the motion before, and
-//! counts where samples were left out inside the range of the others.
+//! counts where samples were left out inside the range of the others. Their force does not tell in
+//! which state springs enter the recording either.
 
+use super::perceptual::{Reference, Weights};
 use super::vaf;
 use crate::model::Realization;
 use crate::recording::{Recording, mean_and_variance};
@@ -43,7 +45,13 @@ pub struct LeftOut {
     pub vaf: f64,
     /// rms error, N.
     pub rms_n: f64,
+    /// Perceptual VAF, if there are weights and the force has anything of what is weighed. Unlike `vaf` it does not count a
+    /// constant error.
+    pub perceptual: Option<f64>,
 }
+
+/// Recording, sample, and its error, N.
+type Error = (usize, usize, f64);
 
 impl<'r> Folds<'r> {
     /// Divides recordings.
@@ -103,35 +111,55 @@ impl<'r> Folds<'r> {
     pub fn left_out(
         &self,
         realization: impl Fn(usize) -> Option<Realization> + Sync,
+        weights: Option<&Weights>,
     ) -> Option<LeftOut> {
-        // errors and forces
-        let of_fold = |fold: usize| -> Option<(Vec<f64>, Vec<f64>)> {
+        let of_fold = |fold: usize| -> Option<Vec<Error>> {
             let realization = realization(fold)?;
             let [low, high] = realization.trained.x_mm;
-            let mut all = (Vec::new(), Vec::new());
-            for (recording, of) in self.recordings.iter().zip(&self.of) {
-                for (i, error) in vaf::errors(&realization, recording).iter().enumerate() {
+            let mut all = Vec::new();
+            for (r, (recording, of)) in self.recordings.iter().zip(&self.of).enumerate() {
+                let predicted = vaf::predict_told(&realization, recording, |i| of[i] != fold);
+                for (i, predicted_n) in predicted.enumerate() {
                     if of[i] == fold && (low..=high).contains(&recording.x_mm[i]) {
-                        all.0.push(*error);
-                        all.1.push(recording.f_n[i]);
+                        all.push((r, i, predicted_n - recording.f_n[i]));
                     }
                 }
             }
-
             Some(all)
         };
-        let each: Vec<_> = (0..FOLDS)
+        let each: Vec<Vec<Error>> = (0..FOLDS)
             .into_par_iter()
             .map(of_fold)
             .collect::<Option<_>>()?;
-        let (errors, forces): (Vec<_>, Vec<_>) = each.into_iter().unzip();
-        let (errors, forces) = (errors.concat(), forces.concat());
-        let square = errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64;
+        let errors = each.concat();
+        let square = errors.iter().map(|(_, _, e)| e * e).sum::<f64>() / errors.len() as f64;
+        let forces = errors.iter().map(|(r, i, _)| self.recordings[*r].f_n[*i]);
+        let forces: Vec<f64> = forces.collect();
+        if !square.is_finite() {
+            return None;
+        }
         let (_, variance) = mean_and_variance(&forces);
-        (square.is_finite() && variance > 0.0).then(|| LeftOut {
+        (variance > 0.0).then(|| LeftOut {
             vaf: 1.0 - square / variance,
             rms_n: square.sqrt(),
+            perceptual: weights.and_then(|weights| self.perceptual(errors, weights)),
         })
+    }
+
+    /// The perceptual VAF of all recordings together.
+    fn perceptual(&self, mut errors: Vec<Error>, weights: &Weights) -> Option<f64> {
+        errors.sort_by_key(|(r, i, _)| (*r, *i));
+        let (mut missed, mut force) = (0.0, 0.0);
+        for own in errors.chunk_by(|a, b| a.0 == b.0) {
+            let samples: Vec<usize> = own.iter().map(|(_, i, _)| *i).collect();
+            let recording = self.recordings[own[0].0].select(&samples);
+            let of_samples: Vec<f64> = own.iter().map(|(_, _, error)| *error).collect();
+            let [own_missed, own_force] =
+                Reference::of(&recording)?.weighed(&of_samples, weights)?;
+            missed += own_missed;
+            force += own_force;
+        }
+        (force > 0.0).then(|| 1.0 - missed / force)
     }
 }
 

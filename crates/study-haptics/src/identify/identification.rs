@@ -16,10 +16,11 @@ use super::evidence::lag;
 use super::features;
 use super::grid::{self, Cell};
 use super::method::{Claim, Options, Progress};
+use super::perceptual::{Reference, Weights};
 use super::signal::{self, Acceleration, Excitation, filter};
 use super::validation::{self, Ceiling, Validation};
 use super::{IdentifyError, Training};
-use crate::model::{Units, file};
+use crate::model::{Realization, Units, file};
 use crate::recording::{self, Names, Recording};
 use std::io::BufRead;
 use study_base::text::{ModelId, Untrusted};
@@ -49,6 +50,8 @@ pub struct Request {
     pub without_coverage: bool,
     /// Mass and damping that the experimenter states.
     pub stated: Stated,
+    /// How much each component of an error counts in a comparison of estimators, if not alike.
+    pub weights: Option<Weights>,
 }
 
 impl Default for Request {
@@ -67,6 +70,7 @@ impl Default for Request {
             turned: None,
             without_coverage: false,
             stated: Stated::default(),
+            weights: None,
         }
     }
 }
@@ -211,6 +215,8 @@ pub struct Identification {
     pub turned: Option<(Units, f64)>,
     /// How the best cell fails.
     pub failed: Option<Failure>,
+    /// How much each component of an error counts, if that was asked for.
+    pub weights: Option<Weights>,
     /// Whether an estimator was asked for, and not a comparison or the default.
     asked: bool,
     several_deltas: bool,
@@ -297,7 +303,9 @@ pub fn run(
             training = training.with_elsewhere(elsewhere.clone());
         }
         if compares {
-            let comparison = compare::run(&training, request.lookup, &scored, step)?;
+            let weights = request.weights.as_ref();
+            let comparison =
+                compare::run_weighed(&training, request.lookup, &scored, weights, step)?;
             let cells = comparison.best().map(|best| best.cell.clone());
             return Ok((cells.into_iter().collect(), Some(comparison), elsewhere));
         }
@@ -374,6 +382,7 @@ pub fn run(
         ceilings,
         turned: request.turned,
         failed,
+        weights: request.weights.clone(),
         asked: request.options.method.is_some(),
         several_deltas: request.options.delta_mm.len() > 1,
         offset,
@@ -393,6 +402,16 @@ impl Identification {
         let test = self.recordings.get(self.validations);
         let found = test.or(self.recordings.first());
         &found.unwrap_or(&self.training[0]).recording
+    }
+
+    /// The perceptual VAF of a realization on each of `recordings`; nothing without weights.
+    pub fn perceptual_vaf(&self, realization: &Realization) -> Vec<Option<f64>> {
+        let Some(weights) = &self.weights else {
+            return Vec::new();
+        };
+        (self.recordings.iter())
+            .map(|source| Reference::of(&source.recording)?.vaf(realization, weights))
+            .collect()
     }
 
     /// Whether the best cell is a baseline that was asked for, with which others are compared.

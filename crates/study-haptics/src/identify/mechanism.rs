@@ -47,6 +47,8 @@ const CORNER_HZ: f64 = 30.0;
 pub const PREDICTED_HZ: f64 = 8000.0;
 /// The same while starts are compared.
 const STARTED_HZ: f64 = 4000.0;
+/// Share of a sampling interval in which nothing relaxes.
+const AT_ONCE: f64 = 1e-9;
 /// Of each recording as much is used while starts are compared that together they last so
 /// long, s.
 const STARTED_S: f64 = 20.0;
@@ -145,16 +147,18 @@ impl Fitted {
                 standard_error,
                 origin: Origin::Training,
                 upper_bound: None,
-                identified: is_sure(name, value, standard_error),
+                identified: is_sure(value, standard_error),
             })
             .collect()
     }
 
-    /// A warning for each scalar whose standard error is above half its value, or that is 0.
+    /// A warning for each scalar whose standard error is above half its value, or that is 0, except of a force, which may well be 0.
     pub(super) fn warnings(&self) -> Vec<Warning> {
         let values = self.mechanism.scalars.to_array();
         (PARAMETERS.into_iter().zip(values).zip(self.standard_errors))
-            .filter(|(((name, ..), value), error)| !is_sure(name, *value, *error))
+            .filter(|(((name, ..), value), error)| {
+                *name != "offset force" && !is_sure(*value, *error)
+            })
             .map(
                 |(((parameter, _, excitation), value), error)| Warning::NotDetermined {
                     parameter,
@@ -167,9 +171,9 @@ impl Fitted {
     }
 }
 
-/// Whether a scalar is determined. A force may well be 0.
-fn is_sure(name: &str, value: f64, standard_error: Option<f64>) -> bool {
-    standard_error.is_some_and(|error| error <= UNSURE * value.abs()) || name == "offset force"
+/// Whether a scalar is determined: at least two standard errors, as for every other term.
+fn is_sure(value: f64, standard_error: Option<f64>) -> bool {
+    standard_error.is_some_and(|error| error <= UNSURE * value.abs())
 }
 
 impl Layout {
@@ -363,16 +367,22 @@ pub fn predict(
 }
 
 /// The force of each sample of a recording by elements, N, in steps of at least
-/// [`PREDICTED_HZ`]. The state in which the springs enter the recording is that which its force tells
-/// ([`start_of`]).
-pub(super) fn predict_elements(elements: &Elements, recording: &Recording) -> Vec<f64> {
+/// [`PREDICTED_HZ`]. The state in which the springs enter the recording is that which the force of
+/// some of its samples tells ([`start_of`]).
+pub(super) fn predict_elements(
+    elements: &Elements,
+    recording: &Recording,
+    tells: impl Fn(usize) -> bool,
+) -> Vec<f64> {
     let view = elements.view();
-    let start = start_of(elements, recording);
+    let start = start_of(elements, recording, tells);
     let mut state = elements::State::deflected(recording.x_mm[0], start);
     (0..recording.len())
         .map(|i| {
             let mut force_n = 0.0;
             for (motion, span_s) in substeps(recording, i, PREDICTED_HZ) {
+                // the state is that of the first sample, so that nothing relaxes before it
+                let span_s = if i == 0 { AT_ONCE * span_s } else { span_s };
                 force_n = state.step(&view, motion, span_s);
             }
             force_n + view.mass_kg * recording.a_m_s2[i]

@@ -118,7 +118,7 @@ pub struct Estimate {
     pub standard_error: Option<f64>,
     /// What the term is at most, with a confidence of 99 %, in the unit.
     pub upper_bound: Option<f64>,
-    /// Whether the recordings determine it: otherwise it is left out, or no more than set. A table leaves out a term that they
+    /// Whether the recordings determine it, to two standard errors at least: otherwise it is left out, or no more than set. A table leaves out a term that they
     /// determine if least squares would find too little of it, and has one that they do not determine if it predicts; both with a warning.
     pub identified: bool,
     /// What it is known from. A stated value was not identified.

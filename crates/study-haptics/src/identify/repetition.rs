@@ -273,7 +273,8 @@ impl Loops {
             sha256: String::new(),
             warnings: Vec::new(),
         };
-        let forces: Vec<f64> = vaf::predict(realization, &motion).collect();
+        // springs that relax begin at rest, as those of a device do
+        let forces: Vec<f64> = vaf::predict_told(realization, &motion, |_| false).collect();
         Curve::of(x_mm, &forces, range_mm)
     }
 }

@@ -31,16 +31,29 @@ pub(super) fn motion(recording: &Recording, i: usize) -> Motion {
 }
 
 /// The predicted force of each sample, N. That of a mechanism passes the low-pass that the
-/// recorded force had passed when it was identified.
+/// recorded force had passed when it was identified. In which state springs that relax enter
+/// the recording, its force tells.
 pub fn predict<'r>(
     realization: &'r Realization,
     recording: &'r Recording,
+) -> Box<dyn Iterator<Item = f64> + 'r> {
+    predict_told(realization, recording, |_| true)
+}
+
+/// The same, where only the force of some samples tells in which state springs that relax enter
+/// the recording; without any they enter without force.
+pub(super) fn predict_told<'r>(
+    realization: &'r Realization,
+    recording: &'r Recording,
+    tells: impl Fn(usize) -> bool,
 ) -> Box<dyn Iterator<Item = f64> + 'r> {
     if let Some(mechanism) = &realization.mechanism {
         return Box::new(super::mechanism::low_passed(mechanism, recording).into_iter());
     }
     if let Some(elements) = &realization.elements {
-        return Box::new(super::mechanism::predict_elements(elements, recording).into_iter());
+        return Box::new(
+            super::mechanism::predict_elements(elements, recording, tells).into_iter(),
+        );
     }
     let table = realization.table();
     let rule = realization.direction;

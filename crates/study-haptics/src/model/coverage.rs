@@ -23,7 +23,7 @@ pub struct Coverage {
 /// The map of one direction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Covered {
-    /// Highest speed, mm/s.
+    /// Highest speed in this direction, mm/s. The trained speed is that of either direction: [`Trained`](super::Trained).
     pub top_mm_s: f64,
     /// Number of samples by class of speeds, and in each by place.
     pub samples: Vec<Vec<u32>>,
@@ -125,12 +125,6 @@ impl Coverage {
         })
     }
 
-    /// The speed up to which both directions were recorded, mm/s.
-    pub fn top_mm_s(&self) -> f64 {
-        let [positive, negative] = &self.directions;
-        positive.top_mm_s.min(negative.top_mm_s)
-    }
-
     /// The same in another unit of length.
     pub(super) fn rescale(&mut self, by: f64) {
         let tops = self.directions.iter_mut().map(|of| &mut of.top_mm_s);
@@ -186,7 +180,6 @@ mod tests {
         assert_eq!(positive.samples, [[1, 0, 0, 0, 0], [1, 0, 0, 0, 0], [0; 5]]);
         assert_eq!(negative.samples, [[0, 0, 1, 0, 0], [0; 5], [0, 0, 0, 0, 1]]);
         assert_eq!((positive.top_mm_s, negative.top_mm_s), (20.1, 79.0));
-        assert_eq!(map.top_mm_s(), 20.1);
     }
 
     #[test]

@@ -10,7 +10,8 @@
 //!   part of the names, as in `force_n` or `Force (N)`, and are gf and mm otherwise. A column `time`, in s or in
 //!   the unit of its name, gives the rate.
 //!
-//! Fields may be quoted.
+//! Fields may be quoted. A row with fewer fields than column names is refused, also the last one: a journal's last line may be cut by
+//! a crash and is set aside, but a file of an instrument that ends within a row was not copied whole, and nobody knows what else it lacks.
 //!
 //! A file whose rows begin at the bottom has its press put before its release; [`ForceCurve::passive`] tells rows in reverse order and swapped columns.
 //! [`join()`] makes one recording of several curves: repeated measurements, or several speeds.
@@ -30,6 +31,10 @@ use time::{Time, moment, rate, time_of};
 const MOST_HEADER_LINES: usize = 100;
 /// Fewest rows of a curve: second differences need three.
 const LEAST_ROWS: usize = 3;
+/// Fewest rows a second: a slower press is likelier a time in another unit.
+pub const LEAST_RATE_HZ: f64 = 0.001;
+/// Most rows a second.
+pub const MOST_RATE_HZ: f64 = 1e6;
 
 study_base::named! {
     /// How a file writes a force curve.
@@ -128,16 +133,20 @@ pub enum ForceCurveFault {
         "the displacement decreases during the press: change its sign, so that a press increases it"
     )]
     Downwards,
-    #[error("{found} fields, but {column} is column {expected}: complete or remove the row")]
-    Ragged {
+    #[error("{found} of {expected} fields: {}", if *.last { "the file ends within this row; export it again, or remove the row" } else { "complete or remove the row" })]
+    Short {
         found: usize,
-        column: &'static str,
         expected: usize,
+        last: bool,
     },
     #[error("{column} is `{}`, which is not a number: remove or correct the row", Untrusted(.text))]
     NotANumber { column: &'static str, text: String },
-    #[error("the recording rate is `{}`: it has to be a time above 0 s", Untrusted(.0))]
+    #[error("the recording rate is `{}`: it has to be a time from {least} to {most} s", Untrusted(.0), least = 1.0 / MOST_RATE_HZ, most = 1.0 / LEAST_RATE_HZ)]
     Rate(String),
+    #[error(
+        "by the column of the time there are {0:.3e} rows a second, and from {LEAST_RATE_HZ} to {MOST_RATE_HZ} are possible: name its unit, as in time_ms, or remove the column"
+    )]
+    TimeRate(f64),
     #[error("{found} rows, but DATA COUNT is {stated}: the file is not complete, export it again")]
     Count { found: usize, stated: usize },
     #[error("{0} rows: a curve has at least {LEAST_ROWS}")]
@@ -189,7 +198,7 @@ struct Header {
     displacement: Column,
     time: Option<Time>,
     name: Option<usize>,
-    /// Fields of a row, at most.
+    /// Fields of a row, without empty ones at the end.
     fields: usize,
 }
 
@@ -237,22 +246,15 @@ impl Column {
 
     /// The value in one row, mm or N.
     fn value(&mut self, fields: &[&str], separator: u8) -> Result<f64, Fault> {
-        let field = |at: usize| {
-            (fields.get(at).copied()).ok_or(Fault::Ragged {
-                found: fields.len(),
-                column: self.what,
-                expected: at + 1,
-            })
-        };
-        let text = field(self.at)?;
+        let field = |at: usize| fields.get(at).copied().unwrap_or_default();
+        let text = field(self.at);
         let value = number_in(text, separator).filter(|value: &f64| value.is_finite());
         let value = value.ok_or_else(|| Fault::NotANumber {
             column: self.what,
             text: shown(text),
         })?;
         if let Some(at) = self.unit_at {
-            let unit = field(at)?;
-            self.unit(unit)?;
+            self.unit(field(at))?;
         }
         Ok(value * self.factor.unwrap_or(1.0))
     }
@@ -289,7 +291,12 @@ pub fn read(text: &str) -> Result<ForceCurve, ForceCurveError> {
     let (mut x_mm, mut f_n, mut times) = (Vec::new(), Vec::new(), Vec::new());
     let mut target = None;
     let (mut last, mut lines_of_rows) = (first_row, Vec::new());
-    for (line, text) in lines().filter(|(line, text)| *line >= first_row && !text.is_empty()) {
+    // a tab at the end of a line is an empty field
+    let mut rows = (1..)
+        .zip(text.lines())
+        .filter(|(line, text)| *line >= first_row && !text.trim().is_empty())
+        .peekable();
+    while let Some((line, text)) = rows.next() {
         let separator = header.separator;
         let fields = fields(text, separator);
         let fields: Vec<&str> = fields.iter().map(str::trim).collect();
@@ -297,6 +304,13 @@ pub fn read(text: &str) -> Result<ForceCurve, ForceCurveError> {
         if found > header.fields {
             let expected = header.fields;
             return Err(at(line)(Fault::Fields { found, expected }));
+        }
+        if fields.len() < header.fields {
+            return Err(at(line)(Fault::Short {
+                found: fields.len(),
+                expected: header.fields,
+                last: rows.peek().is_none(),
+            }));
         }
         let value = |column: &mut Column| column.value(&fields, separator).map_err(at(line));
         f_n.push(value(&mut header.force)?);
@@ -334,7 +348,13 @@ pub fn read(text: &str) -> Result<ForceCurve, ForceCurveError> {
             return Err(at(last)(Fault::Count { found, stated }));
         }
         Some(settings) => Some(1.0 / settings.interval_s),
-        None => rate(&times).map_err(|(line, fault)| ForceCurveError { line, fault })?,
+        None => {
+            let hz = rate(&times).map_err(|(line, fault)| ForceCurveError { line, fault })?;
+            if let Some(hz) = hz.filter(|hz| !is_rate(*hz)) {
+                return Err(at(first_row - 1)(Fault::TimeRate(hz)));
+            }
+            hz
+        }
     };
     let assumed = [&header.force, &header.displacement]
         .into_iter()
@@ -350,6 +370,11 @@ pub fn read(text: &str) -> Result<ForceCurve, ForceCurveError> {
         release_first,
         first_line: lines_of_rows[0],
     })
+}
+
+/// Whether an instrument may write so many rows a second.
+fn is_rate(hz: f64) -> bool {
+    (LEAST_RATE_HZ..=MOST_RATE_HZ).contains(&hz)
 }
 
 /// The columns of a line of column names; `None` if it is none.
@@ -442,8 +467,7 @@ fn settings<'t>(
             }
             "RECORDING RATE" => {
                 let text = next();
-                let positive = |s: &f64| s.is_finite() && *s > 0.0;
-                let parsed = text.parse().ok().filter(positive);
+                let parsed = text.parse().ok().filter(|s: &f64| is_rate(1.0 / *s));
                 interval_s = Some(parsed.ok_or_else(|| at(Fault::Rate(shown(text))))?);
             }
             "DATA COUNT" => {

@@ -111,6 +111,8 @@ pub enum Refusal {
     NotANumber,
     /// The list has only so many options.
     NotListed(usize),
+    /// The rank was given to something else, and no two are alike.
+    RankTaken(i64),
     /// The text has more than [`MAX_TEXT_BYTES`].
     TooLong,
     /// It is no answer to a question of this kind.
@@ -128,6 +130,7 @@ impl Refusal {
             Self::OutOfRange { min, max } => return range(min, max, words),
             Self::NotAbove(above) => return words.fill(Phrase::RangeAbove, &[("above", &above)]),
             Self::NotListed(total) => return words.fill(Phrase::ListHas, &[("total", &total)]),
+            Self::RankTaken(rank) => return words.fill(Phrase::RankTaken, &[("rank", &rank)]),
             // The editors of all channels cut a text before.
             Self::TooLong => return format!("At most {MAX_TEXT_BYTES} bytes."),
             Self::NoOption => Phrase::OptionFirst,

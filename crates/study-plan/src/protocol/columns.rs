@@ -479,7 +479,7 @@ table! {
             ("playback-lost", "the start or end of the playback was not confirmed"),
             ("marked-bad", "marked as bad by a person"),
             ("stopped", "stopped, and played again instead of rated"),
-            ("interrupted", "the program ended or stood still during the attempt, or paused too long before its answer"),
+            ("interrupted", "the program ended or stood still during the attempt, or paused too long before its answer or its next interval"),
             ("rendering", "the force was not that of the table"),
         ], "why the attempt failed").empty("the event is no failure"),
         By: level("by", &[

@@ -28,6 +28,7 @@ mod parts;
 mod power;
 mod questionnaires;
 mod questions;
+mod ranking;
 mod resolve;
 mod similarity;
 mod spaces;
@@ -131,7 +132,7 @@ const FORMATS: &[Word] = &[
 const OF_FORMAT_2: [&str; 5] = ["parts", "families", "tracks", "groups", "sessions"];
 
 /// Keys that need [`FORMAT_3`], without the places in lists.
-pub const OF_FORMAT_3: [&str; 15] = [
+pub const OF_FORMAT_3: [&str; 16] = [
     "confirms",
     "design.order_version",
     "factors",
@@ -141,6 +142,7 @@ pub const OF_FORMAT_3: [&str; 15] = [
     "parts.answers",
     "parts.confirm",
     "parts.different",
+    "parts.first",
     "parts.modulus",
     "analysis.model",
     "device.commissioned_within_days",
@@ -354,7 +356,7 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
     let mut questions = questions::read(&mut root, "questions");
     let own_questions = raw.questions();
     let has_faulty_parts = raw.rating_parts() + own_questions.len() < raw.parts.len();
-    questions.extend(own_questions);
+    questions.extend(own_questions.into_iter().flatten());
     let setup = questions::read(&mut root, "setup");
     let intake = questions::read(&mut root, "intake");
     let mut outro = questions::read(&mut root, "outro");

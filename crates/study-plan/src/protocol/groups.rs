@@ -137,7 +137,11 @@ impl Protocol {
                     Task::Similarity(task) => {
                         task.keep(|m| models.contains(m) || self.level_of(m).is_some());
                     }
-                    Task::Discrimination { .. } | Task::Search(_) | Task::Adjustment(_) => {}
+                    // All realizations of a ranking belong to all groups.
+                    Task::Discrimination { .. }
+                    | Task::Search(_)
+                    | Task::Ranking(_)
+                    | Task::Adjustment(_) => {}
                 }
             }
         }

@@ -20,6 +20,12 @@ pub struct OutcomeRules {
     pub better: Option<BetterEnd>,
     /// What is analyzed of it.
     pub transform: Transform,
+    /// The generalized mixed model that is fitted besides; it decides nothing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub model: Option<OutcomeFamily>,
+    /// Of how many trials it is the successes, of a binomial model.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub of: Option<u32>,
 }
 
 /// What is measured, and by what.
@@ -93,7 +99,29 @@ words! {
     }
 }
 
+words! {
+    /// The family of a generalized mixed model of an outcome.
+    OutcomeFamily {
+        /// Counts, such as errors: Poisson, the logarithm of the mean is linear.
+        Poisson = "poisson",
+        /// Successes in `of` trials, such as hits: binomial, the logit of the probability is linear.
+        Binomial = "binomial",
+        /// Numbers above 0 whose spread is in proportion to their mean, such as times and forces: gamma, the logarithm
+        /// of the mean is linear.
+        Gamma = "gamma",
+    }
+}
+
 impl Measure {
+    /// Whether its numbers can be counts: full strokes, or the answer to one question.
+    pub fn can_be_counted(&self) -> bool {
+        match self {
+            Self::Clock(_) => false,
+            Self::Telemetry(what) => *what == Telemetry::Strokes,
+            Self::Answers(answers) => answers.questions.len() == 1,
+        }
+    }
+
     /// What measures it, as the protocol says it.
     pub fn from(&self) -> &'static str {
         match self {
@@ -138,12 +166,19 @@ impl OutcomeRules {
     /// Its declaration in a phrase: `time (exploration time, s, lower is better, log)`.
     pub fn in_words(&self) -> String {
         let noun = self.measure.noun();
+        let trials = self.of.map_or_else(String::new, |of| format!(" of {of}"));
+        let model = self.model.map(|family| match family {
+            OutcomeFamily::Poisson => "Poisson model besides".to_owned(),
+            OutcomeFamily::Binomial => format!("binomial model{trials} besides"),
+            OutcomeFamily::Gamma => "gamma model besides".to_owned(),
+        });
         let mut facts = vec![&*noun, self.measure.unit()];
         facts.extend(self.better.map(|better| match better {
             BetterEnd::Higher => "higher is better",
             BetterEnd::Lower => "lower is better",
         }));
         facts.extend((self.transform == Transform::Log).then_some("log"));
+        facts.extend(model.as_deref());
         format!("{} ({})", self.id, facts.join(", "))
     }
 }
@@ -189,6 +224,8 @@ mod tests {
             measure: Measure::Clock(Clock::Exploration),
             better: Some(BetterEnd::Lower),
             transform: Transform::Log,
+            model: None,
+            of: None,
         };
         assert_eq!(
             serde_json::json!(rules),
@@ -198,6 +235,16 @@ mod tests {
                 "better": "lower",
                 "transform": "log",
             })
+        );
+        let modeled = OutcomeRules {
+            model: Some(OutcomeFamily::Binomial),
+            of: Some(12),
+            ..rules
+        };
+        let written = serde_json::json!(modeled);
+        assert_eq!(
+            (&written["model"], &written["of"]),
+            (&serde_json::json!("binomial"), &serde_json::json!(12))
         );
     }
 }

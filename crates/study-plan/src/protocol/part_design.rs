@@ -32,6 +32,12 @@ impl Protocol {
                 // No study has orders of an older version.
                 design.order_version = OrderVersion::Unguessable;
             }
+            (Some(Task::Ranking(own)), _) => {
+                design.repetitions = own.repetitions;
+                design.order = own.order.clone();
+                (design.max_run, design.min_distance) = (None, None);
+                design.practice.clear();
+            }
             (Some(_), None) => {
                 (design.max_run, design.min_distance) = (None, None);
                 design.practice.clear();

@@ -8,7 +8,8 @@
 use super::keys::words;
 use super::presentations::{Magnitude, Mushra, Presentations};
 use super::{
-    Adjustment, Answer, Identification, Pairs, Protocol, Relative, SearchTask, Seat, Similarity,
+    Adjustment, Answer, Identification, Pairs, Protocol, Ranking, Relative, SearchTask, Seat,
+    Similarity,
 };
 use crate::procedure::{Ladder, ProcedureError, Rule, Track};
 use serde::{Deserialize, Serialize};
@@ -56,6 +57,8 @@ pub enum Task {
     Search(SearchTask),
     /// Two realizations are felt, and how different they are is rated.
     Similarity(Similarity),
+    /// Several realizations are felt, and each is given a rank.
+    Ranking(Ranking),
     /// A level of a family is set, step by step, until it feels equal to a standard or as it should.
     Adjustment(Adjustment),
 }
@@ -72,6 +75,7 @@ impl Task {
             | Self::Discrimination { .. }
             | Self::Search(_)
             | Self::Similarity(_)
+            | Self::Ranking(_)
             | Self::Adjustment(_) => None,
         }
     }
@@ -87,7 +91,8 @@ impl Task {
             | Self::Pairs(_)
             | Self::Discrimination { .. }
             | Self::Search(_)
-            | Self::Similarity(_) => None,
+            | Self::Similarity(_)
+            | Self::Ranking(_) => None,
         }
     }
 
@@ -482,6 +487,18 @@ impl Protocol {
         let path = ["track", track.id.as_str(), seat.stream(), &number];
         let mut stream = Stream::new(self.study.seed, &path);
         Track::new(&track.rule, &self.ladder(track), &mut stream)
+    }
+
+    /// Whether the answers to a question are numbers but no ratings of a realization: estimates of magnitude, how different two are,
+    /// ranks, or levels that were set.
+    pub fn has_other_numbers(&self, question: &QuestionId) -> bool {
+        self.parts.iter().any(|part| match part.task {
+            Task::Magnitude(_) | Task::Similarity(_) | Task::Adjustment(_) => {
+                part.asks.first() == Some(question)
+            }
+            Task::Ranking(_) => part.asks.contains(question),
+            _ => false,
+        })
     }
 
     /// Whether the number of trials of a session depends on the answers.

@@ -104,6 +104,7 @@ phrases! {
     First "first" "first";
     Second "second" "second";
     Third "third" "third";
+    NumberedInterval "numbered-interval" "number {n}";
     ReferenceInterval "reference-interval" "reference";
     ToRate "to-rate" "rate this one";
     Tie "tie" "no difference";
@@ -121,6 +122,7 @@ phrases! {
     TypeAnswerFirst "type-answer-first" "Type an answer first.";
     NumberLike "number-like" "Type a number, such as 12.5.";
     OffScale "off-scale" "The scale goes from {from} to {to}.";
+    RankTaken "rank-taken" "{rank} is given already. Choose another rank, or go back and change the earlier one.";
     Range "range" "Type a number from {from} to {to}.";
     RangeFrom "range-from" "Type a number from {from} up.";
     RangeTo "range-to" "Type a number up to {to}.";
@@ -160,7 +162,8 @@ phrases! {
     PlainNoCommand "plain-no-command" "{command} is no command. Type /help for a list. An answer that begins with a slash needs two.";
     PlainLeave "plain-leave" "Leave the session? It can be resumed later.";
     PlainUnpause "plain-unpause" "Press Enter to continue, or type /quit.";
-    PlainNoReplay "plain-no-replay" "This cannot be presented again.";
+    PlainNoReplay "plain-no-replay" "This cannot be presented again now. A trial can be, before its first answer, as often as the study allows.";
+    NeverReplay "never-replay" "In this study nothing is presented again on request.";
     PlainNoBack "plain-no-back" "There is no question before this one.";
     CommandStop "command-stop" "stops the device at once";
     CommandRemark "command-remark" "keeps a remark of the experimenter";
@@ -198,6 +201,7 @@ phrases! {
     AlreadyAnswer "already-answer" "That is already the answer.";
     NewAnswerFirst "new-answer-first" "Enter the new answer first, or press Esc.";
     ReasonFirst "reason-first" "Type a reason first, or press Esc.";
+    FinishFirst "finish-first" "Finish this first, or press Esc.";
     NothingToCorrect "nothing-to-correct" "There is no earlier answer to correct.";
     WhichCorrect "which-correct" "Type the number of the answer to correct. Enter alone: none.";
     WhichOfList "which-of-list" "Type a number of the list.";
@@ -207,6 +211,7 @@ phrases! {
     FormSetup "form-setup" "set-up";
     FormIntake "form-intake" "intake";
     FormOutro "form-outro" "closing questions";
+    Remark "remark" "remark";
 }
 
 impl Phrase {

@@ -76,6 +76,11 @@ pub enum Stimuli {
         /// Whether the point with the higher number comes first.
         swapped: bool,
     },
+    /// Several realizations that are ranked, in this order.
+    Set {
+        /// The realizations.
+        set: Vec<ModelId>,
+    },
 }
 
 impl Stimuli {
@@ -96,8 +101,9 @@ impl Trial {
             Stimuli::One { model } | Stimuli::Rated { model, .. } => Some(model),
             Stimuli::Pair { .. }
             | Stimuli::Track { .. }
-            | Stimuli::Adjusted { .. }
-            | Stimuli::Search { .. } => None,
+            | Stimuli::Search { .. }
+            | Stimuli::Set { .. }
+            | Stimuli::Adjusted { .. } => None,
         }
     }
 
@@ -108,8 +114,9 @@ impl Trial {
             Stimuli::One { .. }
             | Stimuli::Rated { .. }
             | Stimuli::Pair { .. }
-            | Stimuli::Adjusted { .. }
-            | Stimuli::Search { .. } => None,
+            | Stimuli::Search { .. }
+            | Stimuli::Set { .. }
+            | Stimuli::Adjusted { .. } => None,
         }
     }
 

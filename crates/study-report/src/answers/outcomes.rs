@@ -5,11 +5,11 @@ use crate::wording::two_levels;
 use crate::{apa, sentences};
 use study_analysis::analyze::findings::Estimate;
 use study_analysis::analyze::results::{
-    MeasuredOutcome, Number as _, OutcomeMean, OutcomeName, OutcomePair,
+    MeasuredOutcome, Number as _, OutcomeMean, OutcomeModelTest, OutcomeName, OutcomePair,
 };
 use study_analysis::analyze::{Analysis, Finding, OutcomeAnswer, Question, Verdict};
 use study_base::text::sentence;
-use study_plan::protocol::{BetterEnd, Transform};
+use study_plan::protocol::{BetterEnd, OutcomeFamily, OutcomeRules, Transform};
 
 /// An answer for each outcome that was measured.
 pub(super) fn outcomes(a: &Analysis) -> Vec<Answer> {
@@ -39,7 +39,72 @@ fn answer(a: &Analysis, outcome: &OutcomeAnswer, record: &MeasuredOutcome) -> An
         "Measured outcomes decide no question of the study; p is corrected over the tests of all of them (Holm)."
             .to_owned(),
     );
+    answer.more.extend(second_opinion(a, rules, record));
     answer
+}
+
+/// What the generalized mixed model says of each effect, which decides nothing.
+fn second_opinion(a: &Analysis, rules: &OutcomeRules, record: &MeasuredOutcome) -> Option<String> {
+    let model = record.model.as_ref()?;
+    let (name, compared) = match rules.model? {
+        OutcomeFamily::Poisson => ("A Poisson mixed model", "means"),
+        OutcomeFamily::Binomial => ("A binomial mixed model", "odds"),
+        OutcomeFamily::Gamma => ("A gamma mixed model", "means"),
+    };
+    if let Some(why) = model.loglik.reason() {
+        return Some(sentence(&format!(
+            "{name} was asked for as a second opinion and has no estimate: {why}"
+        )));
+    }
+    let realizations = model
+        .differ
+        .iter()
+        .map(|test| ("realizations".to_owned(), test));
+    let effects = (model.effects.iter()).map(|(effect, test)| (effect.as_str().to_owned(), test));
+    let all: Vec<String> = (realizations.chain(effects))
+        .map(|(effect, test)| likelihood_ratio(a, &effect, compared, test))
+        .collect();
+    Some(sentence(&format!(
+        "{name} of the single trials, by likelihood ratios and not corrected for their number, is a second opinion \
+         and decides nothing: {}",
+        all.join("; ")
+    )))
+}
+
+/// The test of an effect and, of two levels, the ratio of their means or odds.
+fn likelihood_ratio(a: &Analysis, effect: &str, compared: &str, test: &OutcomeModelTest) -> String {
+    let named = effect.replace(':', " × ");
+    let (Some(chi2), Some(df), Some(p)) = (test.chi2.number(), test.df.number(), test.p.number())
+    else {
+        let why = test.chi2.reason().unwrap_or("it has no test");
+        return format!("{named} has no test ({why})");
+    };
+    let ratio = test.ratio.number().map_or_else(String::new, |ratio| {
+        let ci = sentences::ci(test.ratio_ci95.as_ref(), apa::two);
+        let levels = levels_of(a, effect).map(|levels| levels.map(apa::name));
+        let [first, second] =
+            levels.unwrap_or_else(|| ["the first", "the second"].map(str::to_owned));
+        format!(
+            ", ratio of the {compared} {second} over {first} = {}{ci}",
+            apa::two(ratio)
+        )
+    });
+    format!(
+        "{named}, χ²({}) = {}, p {}{ratio}",
+        apa::whole(df),
+        apa::two(chi2),
+        apa::p(p)
+    )
+}
+
+/// The two levels of a factor that has two.
+fn levels_of<'a>(a: &'a Analysis, factor: &str) -> Option<[&'a str; 2]> {
+    let crossing = a.crossing.as_ref()?;
+    let place = (0..=crossing.factors.len()).find(|place| crossing.name(*place) == factor)?;
+    match crossing.levels(place) {
+        [first, second] => Some([first.as_str(), second.as_str()]),
+        _ => None,
+    }
 }
 
 /// The verdict of a test, with its result.

@@ -84,20 +84,10 @@ fn steps(a: &Analysis, all: &Flow) -> Vec<Step> {
         side: participants,
     }];
     // Between both, who stays with all trials; without either it is the first or the last one.
-    let lost = all
-        .left_out
-        .values()
-        .fold(Share::default(), |sum, share| Share {
-            participants: sum.participants + share.participants,
-            trials: sum.trials + share.trials,
-        });
-    if lost.participants > 0 && !trials.is_empty() {
-        let kept = Share {
-            participants: all.recorded.participants - lost.participants,
-            trials: all.recorded.trials - lost.trials,
-        };
+    if !all.left_out.is_empty() && !trials.is_empty() {
+        let staying = of(all.staying, TRIALS);
         steps.push(Step {
-            lines: vec!["Of participants who stay".to_owned(), of(kept, TRIALS)],
+            lines: vec!["Of participants who stay".to_owned(), staying],
             side: trials,
         });
     } else if !trials.is_empty() {

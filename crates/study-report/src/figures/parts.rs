@@ -7,6 +7,7 @@ use super::functions::{
     MAX_PANELS, cut, grid, level_axis, level_label, of_everybody, place, psychometric,
 };
 use super::identification::confusions;
+use super::rankings::worths;
 use super::similarity::map;
 use super::thresholds::{by_conditions, by_participant};
 use super::weber::webers_law;
@@ -37,6 +38,7 @@ pub fn of_part(number: usize, part: &PartAnalysis) -> Vec<Drawn> {
         magnitudes(&name("magnitudes"), part),
         confusions(&name("confusions"), part),
         map(&name("map"), part),
+        worths(&name("worths"), part),
         settings(&name("settings"), part),
     ];
     let note = match (part.simulated, part.pilot) {

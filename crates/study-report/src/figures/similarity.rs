@@ -50,8 +50,12 @@ pub(super) fn map(name: &str, part: &PartAnalysis) -> Option<Drawn> {
         data.push(line);
     }
     let stress = found.map_stress.number().map_or_else(String::new, plain);
+    let axes = match dimensions {
+        1 => "only distances have a meaning, no place and no direction",
+        _ => "axes have no meaning of their own, and a unit is as long on both",
+    };
     let caption = format!(
-        "Map of the realizations: distances stand for differences, in points of the scale; axes have no meaning of their own, and a unit is as long on both. Bars: one standard \
+        "Map of the realizations: distances stand for differences, in points of the scale; {axes}. Bars: one standard \
          error over participants to both sides. Stress {stress}."
     );
     let title = "Map of perceived differences";

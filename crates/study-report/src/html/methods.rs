@@ -297,10 +297,17 @@ fn outcomes(a: &Analysis) -> Option<String> {
         Some(_) => "by the factors in the same way",
         None => "between the realizations in the same way",
     };
+    let besides = match a.outcomes.iter().any(|o| o.rules.model.is_some()) {
+        true => {
+            " Generalized mixed models of single trials with random intercepts of participants, and of their cells where \
+             they repeat or are counts, are given besides and decide nothing."
+        }
+        false => "",
+    };
     (!named.is_empty()).then(|| {
         format!(
             "Measured besides: {}. They were compared {by}, in the trials whose rating was analyzed, with Holm's \
-             correction over the tests of all of them.",
+             correction over the tests of all of them.{besides}",
             apa::listing(&named)
         )
     })

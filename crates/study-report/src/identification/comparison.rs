@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 use std::fmt::Write as _;
 use study_haptics::identify::compare::{Candidate, Comparison};
 use study_haptics::identify::identification::Identification;
+use study_haptics::model::Realization;
 
 /// One table and one sentence.
 pub(super) fn table(results: &Identification, comparison: &Comparison) -> String {
@@ -13,7 +14,14 @@ pub(super) fn table(results: &Identification, comparison: &Comparison) -> String
     let mut heads: Vec<String> = ["", "method"].map(String::from).into();
     heads.extend([format!("dx {x}"), format!("delta {x}")]);
     heads.extend(["VAF left out".into(), format!("residual {f}")]);
+    if comparison.by_perceptual {
+        heads.push("perceptual".into());
+    }
     heads.extend((results.recordings.iter()).map(|source| format!("VAF {}", short_name(source))));
+    if results.weights.is_some() {
+        let names = results.recordings.iter().map(short_name);
+        heads.extend(names.map(|name| format!("perceptual {name}")));
+    }
     heads.push("passive".into());
     let mut rows = vec![heads];
     for (i, candidate) in comparison.candidates.iter().enumerate() {
@@ -34,7 +42,12 @@ pub(super) fn table(results: &Identification, comparison: &Comparison) -> String
             ],
             None => ["-", "-"].map(String::from),
         });
+        let shown = |vaf: Option<f64>| vaf.map_or("-".to_owned(), |vaf| format!("{vaf:.4}"));
+        if comparison.by_perceptual {
+            row.push(shown(candidate.left_out.and_then(|l| l.perceptual)));
+        }
         row.extend((candidate.cell.scores.iter()).map(|score| format!("{:.4}", score.vaf)));
+        row.extend(results.perceptual_vaf(realization).into_iter().map(shown));
         let passes = candidate.cell.certificate.passes();
         row.push(if passes { "PASS" } else { "FAIL" }.to_owned());
         rows.push(row);
@@ -43,8 +56,12 @@ pub(super) fn table(results: &Identification, comparison: &Comparison) -> String
         true => "strokes",
         false => "tenths of the travel in one direction",
     };
+    let perceptual = match comparison.by_perceptual {
+        true => "; perceptual: the VAF of weighted components there",
+        false => "",
+    };
     let mut out = format!(
-        "VAF left out: on {left_out} that were left out of the training, a fifth at a time\n{}",
+        "VAF left out: on {left_out} that were left out of the training, a fifth at a time{perceptual}\n{}",
         align(&rows)
     );
     for candidate in &comparison.candidates {
@@ -78,6 +95,9 @@ fn sentence(p: Printed, comparison: &Comparison) -> String {
     let Some(best) = comparison.recommended else {
         return "no method is recommended: all fail".into();
     };
+    if comparison.by_perceptual {
+        return by_perceptual(comparison, best);
+    }
     let shown = |n: f64| format!("{:.decimals$} {}", p.force(n), p.f());
     let noise = match comparison.noise_n {
         Some(noise_n) => format!(" (noise of the force: {})", shown(noise_n)),
@@ -103,9 +123,44 @@ fn sentence(p: Printed, comparison: &Comparison) -> String {
     )
 }
 
-pub(super) fn json(comparison: &Comparison) -> Value {
+/// The same of candidates that were compared by their perceptual VAF.
+fn by_perceptual(comparison: &Comparison, best: usize) -> String {
+    let candidate = |i: usize| &comparison.candidates[i];
+    let name = |i: usize| candidate(i).cell.method.as_str();
+    let left_out = |i: usize| candidate(i).left_out;
+    let vaf = |i: usize| left_out(i).and_then(|l| l.perceptual).unwrap_or(0.0);
+    let against = match comparison.second {
+        None => "and every other one fails".to_owned(),
+        Some(next) if vaf(next) <= vaf(best) => {
+            format!(
+                "and that of {}, the next best, is {:.4}",
+                name(next),
+                vaf(next)
+            )
+        }
+        Some(next) => format!(
+            "hardly less than that of {next}, and it is preferred to {next}",
+            next = name(next)
+        ),
+    };
+    format!(
+        "recommended: {}, because its perceptual VAF on data left out is {:.4}, {against}",
+        name(best),
+        vaf(best),
+    )
+}
+
+/// The perceptual VAF of a realization by recording.
+pub(super) fn perceptual(results: &Identification, realization: &Realization) -> Value {
+    let each = results.perceptual_vaf(realization);
+    let by_name = (results.recordings.iter().zip(each))
+        .map(|(source, vaf)| (source.recording.name.clone(), json!(vaf)));
+    Value::Object(by_name.collect())
+}
+
+pub(super) fn json(results: &Identification, comparison: &Comparison) -> Value {
     let candidate = |candidate: &Candidate| {
-        json!({
+        let mut document = json!({
             "method": candidate.cell.method.as_str(),
             "vaf_left_out": candidate.left_out.map(|l| l.vaf),
             "residual_left_out_n": candidate.left_out.map(|l| l.rms_n),
@@ -113,7 +168,14 @@ pub(super) fn json(comparison: &Comparison) -> Value {
             "vaf": candidate.cell.realization.vaf,
             "certificate_pass": candidate.cell.certificate.passes(),
             "failed": candidate.failure().map(|failure| failure.to_string()),
-        })
+        });
+        if results.weights.is_some() {
+            let left_out = candidate.left_out.and_then(|l| l.perceptual);
+            document["perceptual_vaf_left_out"] = json!(left_out);
+            let realization = &candidate.cell.realization;
+            document["perceptual_vaf"] = perceptual(results, realization);
+        }
+        document
     };
     let candidates: Vec<Value> = comparison.candidates.iter().map(candidate).collect();
     let mut document = json!({

@@ -24,7 +24,7 @@ pub fn document(results: &Identification) -> String {
             };
             let warnings: Vec<String> = cell.warnings.iter().map(ToString::to_string).collect();
             let [start, sort] = start_and_sort(cell.method);
-            json!({
+            let mut document = json!({
                 "method": cell.method.as_str(),
                 "lambda": provenance.lambda,
                 "memory_mm": provenance.memory_mm,
@@ -48,7 +48,11 @@ pub fn document(results: &Identification) -> String {
                 "terms": cell.terms.iter().map(term).collect::<Vec<_>>(),
                 "mechanism": cell.fitted.as_deref().map(mechanism),
                 "elements": cell.realization.elements.as_ref().map(elements::json),
-            })
+            });
+            if results.weights.is_some() {
+                document["perceptual_vaf"] = comparison::perceptual(results, &cell.realization);
+            }
+            document
         })
         .collect();
     let recording = |source: &Source, role: &str| {
@@ -107,7 +111,7 @@ pub fn document(results: &Identification) -> String {
         "cells": cells,
     });
     if let Some(comparison) = &results.comparison {
-        document["comparison"] = comparison::json(comparison);
+        document["comparison"] = comparison::json(results, comparison);
     }
     format!("{document:#}\n")
 }

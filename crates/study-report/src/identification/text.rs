@@ -305,6 +305,10 @@ fn heads(results: &Identification) -> Vec<String> {
         heads.push(format!("VAF {}", short_name(source)));
         heads.extend([format!("bias {f}"), format!("residual {f}")]);
     }
+    if results.weights.is_some() {
+        let names = results.recordings.iter().map(short_name);
+        heads.extend(names.map(|name| format!("perceptual {name}")));
+    }
     heads.extend(["m<0", "b<0", "passive"].map(String::from));
     heads
 }
@@ -350,6 +354,8 @@ fn row(results: &Identification, cell: &Cell, best: bool) -> Vec<String> {
         row.push(format!("{:+.decimals$}", p.force(score.bias_n)));
         row.push(format!("{:.decimals$}", p.force(score.residual_n)));
     }
+    let perceptual = results.perceptual_vaf(&cell.realization).into_iter();
+    row.extend(perceptual.map(|vaf| vaf.map_or("-".to_owned(), |vaf| format!("{vaf:.6}"))));
     let certificate = &cell.certificate;
     for share in [certificate.negative_mass, certificate.negative_damping] {
         row.push(format!("{:.0} %", 100.0 * share));

@@ -149,6 +149,24 @@ fn trials(protocol: &Protocol, part: &Part) -> String {
                 counted(own.repetitions as usize, "trial", "trials")
             ));
         }
+        Task::Ranking(own) => {
+            let ties = match own.ties {
+                true => "several could have the same rank",
+                false => "no two had the same rank",
+            };
+            let practice = match own.practice {
+                0 => String::new(),
+                n => format!(
+                    " {} came before.",
+                    counted(n as usize, "practice trial", "practice trials")
+                ),
+            };
+            text.push(format!(
+                "In each of {} all of {} were felt one after another, and then each was given its rank; {ties}.{practice}",
+                counted(own.repetitions as usize, "trial", "trials"),
+                counted(own.models.len(), "realization", "realizations")
+            ));
+        }
         Task::Adjustment(own) => {
             let practice = match own.practice {
                 0 => String::new(),

@@ -3,7 +3,7 @@
 use crate::apa::{self, bare_p, plain, two, whole};
 use crate::table::{Builder, Table, file, report};
 use study_analysis::analyze::results::{
-    Interval, MeasuredOutcome, Number as _, OutcomeMean, RealizationName, Stat,
+    Interval, MeasuredOutcome, Number as _, OutcomeMean, OutcomeModelTest, RealizationName, Stat,
 };
 use study_analysis::analyze::{Analysis, Finding, OutcomeAnswer};
 use study_plan::protocol::Transform;
@@ -58,6 +58,15 @@ pub(crate) fn means(a: &Analysis) -> Table {
         .notes(any.then(|| note.to_owned()))
 }
 
+/// What the generalized mixed model of an outcome says of the effect that a finding is about.
+fn by_model<'a>(record: &'a MeasuredOutcome, f: &Finding) -> Option<&'a OutcomeModelTest> {
+    let model = record.model.as_ref()?;
+    match f.names.is_empty() {
+        true => model.differ.as_ref(),
+        false => model.effects.get(f.names.join(":").as_str()),
+    }
+}
+
 /// The tests of the outcomes.
 pub(crate) fn tests(a: &Analysis) -> Table {
     let rows: Vec<(&OutcomeAnswer, &MeasuredOutcome, &Finding)> = all(a)
@@ -83,6 +92,9 @@ pub(crate) fn tests(a: &Analysis) -> Table {
     };
     let note = "p (Holm) is corrected over the tests of all measured outcomes together. They decide no question of the study.";
     let any = !rows.is_empty();
+    let modeled = rows.iter().any(|r| r.1.model.is_some());
+    let model_note = "χ² and p (model) are the likelihood ratio of a generalized mixed model of the single trials, a second \
+                      opinion that decides nothing; p is of this test alone.";
     Builder::new("Tests of the measured outcomes", &rows)
         .text(report("outcome"), &|r| name(r.0))
         .text(file("outcome"), &|r| r.0.rules.id.to_string())
@@ -103,5 +115,21 @@ pub(crate) fn tests(a: &Analysis) -> Table {
         .number(report("η²G").file("effect_size"), two, &|r| {
             r.2.effect.as_ref().map(|e| e.value)
         })
+        .number(
+            report("χ² (model)")
+                .file("model_chi2")
+                .explained(model_note.to_owned())
+                .when(modeled),
+            two,
+            &|r| by_model(r.1, r.2)?.chi2.number(),
+        )
+        .number(file("model_df").when(modeled), whole, &|r| {
+            by_model(r.1, r.2)?.df.number()
+        })
+        .number(
+            report("p (model)").file("model_p").when(modeled),
+            bare_p,
+            &|r| by_model(r.1, r.2)?.p.number(),
+        )
         .notes(any.then(|| note.to_owned()))
 }

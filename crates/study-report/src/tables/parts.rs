@@ -4,6 +4,7 @@
 mod adjustment;
 mod identification;
 mod population;
+mod ranking;
 mod scales;
 mod similarity;
 
@@ -22,7 +23,7 @@ use study_base::text::Untrusted;
 type Kind = (&'static str, fn(&PartResults) -> Table);
 
 /// All tables, in the order of a page; those without rows and notes are left out of it.
-pub(crate) const KINDS: [Kind; 26] = [
+pub(crate) const KINDS: [Kind; 29] = [
     ("part_thresholds.csv", thresholds),
     ("part_population.csv", population::population),
     ("part_population_contrasts.csv", population::contrasts),
@@ -44,6 +45,9 @@ pub(crate) const KINDS: [Kind; 26] = [
     ("part_map_follows.csv", similarity::follows),
     ("part_differences.csv", similarity::pairs),
     ("part_similarity.csv", similarity::participants),
+    ("part_ranks.csv", ranking::realizations),
+    ("part_rank_pairs.csv", ranking::pairs),
+    ("part_rankings.csv", ranking::participants),
     ("part_adjustment.csv", adjustment::participants),
     ("part_scores.csv", scores),
     ("part_items.csv", items),

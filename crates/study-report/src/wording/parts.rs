@@ -111,6 +111,20 @@ fn texts(question: &PartQuestion) -> Wording {
             shown: "Procrustes correlation {size}, {result} ({corrected}, {realizations})",
             ..PART
         },
+        PartQuestion::RankedAlike => Wording {
+            ask: "Do participants rank the realizations alike?",
+            yes: "Participants ranked the realizations alike",
+            not_shown: "It was not shown that participants rank the realizations alike",
+            shown: "Kendall's W = {size}, {result} ({corrected}, {people})",
+            ..PART
+        },
+        PartQuestion::RankedFirst => Wording {
+            ask: "Is one realization ranked above each other one?",
+            yes: "{first} was ranked above each other realization",
+            not_shown: "It was not shown that one realization is ranked above each other one",
+            shown: "{first} over {second} by {size} on the logarithm of the worth, {result} ({corrected}, {people})",
+            ..PART
+        },
         PartQuestion::Adjusted => Wording {
             ask: "Do settings differ from the standard?",
             yes: "Settings differed from the standard",

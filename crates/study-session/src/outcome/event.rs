@@ -99,7 +99,7 @@ named! {
         /// Stopped by Esc or a pause and played again instead of rated.
         Stopped = "stopped",
         /// The program ended or stood still during the attempt, or paused too long before
-        /// its answer.
+        /// its answer or its next interval.
         Interrupted = "interrupted",
         /// The force was not that of the table.
         Rendering = "rendering",

@@ -379,7 +379,7 @@ impl Kind {
 impl Interval {
     fn new(view: &View, at: u32, of: u32) -> Self {
         Self {
-            name: view.interval_name(at).to_owned(),
+            name: view.interval_name(at),
             at,
             of,
         }

@@ -288,7 +288,7 @@ impl Exchange {
         };
         let stays = |screen| same_page(screen, &view.screen);
         let outcome = match pending.leaves.as_ref().is_some_and(stays) {
-            true => Outcome::Refused(String::new()),
+            true => Outcome::Refused(refusal(view)),
             false => Outcome::Saved,
         };
         self.settle(&pending.key, outcome);
@@ -301,6 +301,12 @@ impl Exchange {
             self.settled += 1;
         }
     }
+}
+
+/// Why the session took no answer to the page on the screen; of other pages nothing is said.
+fn refusal(view: &View) -> String {
+    let words = (view.notice.as_ref()).filter(|_| matches!(view.screen, Screen::Form { .. }));
+    words.cloned().unwrap_or_default()
 }
 
 /// The input that a reply means on the page of a view.

@@ -2,9 +2,9 @@
 //!
 //! An answer has to be about what was felt, not about what is remembered of it. The program
 //! may be left, paused, or wait for the device or the disk; the computer may be suspended.
-//! After a longer pause than the protocol allows the trial is felt again. Once a question of it is
-//! answered it is not: that answer was in time and must not be lost. The others then go on, and
-//! the trial records its pause.
+//! After a longer pause than the protocol allows the trial is felt again, and so it is if the pause
+//! came between two of its intervals. Once a question of it is answered it is not: that answer was
+//! in time and must not be lost. The others then go on, and the trial records its pause.
 
 use super::phase::{CLOCK_STEP_S, Phase};
 use super::{Effect, Session};
@@ -87,6 +87,41 @@ impl Session {
     fn notify_once_more(&mut self) {
         let words = self.words.get(Phrase::OnceMore).to_owned();
         self.notify(words);
+    }
+
+    /// Has all intervals felt again if the next one comes too long after the one before, which
+    /// ended at `ended`; returns whether it does. A person who changes samples takes their time.
+    pub(super) fn are_apart(&mut self, ended: Moment, at: Moment) -> bool {
+        let Some(open) = self.history.open() else {
+            return false;
+        };
+        // The first interval of a repetition follows nothing.
+        let follows = open.attempt.interval().is_some_and(|n| n > 1);
+        let gap_s = self.part_of(open.trial).map_or(0.0, |part| part.gap_s);
+        if !follows || self.by_hand(open.trial) {
+            return false;
+        }
+        // A computer that was suspended counts the time by its wall clock only.
+        let wall_s = (at.wall - ended.wall).as_seconds_f64();
+        let pause_s = at.seconds_since(&ended).max(wall_s) - gap_s;
+        if pause_s <= self.protocol.session.longest_pause_s {
+            return false;
+        }
+        self.away_s = pause_s;
+        self.out.push(Effect::Limp);
+        self.feel_again(at);
+        self.proceed(at);
+        true
+    }
+
+    /// The program did not run for so long, s, by the clock that also measures pauses: the process
+    /// was stopped, or the computer suspended where that clock goes on.
+    pub(super) fn did_not_run(&mut self, seconds: f64, at: Moment) {
+        self.stood_still(seconds, at);
+        // A pause, or a stopped trial, has this time in its own.
+        if self.in_form() && self.overlaid_since.is_none() {
+            self.was_away(seconds, at);
+        }
     }
 
     /// The computer stood still for so long, s. What a device did meanwhile, and for how long

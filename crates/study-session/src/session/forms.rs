@@ -7,7 +7,7 @@ use crate::outcome::{Author, Event, FormId, Moment, STEP_BACK};
 use study_base::text::QuestionId;
 use study_plan::protocol::answer::MAX_TEXT_BYTES;
 use study_plan::protocol::phrases::{Phrase, Words};
-use study_plan::protocol::{Answer, Control, Question, Refusal, Stimuli};
+use study_plan::protocol::{Answer, Control, Question, Refusal, Stimuli, Task};
 
 /// Why an input was not accepted; shown to the operator.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -126,9 +126,12 @@ impl Session {
         let checked = check(page, meant).and_then(|answers| {
             let kept = |q: &Question| self.history.answer(open.id, &q.id).is_some();
             let missing = |q: &&Question| answers.iter().all(|(id, _)| *id != q.id);
-            match page.iter().filter(missing).any(kept) {
-                true => Err(InputRefused::AnswerMissing),
-                false => Ok(answers),
+            if page.iter().filter(missing).any(kept) {
+                return Err(InputRefused::AnswerMissing);
+            }
+            match self.taken(open.id, &answers) {
+                Some(refusal) => Err(refusal.into()),
+                None => Ok(answers),
             }
         });
         match checked {
@@ -141,6 +144,32 @@ impl Session {
                 self.turn_page(at);
             }
         }
+    }
+
+    /// Refuses ranks that are alike on this page of the form and those before it, in a part without ties. Pages after this
+    /// one are passed again.
+    fn taken(&self, form: FormId, answers: &[(QuestionId, Answer)]) -> Option<Refusal> {
+        let FormId::Trial { trial, .. } = form else {
+            return None;
+        };
+        let part = self.part_of(self.history.planned(trial)?)?;
+        let Task::Ranking(own) = &part.task else {
+            return None;
+        };
+        let asked = own.asked(&part.asks);
+        let rank = |answer: &Answer| match answer {
+            Answer::Rating(rank) => Some(*rank),
+            _ => None,
+        };
+        let taken = |(question, answer): &(QuestionId, Answer)| {
+            let at = asked.iter().position(|id| id == question)?;
+            let before = asked[..at].iter();
+            let before = before.filter_map(|id| rank(self.history.answer(form, id)?));
+            let ranks: Vec<i64> = before.chain(rank(answer)).collect();
+            let again = (1..ranks.len()).find(|i| ranks[..*i].contains(&ranks[*i]))?;
+            Some(Refusal::RankTaken(ranks[again]))
+        };
+        answers.iter().filter(|_| !own.ties).find_map(taken)
     }
 
     /// Records an answer to a form on the screen. After a step back it may replace an
@@ -239,8 +268,9 @@ impl Session {
             }
             Stimuli::Rated { .. }
             | Stimuli::Pair { .. }
-            | Stimuli::Adjusted { .. }
-            | Stimuli::Search { .. } => None,
+            | Stimuli::Search { .. }
+            | Stimuli::Set { .. }
+            | Stimuli::Adjusted { .. } => None,
         }
     }
 

@@ -36,10 +36,12 @@ impl Session {
                 None => Vec::new(),
             },
             can_replay: self.can_replay(),
+            has_replays: self.has_replays(),
             can_go_back: self.can_go_back(),
             remarks: self.remarks.iter().rev().take(3).cloned().collect(),
             force: self.presents_force(),
             has_reference: self.has_reference(),
+            numbered: self.is_numbered(),
             adjusting: self.shown_adjustment(),
             can_advance: can_advance(&screen),
             words: self.words.clone(),
@@ -187,8 +189,15 @@ impl Session {
             Stimuli::One { .. }
             | Stimuli::Pair { .. }
             | Stimuli::Track { .. }
-            | Stimuli::Search { .. } => false,
+            | Stimuli::Search { .. }
+            | Stimuli::Set { .. } => false,
         })
+    }
+
+    /// Whether the intervals of the trial under way have numbers for names, by which they are asked about.
+    fn is_numbered(&self) -> bool {
+        let open = self.history.open();
+        open.is_some_and(|open| matches!(open.trial.stimuli, Stimuli::Set { .. }))
     }
 
     /// The interval under way and their number, if there are several.

@@ -13,6 +13,8 @@ pub struct Roster {
     again: BTreeMap<ParticipantId, String>,
     /// Those who began last, the latest first.
     recent: Vec<ParticipantId>,
+    /// Whose session was interrupted, and where it goes on.
+    interrupted: Option<(ParticipantId, String)>,
     /// The search that the study confirms.
     search: Option<Confirms>,
     newcomer: Newcomer,
@@ -62,6 +64,7 @@ impl Roster {
             recent: recent.map(|row| row.participant.clone()).collect(),
             known: known.collect(),
             again: BTreeMap::new(),
+            interrupted: None,
             search: None,
             newcomer,
         }
@@ -70,6 +73,29 @@ impl Roster {
     /// Says of a participant who has finished a session when the next one is.
     pub fn comes_again(&mut self, participant: &ParticipantId, words: String) {
         self.again.insert(participant.clone(), words);
+    }
+
+    /// Says whose session was interrupted, and where it goes on, such as "with trial 12 of 40":
+    /// this participant is proposed.
+    pub fn interrupted(&mut self, participant: ParticipantId, goes_on: String) {
+        self.interrupted = Some((participant, goes_on));
+    }
+
+    /// The participant whose session was interrupted, with two sentences that say what is proposed.
+    pub fn unfinished(&self) -> Option<(&ParticipantId, [String; 2])> {
+        let (id, goes_on) = self.interrupted.as_ref()?;
+        let sentences = [
+            format!("{id} has not finished: Enter goes on {goes_on}."),
+            "Type another id to start somebody else.".to_owned(),
+        ];
+        Some((id, sentences))
+    }
+
+    /// The id that Enter alone takes: that of an interrupted session, or else one for the next
+    /// participant.
+    pub fn proposed(&self) -> Option<ParticipantId> {
+        let unfinished = self.interrupted.as_ref().map(|(id, _)| id.clone());
+        unfinished.or_else(|| self.next_id())
     }
 
     /// Says which search the study confirms: who took part in it cannot take part here.
@@ -89,7 +115,7 @@ impl Roster {
 
     /// An id for the next participant: that of the last one, or P00, with the next free
     /// number.
-    pub fn next_id(&self) -> Option<ParticipantId> {
+    fn next_id(&self) -> Option<ParticipantId> {
         let last = self.recent.first().map_or("P00", ParticipantId::as_str);
         let name = last.trim_end_matches(|c: char| c.is_ascii_digit());
         let digits = &last[name.len()..];

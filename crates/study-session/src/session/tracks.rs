@@ -37,6 +37,7 @@ impl Session {
                 return Some(Presenting::of(vec![reference.clone(), model.clone()]));
             }
             Stimuli::Pair { pair } => return Some(Presenting::of(pair.to_vec())),
+            Stimuli::Set { set } => return Some(Presenting::of(set.clone())),
             Stimuli::Adjusted { start, standard } => {
                 let models = standard.iter().chain([start]).cloned();
                 return Some(Presenting::of(models.collect()));

@@ -108,13 +108,14 @@ impl Session {
         (gap_s > 0.0).then_some((ended, gap_s * late))
     }
 
-    /// Starts the next interval at the end of the gap.
+    /// Starts the next interval at the end of the gap, unless that took too long.
     pub(super) fn end_gap(&mut self, at: Moment) {
         if let Phase::Gap {
             ended,
             start_after_s,
         } = self.phase
             && at.seconds_since(&ended) >= start_after_s
+            && !self.are_apart(ended, at)
         {
             self.start_playback(at);
         }
@@ -369,6 +370,12 @@ impl Session {
             && !self.device_lost
     }
 
+    /// Whether some trial of the study may be felt again.
+    pub(super) fn has_replays(&self) -> bool {
+        let mut parts = self.protocol.parts.iter();
+        self.protocol.trial.exposure.replays > 0 || parts.any(|part| part.exposure.replays > 0)
+    }
+
     /// Whether more exploration is required after this time and these strokes.
     pub(super) fn too_little(&self, felt_s: f64, strokes: u32) -> bool {
         let open = self.history.open();
@@ -441,7 +448,10 @@ impl Session {
                 self.stop(at);
                 self.start_pause(at);
             }
-            Phase::ResumeChoice { .. } | Phase::End => self.notify("nothing can be paused now"),
+            Phase::ResumeChoice { .. } => {
+                self.notify("a pause is possible once the session goes on: choose how");
+            }
+            Phase::End => self.notify("nothing can be paused any more: the session is over"),
             _ => self.start_pause(at),
         }
     }

@@ -38,6 +38,8 @@ pub struct View {
     /// Whether all intervals of the trial can be felt again:
     /// [`PlayAgain`](super::Input::PlayAgain).
     pub can_replay: bool,
+    /// Whether that is possible at some trial of the study.
+    pub has_replays: bool,
     /// Whether there is an earlier page of questions: [`Back`](super::Input::Back).
     pub can_go_back: bool,
     /// Whether what is presented is a force; else a program of the laboratory presents
@@ -46,6 +48,8 @@ pub struct View {
     /// Whether the first interval of the trial is a reference, and the second one is
     /// rated.
     pub has_reference: bool,
+    /// Whether the intervals of the trial have numbers for names.
+    pub numbered: bool,
     /// The adjustment under way, until its level is confirmed.
     pub adjusting: Option<Adjusting>,
     /// The experimenter's last remarks in this sitting, newest first.
@@ -64,15 +68,20 @@ impl View {
         found.map(|c| &c.answer)
     }
 
-    /// The name of an interval, from 1. No trial has more than three.
-    pub fn interval_name(&self, interval: u32) -> &str {
-        self.words.get(match (self.has_reference, interval) {
+    /// The name of an interval, from 1. No trial whose intervals are not numbered has more than three.
+    pub fn interval_name(&self, interval: u32) -> String {
+        if self.numbered {
+            let number = &[("n", &interval as &dyn std::fmt::Display)];
+            return self.words.fill(Phrase::NumberedInterval, number);
+        }
+        let name = match (self.has_reference, interval) {
             (true, 1) => Phrase::ReferenceInterval,
             (true, _) => Phrase::ToRate,
             (false, 1) => Phrase::First,
             (false, 2) => Phrase::Second,
             (false, _) => Phrase::Third,
-        })
+        };
+        self.words.get(name).to_owned()
     }
 }
 

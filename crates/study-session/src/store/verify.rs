@@ -2,6 +2,7 @@
 
 mod adjustments;
 mod clocks;
+mod not_checked;
 mod practice;
 mod searches;
 mod tables;

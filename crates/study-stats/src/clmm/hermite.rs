@@ -9,15 +9,15 @@ use std::f64::consts::PI;
 
 /// A node with the logarithm of its weight.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Node {
+pub(crate) struct Node {
     /// Node of ∫ e^(−z²) g(z) dz.
-    pub(super) z: f64,
+    pub(crate) z: f64,
     /// ln w + z²: logarithm of the weight in ∫ h(z) dz.
-    pub(super) ln_weight: f64,
+    pub(crate) ln_weight: f64,
 }
 
 /// The rule with n nodes, ascending; exact for polynomials up to degree 2n − 1.
-pub(super) fn rule(n: usize) -> Vec<Node> {
+pub(crate) fn rule(n: usize) -> Vec<Node> {
     let node = |z| Node {
         z,
         ln_weight: ln_weight(n, z),

@@ -4,7 +4,7 @@
 use super::{Comparison, NoAbilities};
 
 /// The reason why there is none. Ties count in both directions, if the model has them.
-pub(super) fn check(
+pub(crate) fn check(
     items: usize,
     comparisons: &[Comparison],
     ties: bool,

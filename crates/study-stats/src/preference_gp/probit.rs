@@ -42,7 +42,7 @@ pub(super) fn log_cumulative(z: f64) -> (f64, f64) {
 
 /// The logarithm of the probability of an answer whose points differ by `g`, its derivative, and minus the second one:
 /// ln Φ(g/√2).
-pub(super) fn of_answer(g: f64) -> (f64, f64, f64) {
+pub(crate) fn of_answer(g: f64) -> (f64, f64, f64) {
     let z = g / SQRT_2;
     let (log, slope) = log_cumulative(z);
     (log, slope / SQRT_2, 0.5 * (slope * (slope + z)).max(0.0))

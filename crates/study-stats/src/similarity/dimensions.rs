@@ -37,7 +37,7 @@ pub struct Structure {
 
 /// Compares the stress of ratio scaling of the mean dissimilarities with that after each participant's were dealt to the pairs at random: if
 /// nobody perceives a structure, all deals are equally likely, and their means differ little. The order alone fits almost any dissimilarities of
-/// few objects. Both come from the same starts. `None` for fewer than four objects, or if
+/// few objects. Both come from as many starts. `None` for fewer than four objects, or if
 /// there is no map.
 pub fn structure(
     participants: &[Dissimilarities],
@@ -46,7 +46,7 @@ pub fn structure(
     let objects = participants.first()?.objects();
     let dimensions = most(objects).min(2);
     let stress = |participants: &[Dissimilarities], random: &mut _| {
-        let mean = Dissimilarities::mean(participants.iter())?;
+        let mean = Dissimilarities::in_common(participants.iter())?;
         let found = smacof(
             &mean,
             dimensions,
@@ -102,7 +102,7 @@ pub fn predicted(
     }
     let mut of = |(own, mine): (usize, &Dissimilarities)| {
         let others = (participants.iter().enumerate()).filter(|(at, _)| *at != own);
-        let mean = Dissimilarities::mean(others.map(|(_, other)| other))?;
+        let mean = Dissimilarities::in_common(others.map(|(_, other)| other))?;
         let precision = Precision::COARSE;
         let found = smacof(
             &mean,

@@ -3,6 +3,7 @@
 use super::Dissimilarities;
 use super::scaling::{Map, Precision, Scale, smacof_from};
 use crate::describe;
+use crate::distribution::t_quantile;
 use crate::matrix::{Matrix, SymmetricEigen};
 use crate::permutation::enumerate_orders;
 use crate::random::RandomSource;
@@ -13,6 +14,8 @@ pub const MAX_EXACT: usize = 8;
 pub const DRAWS: u32 = 9_999;
 /// Number of resamples of participants.
 pub const RESAMPLES: usize = 499;
+/// The largest correlation that counts; Fisher's z of 1 is infinite.
+const LARGEST: f64 = 0.9999;
 
 /// Objects by coordinates: centered, and the sum of all squares is 1.
 struct Shape {
@@ -137,19 +140,21 @@ pub fn followed(
 /// What resampling participants says of a map.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Resampled {
-    /// Standard errors of the coordinates: by object, then by dimension. Maps of resamples are turned to the map first.
+    /// Standard errors of the coordinates: by object, then by dimension. Maps of resamples are turned to the map first. Their
+    /// standard deviation times √(n/(n − 1)) for n participants, as of a mean.
     pub errors: Vec<Vec<f64>>,
-    /// Percentile interval of [`procrustes`]; `None` without properties.
+    /// Interval of [`procrustes`]: Fisher's z, and t(n − 1) times its standard error, which is that of the resamples as of `errors`.
+    /// Percentiles would be too low, because maps of resamples are noisier. `None` without properties.
     pub r_ci95: Option<(f64, f64)>,
     /// Resamples that gave a map.
     pub resamples: usize,
 }
 
-/// Draws participants with replacement [`RESAMPLES`] times, and scales the mean of their dissimilarities from the map on.
+/// Draws participants with replacement [`RESAMPLES`] times, and scales what their dissimilarities have in common from the map on, as the map was scaled.
 /// `None` for fewer than two participants, or if fewer than 95 % of the resamples give a map.
 pub fn resampled(
     participants: &[Dissimilarities],
-    map: &Map,
+    (map, scale): (&Map, Scale),
     properties: &[Vec<f64>],
     random: &mut impl RandomSource,
 ) -> Option<Resampled> {
@@ -157,15 +162,14 @@ pub fn resampled(
     if n < 2 {
         return None;
     }
-    let unit = Dissimilarities::mean(participants.iter())?;
-    let start = smacof_from(map, &unit, Scale::Ordinal, Precision::COARSE)?.map;
+    let unit = Dissimilarities::in_common(participants.iter())?;
+    let start = smacof_from(map, &unit, scale, Precision::COARSE)?.map;
     let to_units = size(map) / size(&start);
     let mut maps = Vec::with_capacity(RESAMPLES);
     for _ in 0..RESAMPLES {
         let drawn: Vec<usize> = (0..n).map(|_| random.below(n as u64) as usize).collect();
-        let mean = Dissimilarities::mean(drawn.iter().map(|at| &participants[*at]));
-        let found =
-            mean.and_then(|mean| smacof_from(&start, &mean, Scale::Ordinal, Precision::COARSE));
+        let mean = Dissimilarities::in_common(drawn.iter().map(|at| &participants[*at]));
+        let found = mean.and_then(|mean| smacof_from(&start, &mean, scale, Precision::COARSE));
         let turned = found.and_then(|found| turned(&found.map.scaled(to_units), map));
         maps.extend(turned);
     }
@@ -174,24 +178,32 @@ pub fn resampled(
     }
     let error = |object: usize, k: usize| {
         let own: Vec<f64> = maps.iter().map(|map| map.point(object)[k]).collect();
-        describe::sd(&own)
+        Some(as_of_mean(n) * describe::sd(&own)?)
     };
     let errors: Option<Vec<Vec<f64>>> = (0..map.objects())
         .map(|object| (0..map.dimensions()).map(|k| error(object, k)).collect())
         .collect();
     let r: Option<Vec<f64>> = maps.iter().map(|map| procrustes(map, properties)).collect();
-    let r_ci95 = r.and_then(|r| {
-        let sorted = describe::sorted(&r);
-        Some((
-            describe::quantile(&sorted, 0.025)?,
-            describe::quantile(&sorted, 0.975)?,
-        ))
-    });
+    let r_ci95 = r.and_then(|r| around(procrustes(map, properties)?, &r, n));
     Some(Resampled {
         errors: errors?,
         r_ci95,
         resamples: maps.len(),
     })
+}
+
+/// By how much the mean of n varies more than those of its resamples.
+fn as_of_mean(n: usize) -> f64 {
+    (n as f64 / (n as f64 - 1.0)).sqrt()
+}
+
+/// The interval of a correlation of n participants that is at least 0, by its resamples.
+pub(super) fn around(r: f64, resamples: &[f64], n: usize) -> Option<(f64, f64)> {
+    let z = |r: f64| r.min(LARGEST).atanh();
+    let all: Vec<f64> = resamples.iter().map(|r| z(*r)).collect();
+    let half = t_quantile(0.975, n as f64 - 1.0)? * as_of_mean(n) * describe::sd(&all)?;
+    let [low, high] = [z(r) - half, z(r) + half].map(f64::tanh);
+    Some((low.max(0.0).min(r), high.max(r)))
 }
 
 /// The square root of the sum of all squares.

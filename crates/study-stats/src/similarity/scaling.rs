@@ -182,6 +182,9 @@ pub enum Scale {
     Ordinal,
 }
 
+/// Less stress is none: majorization ends before it has vanished.
+const NONE: f64 = 1e-5;
+
 /// A map with little stress.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scaled {
@@ -455,7 +458,11 @@ impl Problem {
         let map = Map::new(self.dimensions, x).principal();
         Some(Scaled {
             map: map.in_units_of(all)?,
-            stress: stress.max(0.0).sqrt(),
+            stress: if stress > NONE * NONE {
+                stress.sqrt()
+            } else {
+                0.0
+            },
         })
     }
 }

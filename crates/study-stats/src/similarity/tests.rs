@@ -1,5 +1,5 @@
 use super::dimensions::{chosen, complete, most, predicted, structure};
-use super::fit::{followed, procrustes, resampled};
+use super::fit::{around, followed, procrustes, resampled};
 use super::scaling::{Map, Precision, Scale, classical, smacof, smacof_from};
 use super::*;
 use crate::random::SplitMix64;
@@ -100,6 +100,24 @@ fn ordinal_stress_agrees_with_vegan() {
         let found = fine(&ekman(), k, Scale::Ordinal, starts);
         assert!(found < stress + tolerance, "{k}: {found}");
         assert!(found > stress - 20.0 * tolerance, "{k}: {found}");
+    }
+}
+
+/// Rothkopf (1957), J. Exp. Psychol. 53: how often two of 36 Morse codes were called the same. `cmdscale` and `vegan::monoMDS`, in the same
+/// file; `MASS::isoMDS` stops at a stress of 0.1969.
+#[test]
+fn the_morse_codes_of_rothkopf_agree_with_r() {
+    let same: Vec<f64> = include_str!("../../tests/reference/morse.txt")
+        .split_whitespace()
+        .map(|percent| percent.parse().unwrap())
+        .collect();
+    assert_eq!(same.len(), 36 * 36);
+    let apart = |a: usize, b: usize| 1.0 - (same[36 * a + b] + same[36 * b + a]) / 200.0;
+    let morse = Dissimilarities::from_fn(36, |a, b| Some(apart(a, b)));
+    let share = classical(&morse, 2).unwrap().share;
+    close(share, 0.276_551_254_981, 1e-11);
+    for (k, stress) in [(2, 0.190_624_164_6), (3, 0.129_443_511_9)] {
+        close(fine(&morse, k, Scale::Ordinal, 0), stress, 1e-6);
     }
 }
 
@@ -243,6 +261,12 @@ fn agreement_agrees_with_r() {
     let found = agreement(&some);
     assert_eq!(found.complete, 3);
     assert!(found.mean_correlation.is_some());
+    // A pair that nobody rates is missing to nobody.
+    let mut fewer = people.to_vec();
+    fewer.iter_mut().for_each(|own| own.values[3] = None);
+    let found = agreement(&fewer);
+    assert_eq!(found.complete, 4);
+    assert!(found.kendall_w.is_some());
     let alone = agreement(&people[..1]);
     assert_eq!((alone.mean_correlation, alone.kendall_w), (None, None));
 }
@@ -258,6 +282,35 @@ fn rescaled_dissimilarities_have_the_mean_one() {
     let other = of(3, [Some(2.0), Some(3.0), None]);
     let mean = Dissimilarities::mean([own, other].iter()).unwrap();
     assert_eq!(mean.values(), [Some(1.0), Some(3.0), Some(4.0)]);
+}
+
+/// Who rated only some pairs does not count more, nor less: base R, in the same file.
+#[test]
+fn what_participants_have_in_common_does_not_depend_on_who_rated_what() {
+    let mut people = PEOPLE.map(|own| of(5, own.map(Some)));
+    let whole = Dissimilarities::in_common(people.iter());
+    assert_eq!(whole, Dissimilarities::mean(people.iter()));
+    people[0].values[7..].fill(None);
+    people[1].values[..2].fill(None);
+    let people = people.map(|own| own.rescaled().unwrap());
+    let found = Dissimilarities::in_common(people.iter()).unwrap();
+    let expected = [
+        0.224_902_061_504,
+        0.433_863_937_097,
+        1.0,
+        1.238_223_257_832,
+        0.330_713_686_815,
+        0.875_606_810_850,
+        1.196_286_971_907,
+        0.624_343_866_471,
+        1.010_177_657_294,
+        0.502_526_677_079,
+    ];
+    let found = found.known();
+    for (own, expected) in found.iter().zip(expected) {
+        close(own / found[2], expected, 1e-10);
+    }
+    assert_eq!(Dissimilarities::in_common([].iter()), None);
 }
 
 /// All 2⁹ choices of signs, in the same file; four standard errors of the drawn ones.
@@ -330,6 +383,19 @@ fn structure_is_found_where_it_is() {
     );
 }
 
+/// Base R, in the same file. A correlation is at least 0, and its interval has it.
+#[test]
+fn the_interval_of_a_correlation_is_that_of_its_z() {
+    let (low, high) = around(0.8, &[0.78, 0.8, 0.82], 3).unwrap();
+    close(low, 0.666_751_686_363, 1e-9);
+    close(high, 0.883_687_401_802, 1e-9);
+    let (low, high) = around(0.8, &[0.7, 0.8, 0.9], 3).unwrap();
+    assert_eq!(low, 0.0);
+    close(high, 0.991_133_687_216, 1e-9);
+    assert_eq!(around(1.0, &[1.0, 1.0, 1.0], 3).unwrap().1, 1.0);
+    assert_eq!(around(0.8, &[0.7, 0.8], 1), None);
+}
+
 #[test]
 fn participants_are_resampled() {
     let people = simulated(7, 2, 10, 8);
@@ -338,14 +404,17 @@ fn participants_are_resampled() {
     let map = smacof(&mean, 2, Scale::Ordinal, 10, Precision::FINE, random).unwrap();
     let property: Vec<f64> = (0..7).map(|object| map.map.point(object)[0]).collect();
     let r = procrustes(&map.map, std::slice::from_ref(&property)).unwrap();
-    let found = resampled(&people, &map.map, &[property], random).unwrap();
+    let found = resampled(&people, (&map.map, Scale::Ordinal), &[property], random).unwrap();
     let (low, high) = found.r_ci95.unwrap();
     assert!(low < r && r < high + 0.02 && low > 0.5, "{low} {r} {high}");
     // The errors of means of ten ratings with the noise 0.8.
     let errors: Vec<f64> = found.errors.concat();
     assert!(errors.iter().all(|e| (0.02..0.9).contains(e)), "{errors:?}");
-    assert_eq!(resampled(&people[..1], &map.map, &[], random), None);
-    let without = resampled(&people, &map.map, &[], random).unwrap();
+    assert_eq!(
+        resampled(&people[..1], (&map.map, Scale::Ordinal), &[], random),
+        None
+    );
+    let without = resampled(&people, (&map.map, Scale::Ratio), &[], random).unwrap();
     assert_eq!(without.r_ci95, None);
 }
 
@@ -363,8 +432,8 @@ fn maps_are_on_principal_axes() {
     assert!(found.point(3)[0] > 0.0);
 }
 
-/// How often there is said to be a structure, and a second dimension, and how often the number of dimensions is found. The table is in
-/// docs/calibration.md (`--ignored --nocapture`).
+/// How often there is said to be a structure, and a second dimension, and how often the number of dimensions is found: participants ×
+/// objects, dimensions, structure, second dimension, number (`--ignored --nocapture`).
 #[test]
 #[ignore = "minutes without optimization"]
 fn tests_keep_their_level() {

@@ -1,6 +1,6 @@
 # Reference values of crates/study-stats/src/similarity/tests.rs: Rscript similarity.R (R 4.2.2, vegan 2.6-4).
 # Ekman (1954), "Dimensions of color vision", J. Psychol. 38: similarities of 14 colors, as in Shepard (1980), Science 210.
-# With the package's files ekman.rda and morse.rda of smacof in the working folder they are compared with those.
+# With the package's file ekman.rda of smacof in the working folder they are compared with those.
 suppressMessages(library(vegan))
 options(digits = 12)
 
@@ -54,10 +54,14 @@ ordinal <- function(d, k) {
 }
 for (k in 1:3) show(paste("ordinal ekman, stress", k), ordinal(ekman, k))
 show("ordinal eurodist, stress 2", ordinal(eurodist, 2))
-if (file.exists("morse.rda")) {
-  e <- new.env(); load("morse.rda", e)
-  show("ordinal morse, stress 2", ordinal(e$morse, 2))
-}
+# Rothkopf (1957), "A measure of stimulus similarity and errors in some paired-associate learning", J. Exp. Psychol. 53: of 36
+# Morse codes (a to z, 1 to 9, 0) how often, in %, two were called the same, by the one that came first (rows).
+same <- as.matrix(read.table("morse.txt"))
+morse <- as.dist(1 - (same + t(same)) / 200)
+eigenvalues <- cmdscale(morse, k = 2, eig = TRUE)$eig
+show("classical morse, share 2", sum(eigenvalues[1:2]) / sum(abs(eigenvalues)))
+for (k in 2:3) show(paste("ordinal morse, stress", k), ordinal(morse, k))
+show("isoMDS of MASS, from the classical map", MASS::isoMDS(morse, maxit = 1000, tol = 1e-8, trace = FALSE)$stress / 100)
 
 # Procrustes' correlation of the classical map of the colors with wavelength, and with two properties.
 wavelength <- c(434, 445, 465, 472, 490, 504, 537, 555, 584, 600, 610, 628, 651, 674)
@@ -89,6 +93,30 @@ ranks <- t(apply(people, 1, rank))
 m <- nrow(ranks); n <- ncol(ranks)
 ties <- sum(apply(people, 1, function(x) { t <- table(x); sum(t^3 - t) }))
 show("Kendall's W", (12 * sum((colSums(ranks) - m * (n + 1) / 2)^2)) / (m^2 * (n^3 - n) - m * ties))
+
+# What they have in common, if one did not rate the last three pairs and another not the first two.
+some <- people
+some[1, 8:10] <- NA
+some[2, 1:2] <- NA
+in_common <- function(x) {
+  factors <- rep(1, nrow(x))
+  for (round in 1:1000) {
+    common <- colMeans(x / factors, na.rm = TRUE)
+    factors <- rowSums(x, na.rm = TRUE) / rowSums(sweep(!is.na(x), 2, common, "*"))
+  }
+  colMeans(x / factors, na.rm = TRUE)
+}
+common <- in_common(some / rowMeans(some, na.rm = TRUE))
+show("in common, by the third pair", common / common[3])
+
+# The interval of a correlation of .8 by three resamples of three participants.
+interval <- function(r, resamples) {
+  n <- 3
+  half <- qt(.975, n - 1) * sqrt(n / (n - 1)) * sd(atanh(resamples))
+  tanh(atanh(r) + c(-half, half))
+}
+show("interval, resamples .78 to .82", interval(.8, c(.78, .8, .82)))
+show("interval, resamples .7 to .9", interval(.8, c(.7, .8, .9)))
 
 # Asymmetry: three participants and three pairs, all 2^9 choices of signs.
 differences <- rbind(c(4, 1, -1), c(3, -2, 2), c(5, 0, 1))

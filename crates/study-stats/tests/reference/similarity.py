@@ -2,7 +2,8 @@
 (Python 3.11, scikit-learn 1.9.1, SciPy 1.17.1). The data are in similarity.R.
 
 python3 similarity.py golden > tests/golden/psychophysics/similarity_sim.json writes the reference file of the
-analysis: simulated ratings, and what NumPy and scikit-learn compute of them."""
+analysis: simulated ratings, and what NumPy and SciPy compute of them. python3 similarity.py coverage simulates the
+intervals of the correlation with properties, and people who rate different pairs."""
 
 import itertools
 import json
@@ -12,7 +13,6 @@ import sys
 
 import numpy as np
 from scipy.optimize import minimize
-from sklearn.manifold import MDS
 
 text = (pathlib.Path(__file__).parent / "similarity.R").read_text()
 numbers = text[text.index("similarity <- c(") : text.index("half <-")]
@@ -32,12 +32,14 @@ def stress1(x, weight, a=a, b=b, delta=delta):
 
 
 def sklearn(k, full=full):
+    from sklearn.manifold import MDS
+
     fit = MDS(k, n_init=100, max_iter=20_000, eps=1e-14, random_state=1, metric="precomputed",
               metric_mds=True, init="random", normalized_stress=False)
     return fit.fit_transform(full)
 
 
-def minimized(k, weight, starts=100):
+def minimized(k, weight, starts=100, a=a, b=b, delta=delta, n=n):
     """Weighted raw stress by BFGS, with missing pairs of weight 0."""
     random = np.random.default_rng(1)
 
@@ -59,6 +61,15 @@ def minimized(k, weight, starts=100):
         if best is None or found.fun < best.fun:
             best = found
     return best.x.reshape(n, k)
+
+
+def in_common(unit):
+    """Means of the pairs after each person's were divided by a factor, so that it does not matter who rated what."""
+    factors, known = np.ones(len(unit)), ~np.isnan(unit)
+    for _ in range(1000):
+        mean = np.nanmean(unit / factors[:, None], axis=0)
+        factors = np.nansum(unit, axis=1) / (known * mean).sum(axis=1)
+    return np.nanmean(unit / factors[:, None], axis=0)
 
 
 def golden():
@@ -88,8 +99,9 @@ def golden():
     both = (one + other) / 2
     own_mean = np.nanmean(both, axis=1)
     unit = both / own_mean[:, None]
-    points = own_mean.mean()
-    mean = np.nanmean(unit, axis=0)
+    mean = in_common(unit)
+    # What 1 of them is on the scale.
+    points = (np.nansum(both, axis=1) / (~np.isnan(both) * mean).sum(axis=1)).mean()
     expected = {}
 
     def put(key, value, tolerance=1e-9, source=("own numpy",)):
@@ -99,7 +111,7 @@ def golden():
     different = [r for r in rows if r[1] != r[2]]
     same = [r for r in rows if r[1] == r[2]]
     put("n", len(different))
-    put("mean", points)
+    put("mean", own_mean.mean())
     put("n_participants", len(people))
     known = ~np.isnan(unit)
     correlations = []
@@ -120,7 +132,7 @@ def golden():
     own = np.array([np.mean([r[3] for r in same if r[0] == who]) for who in people])
     put("identical/n", len(same))
     put("identical/mean", own.mean())
-    put("identical/share", own.mean() / points)
+    put("identical/share", own.mean() / own_mean.mean())
     put("identical/n_not_below", (own >= own_mean).sum())
     far = np.zeros((6, 6))
     for (i, j), value in zip(pairs, mean):
@@ -130,8 +142,9 @@ def golden():
     a, b = np.array(pairs).T
     for k in (1, 2):
         put(f"dimensions/{k}/classical", values[:k].clip(0).sum() / np.abs(values).sum())
-    stress = stress1(sklearn(2, far), np.ones(len(a)), a, b, mean)
-    put("dimensions/2/ratio_stress", stress, 1e-6, ("scikit-learn 1.9.1",))
+    one = np.ones(len(a))
+    stress = stress1(minimized(2, one, 100, a, b, mean, 6), one, a, b, mean)
+    put("dimensions/2/ratio_stress", stress, 1e-6, ("SciPy 1.17.1",))
     for at, (i, j) in enumerate(pairs):
         mine = both[~np.isnan(both[:, at]), at]
         id = f"pair/{names[i]}|{names[j]}/"
@@ -140,7 +153,7 @@ def golden():
         put(id + "sd", mine.std(ddof=1))
         put(id + "rescaled", mean[at] * points)
     for at, who in enumerate(people):
-        rest = np.nanmean(np.delete(unit, at, axis=0), axis=0)
+        rest = in_common(np.delete(unit, at, axis=0))
         put(f"participant/{who}/n", sum(r[0] == who for r in different))
         put(f"participant/{who}/mean", own_mean[at])
         put(f"participant/{who}/identical", own[at])
@@ -156,8 +169,78 @@ def golden():
     print(json.dumps(document, indent=1))
 
 
+def coverage(objects=7, studies=150, resamples=200):
+    """How often intervals of Procrustes' r have that of endlessly many people: ratio scaling of points of a plane."""
+    from scipy.stats import t
+
+    random = np.random.default_rng(3)
+    a, b = np.triu_indices(objects, 1)
+    at = np.arange(objects)
+
+    def scaled(all, start, rounds):
+        """SMACOF of many at once, from a map on."""
+        full = np.zeros((len(all), objects, objects))
+        full[:, a, b] = full[:, b, a] = all
+        x = np.repeat(start[None], len(all), 0)
+        for _ in range(rounds):
+            far = np.sqrt(((x[:, :, None] - x[:, None]) ** 2).sum(-1))
+            far[:, at, at] = 1
+            turned = -full / far
+            turned[:, at, at] = -turned.sum(2)
+            x = turned @ x / objects
+        return x
+
+    def classical(values):
+        full = np.zeros((objects, objects))
+        full[a, b] = full[b, a] = values
+        center = np.eye(objects) - 1 / objects
+        values, vectors = np.linalg.eigh(-0.5 * center @ full**2 @ center)
+        return vectors[:, -2:] * np.sqrt(np.maximum(values[-2:], 0))
+
+    def r(x, y):
+        x = x - x.mean(-2, keepdims=True)
+        y = (y - y.mean()) / np.linalg.norm(y - y.mean())
+        return np.linalg.norm(np.einsum("...ok,o->...k", x, y), axis=-1) / np.sqrt((x**2).sum((-1, -2)))
+
+    def rated(base, people, noise):
+        all = np.maximum(base + noise * random.normal(size=(people, len(a))), 0)
+        return all / all.mean(axis=1, keepdims=True)
+
+    def map_of(mean):
+        return scaled(mean[None], classical(mean), 200)[0]
+
+    for people, noise, other in [(6, .6, .5), (12, .6, .5), (12, 1.5, .5), (30, .6, .5), (6, .6, .02), (12, .6, 3)]:
+        held = np.zeros(2)
+        for _ in range(studies):
+            places = random.normal(size=(objects, 2)) * [1.5, 1]
+            y = places[:, 0] + other * random.normal(size=objects)
+            base = np.linalg.norm(places[a] - places[b], axis=1)
+            own = rated(base, people, noise)
+            truth = r(map_of(rated(base, 3000, noise).mean(axis=0)), y)
+            start = map_of(own.mean(axis=0))
+            drawn = random.integers(0, people, (resamples, people))
+            all = r(scaled(own[drawn].mean(axis=1), start, 25), y)
+            low, high = np.quantile(all, [.025, .975])
+            z = np.arctanh(np.minimum(all, .9999))
+            half = t.ppf(.975, people - 1) * z.std(ddof=1) * np.sqrt(people / (people - 1))
+            middle = np.arctanh(min(r(start, y), .9999))
+            held += [low <= truth <= high, np.tanh(middle - half) <= truth <= np.tanh(middle + half)]
+        print(people, "people, noise", noise, "percentiles, z and t:", held / studies)
+    # Near pairs by half of the people, far ones by the others: the ratios of distances on a line.
+    a, b = np.triu_indices(6, 1)
+    far = (b - a).astype(float)
+    own = np.maximum(20 * np.exp(.3 * random.normal(size=(12, 1))) * far + 2 * random.normal(size=(12, 15)), 0)
+    own[:6, far > 2], own[6:, far < 2] = np.nan, np.nan
+    unit = own / np.nanmean(own, axis=1, keepdims=True)
+    for name, mean in [("by own means", np.nanmean(unit, axis=0)), ("in common", in_common(unit))]:
+        print(name, [round(float(mean[far == k].mean() / mean[far == 1].mean()), 2) for k in range(1, 6)])
+
+
 if sys.argv[1:] == ["golden"]:
     golden()
+    sys.exit()
+if sys.argv[1:] == ["coverage"]:
+    coverage()
     sys.exit()
 
 everything = np.ones(len(a))

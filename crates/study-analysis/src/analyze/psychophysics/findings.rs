@@ -1,10 +1,15 @@
 //! The findings of a part that is no rating.
 
+mod rankings;
+
+pub(super) use rankings::of_rankings;
+
+use super::abilities::AbilityDifference;
 use super::adjustment::Adjusted;
 use super::again::Again;
 use super::identification::Identified;
 use super::over_participants::{ConditionModel, Contrast, FTest, GroupSensitivity};
-use super::preferences::{AbilityDifference, Preferences};
+use super::preferences::Preferences;
 use super::similarity::{MapFit, Similarities};
 use crate::analyze::design::Design;
 use crate::analyze::findings::{Direction, Estimate, Finding, Pair, Test, TestKind, Verdict};
@@ -40,6 +45,10 @@ pub enum PartQuestion {
     Dimensions,
     /// Does the map follow these properties of the realizations?
     MapFollows(String),
+    /// Do participants rank realizations alike?
+    RankedAlike,
+    /// Is the realization with the highest worth above each other one?
+    RankedFirst,
     /// Do settings differ from the standard?
     Adjusted,
     /// Do settings depend on the side from which they start?
@@ -67,6 +76,8 @@ impl PartQuestion {
             Self::Structure => "structure".to_owned(),
             Self::Dimensions => "dimensions".to_owned(),
             Self::MapFollows(of) => group_id("map-follows", &[of]),
+            Self::RankedAlike => "ranked-alike".to_owned(),
+            Self::RankedFirst => "ranked-first".to_owned(),
             Self::Adjusted => "adjusted".to_owned(),
             Self::Starts => "starts".to_owned(),
             Self::Groups => "groups".to_owned(),
@@ -113,14 +124,32 @@ pub(super) fn of_preferences(
     facts: &PartFacts,
     preferences: &Preferences,
 ) -> (Vec<PartFinding>, Vec<Pair>) {
-    let kind = match facts.participants {
-        0 | 1 => TestKind::Wald,
-        _ => TestKind::ClusteredT,
-    };
-    let comparisons = preferences.pairs.len();
+    let pairs = of_abilities(facts, preferences.pairs.iter());
+    let mut found = vec![preferred(facts, preferences, &pairs)];
+    if let Some(vaf) = &preferences.vaf {
+        found.push(with_vaf(facts, PartQuestion::PreferenceVaf, vaf));
+    }
+    found.extend(interval_order(facts, preferences));
+    (found, pairs)
+}
+
+/// How differences of abilities are tested.
+fn test_of_abilities(facts: &PartFacts) -> (TestKind, &'static str) {
+    match facts.participants {
+        0 | 1 => (TestKind::Wald, "z"),
+        _ => (TestKind::ClusteredT, "t"),
+    }
+}
+
+/// The differences of abilities as comparisons, with Holm's correction.
+fn of_abilities<'a>(
+    facts: &PartFacts,
+    differences: impl ExactSizeIterator<Item = (&'a PairName, &'a AbilityDifference)>,
+) -> Vec<Pair> {
+    let (kind, symbol) = test_of_abilities(facts);
+    let comparisons = differences.len();
     let of_pair = |(name, pair): (&PairName, &AbilityDifference)| {
         let difference = pair.difference.number()?;
-        let symbol = if kind == TestKind::Wald { "z" } else { "t" };
         let df: Vec<Option<f64>> = pair.statistic_df.iter().map(Number::number).collect();
         let test = pair.p_holm.number().map(|p| Test {
             comparisons,
@@ -129,13 +158,7 @@ pub(super) fn of_preferences(
         let estimate = estimate("difference", difference, &pair.ci95);
         Some(compared(facts, name, estimate, test, &pair.p))
     };
-    let pairs: Vec<Pair> = preferences.pairs.iter().filter_map(of_pair).collect();
-    let mut found = vec![preferred(facts, preferences, &pairs)];
-    if let Some(vaf) = &preferences.vaf {
-        found.push(with_vaf(facts, PartQuestion::PreferenceVaf, vaf));
-    }
-    found.extend(interval_order(facts, preferences));
-    (found, pairs)
+    differences.filter_map(of_pair).collect()
 }
 
 fn estimate(name: &'static str, value: f64, ci95: &Interval) -> Estimate {

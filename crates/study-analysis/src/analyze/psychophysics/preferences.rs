@@ -1,5 +1,6 @@
 //! Paired preferences: `pairs/…`.
 
+use super::abilities::{AbilityDifference, Judge, differences, interval_of};
 use crate::analyze::record::{
     Declared, Field, Interval, Key, List, PairName, ParticipantName, RealizationName, Stat, Why,
     join, statistics,
@@ -7,10 +8,8 @@ use crate::analyze::record::{
 use crate::analyze::results::Correlation;
 use crate::analyze::values::Values;
 use std::collections::{BTreeMap, BTreeSet};
-use study_stats::distribution::{normal_quantile, normal_upper, t_quantile, t_two_sided};
-use study_stats::paired::holm;
 use study_stats::pairs::{
-    Abilities, Comparison, Difference, Link, Model, NoAbilities, abilities, circular_triads,
+    Abilities, Comparison, Link, Model, NoAbilities, abilities, circular_triads,
 };
 
 statistics! {
@@ -46,28 +45,6 @@ statistics! {
         tie_log_nu: Stat,
         /// its standard error
         tie_log_nu_se: Stat,
-    }
-
-    /// The difference of two abilities.
-    pub struct AbilityDifference {
-        /// that of the first less that of the second
-        difference: Stat,
-        /// standard error
-        se: Stat,
-        /// by the error over participants, from two participants on
-        ci95: Interval,
-        /// 1/(1 + e^(−difference)): the share of comparisons that the first would win
-        preferred: Stat,
-        /// standard error by the sandwich over participants, without a factor for small samples
-        se_clustered: Option<Stat>,
-        /// t over participants: `difference` over √(n/(n−1)) · `se_clustered`, which is at least half of `se`, with n = (Σ h)²/Σ h² participants, h the information of each about the difference; z = `difference`/`se` with one participant
-        statistic: Stat as "t",
-        /// n less 1, at least 1; none with one participant
-        statistic_df: Option<Stat> as "t_df",
-        /// of `t`
-        p: Stat,
-        /// with Holm's correction
-        p_holm: Stat,
     }
 
     /// How consistent a participant is, by what was preferred more often of each pair.
@@ -134,58 +111,6 @@ impl<K: Key, R: Field> Field for Columns<K, R> {
             }
         }
         all.append(&mut own);
-    }
-}
-
-/// The least share of the variance of independent answers that an error over participants may have:
-/// so few participants who answer alike by chance do not show that everybody does.
-const LEAST_SHARE: f64 = 0.25;
-
-/// How an estimate is judged: by participants, of whom each counts once.
-#[derive(Debug, Clone, Copy)]
-struct Judge {
-    /// On how many participants it rests; `None` with one.
-    participants: Option<f64>,
-}
-
-impl Judge {
-    /// An estimate that rests on this many of some participants.
-    fn of(all: usize, participants: f64) -> Self {
-        Self {
-            participants: (all > 1).then_some(participants),
-        }
-    }
-
-    /// Degrees of freedom of t, at least 1.
-    fn df(self) -> Option<f64> {
-        self.participants.map(|n| (n - 1.0).max(1.0))
-    }
-
-    /// The standard error: with n participants √(n/(n − 1)) times the sandwich, but at most √2 times, and at
-    /// least a share of that of independent answers; with one that of independent answers.
-    fn se(self, independent: f64, clustered: Option<f64>) -> f64 {
-        let corrected = self.participants.zip(clustered);
-        let corrected = corrected.map(|(n, se)| se * (n / (n - 1.0).max(0.5 * n)).sqrt());
-        corrected.map_or(independent, |se| se.max(LEAST_SHARE.sqrt() * independent))
-    }
-
-    /// Two-sided p of an estimate: t over participants, z with one.
-    fn p(self, estimate: f64, se: f64) -> Option<f64> {
-        let t = estimate / se;
-        match self.df() {
-            None => Some(2.0 * normal_upper(t.abs())),
-            Some(df) => t_two_sided(t, df),
-        }
-    }
-
-    /// Its 95 % interval.
-    fn interval(self, estimate: f64, se: f64) -> Option<(f64, f64)> {
-        let quantile = match self.df() {
-            None => normal_quantile(0.975),
-            Some(df) => t_quantile(0.975, df),
-        };
-        let half = quantile? * se;
-        Some((estimate - half, estimate + half))
     }
 }
 
@@ -265,10 +190,7 @@ pub fn preferences(rows: &[Preference], ties: bool, order: bool) -> Preferences 
     let judge = |participants: f64| Judge::of(people.len(), participants);
     let stat = |x: Option<f64>| Stat::or(x, why.clone());
     let ability = |(i, item): (usize, &&str)| {
-        let interval = found.and_then(|f| {
-            let judge = judge(f.participants_of(i));
-            judge.interval(f.abilities[i], judge.se(f.ses[i], f.clustered_se(i)))
-        });
+        let interval = found.and_then(|f| interval_of(f, i, people.len()));
         let ability = Ability {
             ability: stat(found.map(|f| f.abilities[i])),
             ability_se: stat(found.map(|f| f.ses[i])),
@@ -308,37 +230,6 @@ pub fn preferences(rows: &[Preference], ties: bool, order: bool) -> Preferences 
     });
     let tied = || Stat::of(comparisons.iter().map(|c| c.tied).sum());
     let ranks = |f: &Abilities| List::of(f.ranks().into_iter().map(|r| r as f64).collect());
-    let pairs: Vec<(usize, usize)> = (0..items.len())
-        .flat_map(|a| (a + 1..items.len()).map(move |b| (a, b)))
-        .collect();
-    let differences: Vec<_> = (pairs.iter())
-        .map(|(a, b)| found.map(|f| f.difference(*a, *b)))
-        .collect();
-    let se = |d: &Difference| judge(d.participants).se(d.effect.se, d.clustered.map(|e| e.se));
-    let p: Vec<Option<f64>> = (differences.iter())
-        .map(|d| (d.as_ref()).and_then(|d| judge(d.participants).p(d.effect.estimate, se(d))))
-        .collect();
-    let p_holm = holm(&p);
-    let of_pair = |(k, (a, b)): (usize, &(usize, usize))| {
-        let difference = differences[k].as_ref();
-        let deciding = difference.map(|d| (d.effect.estimate, se(d)));
-        let interval =
-            difference.and_then(|d| judge(d.participants).interval(d.effect.estimate, se(d)));
-        let clustered = difference.and_then(|d| d.clustered);
-        let found = AbilityDifference {
-            difference: stat(difference.map(|d| d.effect.estimate)),
-            se: stat(difference.map(|d| d.effect.se)),
-            ci95: Interval::or(interval, why.clone()),
-            statistic: stat(deciding.map(|(d, se)| d / se)),
-            statistic_df: (people.len() > 1)
-                .then(|| stat(difference.and_then(|d| judge(d.participants).df()))),
-            preferred: stat(difference.map(|d| d.preferred)),
-            se_clustered: (people.len() > 1).then(|| stat(clustered.map(|e| e.se))),
-            p: stat(p[k]),
-            p_holm: stat(p_holm[k]),
-        };
-        (PairName::of(items[*a], items[*b]), found)
-    };
     Preferences {
         items: Columns(items.iter().enumerate().map(ability).collect()),
         order,
@@ -347,7 +238,7 @@ pub fn preferences(rows: &[Preference], ties: bool, order: bool) -> Preferences 
         deviance: stat(found.map(|f| f.deviance)),
         df: stat(found.map(|f| f.df as f64)),
         rank: found.map(ranks),
-        pairs: pairs.iter().enumerate().map(of_pair).collect(),
+        pairs: differences(&items, found, people.len(), &why),
         triads: match items.len() {
             0..=2 => BTreeMap::new(),
             _ => triads(&items, &people, &comparisons),
@@ -388,7 +279,7 @@ fn triads(
 }
 
 /// The reason with the names of the items.
-fn reason(error: &NoAbilities, items: &[&str]) -> String {
+pub(super) fn reason(error: &NoAbilities, items: &[&str]) -> String {
     let names = |group: &Vec<usize>| {
         let names: Vec<&str> = group.iter().map(|i| items[*i]).collect();
         format!("{{{}}}", names.join(", "))
@@ -412,6 +303,7 @@ fn reason(error: &NoAbilities, items: &[&str]) -> String {
         NoAbilities::NoPairs
         | NoAbilities::OneOrder
         | NoAbilities::AllTied
+        | NoAbilities::TooManySets
         | NoAbilities::NotFound => error.to_string(),
     }
 }

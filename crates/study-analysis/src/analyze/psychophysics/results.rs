@@ -1,5 +1,6 @@
 //! The statistics of a part as records.
 
+pub use super::abilities::AbilityDifference;
 pub use super::adjustment::{Adjusted, ConstantError, OwnSettings, SettingSpread, SidesOfStart};
 pub use super::again::{Again, Groups, Profiles, Retest};
 pub use super::detection::Sensitivity;
@@ -15,7 +16,10 @@ pub use super::over_participants::{
     AboveChance, Center, ConditionModel, Contrast, FTest, GroupSensitivity, Sample,
 };
 pub use super::population::{Convergence, Pooled, PooledContrast, PopulationModel};
-pub use super::preferences::{Ability, AbilityDifference, OrderEffect, Preferences, Ties, Triads};
+pub use super::preferences::{Ability, OrderEffect, Preferences, Ties, Triads};
+pub use super::ranking::{
+    BestRank, OwnRanking, RankAgreement, RankTie, RankedItem, RankedPair, Rankings,
+};
 pub use super::scales::{
     GeometricMean, Magnitudes, MeanExponent, Mushra, OwnExponent, PowerLaw, Rated, Screened,
 };
@@ -30,7 +34,7 @@ pub use super::tracks::{
 };
 pub use crate::analyze::keys::{
     At, CellName, ConditionName, ConfusionName, DimensionsName, GroupName, ItemName, LabelName,
-    ParameterName, PropertyName,
+    ParameterName, PropertyName, TiedName,
 };
 use crate::analyze::record::{Interval, ParticipantName, RealizationName, Stat, statistics};
 use crate::analyze::results::Pearson;
@@ -89,6 +93,8 @@ statistics! {
         identification: Option<Identified>,
         /// how different realizations are
         similarity: Option<Similarities>,
+        /// ranks of realizations
+        ranking: Option<Rankings>,
         /// levels that were set
         adjustment: Option<Adjusted>,
         /// groups and sessions

@@ -1,5 +1,6 @@
 //! Similarity: `similarity/…`.
 
+mod maps;
 mod people;
 
 use crate::analyze::draws::Draws;
@@ -7,15 +8,13 @@ use crate::analyze::keys::{DimensionsName, PropertyName};
 use crate::analyze::record::{
     Interval, PairName, ParticipantName, RealizationName, Stat, Why, statistics,
 };
+use maps::{Maps, maps};
 use people::{Own, people};
 use std::collections::{BTreeMap, BTreeSet};
 use study_stats::describe::{mean, sd};
-use study_stats::paired::one_sample;
-use study_stats::similarity::dimensions::{
-    MOST_OBJECTS, chosen, complete, most, predicted, structure,
-};
+use study_stats::similarity::dimensions::MOST_OBJECTS;
 use study_stats::similarity::fit::{followed, resampled};
-use study_stats::similarity::scaling::{Map, Precision, Scale, classical, smacof};
+use study_stats::similarity::scaling::{Map, Scale};
 use study_stats::similarity::{
     Dissimilarities, agreement, asymmetry, pairs as pairs_of, with_the_others,
 };
@@ -115,7 +114,7 @@ statistics! {
         properties: Stat,
         /// correlation of map and properties after Procrustes' rotation
         r: Stat,
-        /// percentile interval over participants, by the bootstrap
+        /// interval over participants, by the bootstrap
         ci95: Interval,
         /// p over the orders of the realizations
         p: Stat,
@@ -133,7 +132,7 @@ statistics! {
         mean: Stat,
         /// standard deviation of their means
         sd: Stat,
-        /// mean after each participant's ratings were divided by their mean, in points of the scale: what is scaled
+        /// mean after the participants' ratings were brought to the same mean, in points of the scale: what is scaled
         rescaled: Stat,
         /// distance in the map
         distance: Stat,
@@ -173,6 +172,8 @@ statistics! {
         second: SecondDimension,
         /// dimensions of the map
         map_dimensions: Stat,
+        /// whether its distances are in proportion to the dissimilarities (1), because their order alone fits without stress, or in their order (0)
+        map_in_proportion: Stat,
         /// stress of the map
         map_stress: Stat,
         /// the map, by realization
@@ -202,10 +203,8 @@ pub struct SimilarityRow {
 /// A set of properties: of each the values by realization.
 pub type Properties = BTreeMap<String, Vec<BTreeMap<String, f64>>>;
 
-/// Random starts of a map that is reported.
-const STARTS: usize = 100;
-
 const NO_RATINGS: &str = "there are no ratings of two different realizations";
+const ALL_ALIKE: &str = "no two different realizations were rated as different";
 const ONE_PARTICIPANT: &str = "there is one participant";
 const FEW: &str = "there are fewer than four realizations";
 const MANY: &str = "there are more than 30 realizations";
@@ -228,18 +227,22 @@ pub fn similarity(
         .collect();
     let all: Vec<Dissimilarities> = known.iter().map(|k| k.1.clone()).collect();
     let means: Vec<f64> = people.values().filter_map(Own::mean).collect();
-    let points = mean(&means);
+    let unit = Dissimilarities::in_common(all.iter());
+    let points = unit.as_ref().and_then(|unit| points_of(&people, unit));
+    let none = match means.is_empty() {
+        true => NO_RATINGS,
+        false => ALL_ALIKE,
+    };
     let few: Option<Why> = match names.len() {
-        _ if all.is_empty() => Some(NO_RATINGS.into()),
+        _ if all.is_empty() => Some(none.into()),
         0..4 => Some(FEW.into()),
         n if n > MOST_OBJECTS => Some(MANY.into()),
         _ => None,
     };
-    let scaled = match (&few, points, Dissimilarities::mean(all.iter())) {
-        (None, Some(points), Some(unit)) => maps(&all, &unit, points, &draws),
+    let scaled = match (&few, points, &unit) {
+        (None, Some(points), Some(unit)) => maps(&all, unit, points, &draws),
         _ => Maps::none(few.clone().unwrap_or_else(|| NO_MAP.into())),
     };
-    let unit = Dissimilarities::mean(all.iter());
     let others = with_the_others(&all);
     let with_others = |who: &&str| {
         let at = known.iter().position(|k| *k.0 == *who)?;
@@ -248,7 +251,7 @@ pub fn similarity(
     let participants = people.iter().map(|(who, own)| {
         let why = match all.len() {
             0 | 1 => "there are no other participants",
-            _ => "all ratings are equal",
+            _ => "all ratings are equal, or the others did not rate two of these pairs",
         };
         let identical: Vec<f64> = own.identical.values().flatten().copied().collect();
         let record = OwnDifferences {
@@ -261,9 +264,9 @@ pub fn similarity(
     });
     Similarities {
         n: Stat::count(people.values().map(|own| own.different().len()).sum()),
-        mean: Stat::or(points, NO_RATINGS),
+        mean: Stat::or(mean(&means), NO_RATINGS),
         n_participants: Stat::count(all.len()),
-        agreement: agreed(&all),
+        agreement: agreed(&all, none),
         order: order(&people, names.len(), &mut draws("order")),
         identical: identical(&people),
         follows: follows(&scaled, &all, properties, &names, &draws),
@@ -274,6 +277,10 @@ pub fn similarity(
             scaled.map.as_ref().map(|m| m.dimensions() as f64),
             scaled.why(),
         ),
+        map_in_proportion: match &scaled.map {
+            Some(_) => Stat::flag(scaled.scale == Scale::Ratio),
+            None => Stat::missing(scaled.why()),
+        },
         map_stress: Stat::or(scaled.stress, scaled.why()),
         structure: scaled.structure,
         dimensions: scaled.dimensions,
@@ -281,15 +288,29 @@ pub fn similarity(
     }
 }
 
-fn agreed(all: &[Dissimilarities]) -> Agreed {
+/// Mean over participants of the factor between what they rated and what all have in common, in points of the scale.
+fn points_of(people: &BTreeMap<&str, Own>, unit: &Dissimilarities) -> Option<f64> {
+    let factor = |own: &Own| {
+        let rated =
+            pairs_of(unit.objects()).filter_map(|(a, b)| Some([own.pair(a, b)?, unit.get(a, b)?]));
+        let [points, units] = rated.fold([0.0, 0.0], |sum, [x, y]| [sum[0] + x, sum[1] + y]);
+        Some(points / units).filter(|factor| factor.is_finite())
+    };
+    let factors: Vec<f64> = people.values().filter_map(factor).collect();
+    mean(&factors)
+}
+
+/// `none`: why nobody is there, if so.
+fn agreed(all: &[Dissimilarities], none: &'static str) -> Agreed {
     let found = agreement(all);
     let few: &'static str = match all.len() {
-        0 => NO_RATINGS,
+        0 => none,
         1 => ONE_PARTICIPANT,
         _ => "no two participants have ratings that can be correlated",
     };
     let complete = match found.complete {
         0 | 1 => "fewer than two participants rated every pair",
+        _ if all.iter().all(|own| own.known().len() < 2) => "one pair was rated",
         _ => "each participant's ratings are all equal",
     };
     Agreed {
@@ -328,120 +349,9 @@ fn identical(people: &BTreeMap<&str, Own>) -> Option<IdenticalPairs> {
     Some(IdenticalPairs {
         n: Stat::count(found.iter().map(|f| f.0).sum()),
         mean: Stat::of(all),
-        share: Stat::or(
-            share,
-            "no two different realizations were rated as different",
-        ),
+        share: Stat::or(share, ALL_ALIKE),
         n_not_below: Stat::count(not_below.count()),
     })
-}
-
-/// Maps of the mean dissimilarities, and what is known of their dimensions.
-struct Maps {
-    /// Of the chosen number of dimensions, in points of the scale.
-    map: Option<Map>,
-    stress: Option<f64>,
-    structure: StressByChance,
-    dimensions: BTreeMap<DimensionsName, MapOf>,
-    second: SecondDimension,
-    /// Why there is no map.
-    missing: Why,
-}
-
-impl Maps {
-    fn none(why: Why) -> Self {
-        Self {
-            map: None,
-            stress: None,
-            structure: StressByChance::undefined(why.clone()),
-            dimensions: BTreeMap::new(),
-            second: SecondDimension::undefined(why.clone()),
-            missing: why,
-        }
-    }
-
-    fn why(&self) -> Why {
-        self.missing.clone()
-    }
-}
-
-/// `unit`: the mean of the rescaled dissimilarities; `points`: what their mean is on the scale.
-fn maps(
-    all: &[Dissimilarities],
-    unit: &Dissimilarities,
-    points: f64,
-    draws: &dyn Fn(&str) -> Draws,
-) -> Maps {
-    let n = unit.objects();
-    let mut fitted = Vec::new();
-    let mut predictions: Vec<Vec<Option<f64>>> = Vec::new();
-    let mut dimensions = BTreeMap::new();
-    for k in 1..=most(n) {
-        let of = |scale, stream: &str| {
-            let random = &mut draws(&format!("{stream}/{k}"));
-            smacof(unit, k, scale, STARTS, Precision::FINE, random)
-        };
-        let (ordinal, ratio) = (of(Scale::Ordinal, "map"), of(Scale::Ratio, "ratio"));
-        let predicted = predicted(all, k, &mut draws(&format!("predicted/{k}")));
-        let defined: Vec<f64> = predicted.iter().copied().flatten().collect();
-        let alone = match all.len() {
-            0 | 1 => "there are no other participants",
-            _ => "the pairs of the others do not connect all realizations",
-        };
-        let se = sd(&defined).map(|sd| sd / (defined.len() as f64).sqrt());
-        let own = MapOf {
-            stress: Stat::or(ordinal.as_ref().map(|m| m.stress), NO_MAP),
-            ratio_stress: Stat::or(ratio.map(|m| m.stress), NO_MAP),
-            classical: Stat::or(
-                classical(unit, k).map(|c| c.share),
-                "a pair was not rated, or no two differ",
-            ),
-            predicted: Stat::or(mean(&defined), alone),
-            predicted_se: Stat::or(se, alone),
-        };
-        dimensions.insert(DimensionsName::from(k.to_string().as_str()), own);
-        fitted.push(ordinal);
-        predictions.push(predicted);
-    }
-    // With nobody to predict it is a plane, if there are enough realizations.
-    let best = chosen(&predictions).unwrap_or(most(n).min(2));
-    let map = fitted.into_iter().nth(best - 1).flatten();
-    let random = &mut draws("structure");
-    let tested = structure(all, random);
-    let why = |x: Option<f64>| Stat::or(x, NO_MAP);
-    Maps {
-        stress: map.as_ref().map(|m| m.stress),
-        map: map.map(|m| m.map.scaled(points)),
-        structure: StressByChance {
-            dimensions: why(tested.map(|t| t.dimensions as f64)),
-            stress: why(tested.map(|t| t.stress)),
-            by_chance: why(tested.map(|t| t.by_chance)),
-            p: why(tested.map(|t| t.p)),
-        },
-        dimensions,
-        second: second(&predictions),
-        missing: NO_MAP.into(),
-    }
-}
-
-fn second(predictions: &[Vec<Option<f64>>]) -> SecondDimension {
-    let known = complete(predictions);
-    let [one, two, ..] = &known[..] else {
-        return SecondDimension::undefined("there are fewer than six realizations");
-    };
-    let differences: Vec<f64> = two.iter().zip(one).map(|(two, one)| two - one).collect();
-    let why = match differences.len() {
-        0 | 1 => "there are fewer than two participants",
-        _ => "all participants have the same difference",
-    };
-    let found = one_sample(&differences);
-    SecondDimension {
-        difference: Stat::or(found.map(|f| f.mean), why),
-        ci95: Interval::or(found.map(|f| f.ci95), why),
-        t: Stat::or(found.and_then(|f| f.t), why),
-        df: Stat::or(found.map(|f| f.n as f64 - 1.0), why),
-        p: Stat::or(found.and_then(|f| f.p), why),
-    }
 }
 
 fn places(
@@ -453,7 +363,7 @@ fn places(
     let Some(map) = &scaled.map else {
         return BTreeMap::new();
     };
-    let found = resampled(all, map, &[], draws);
+    let found = resampled(all, (map, scaled.scale), &[], draws);
     let why = match all.len() {
         1 => ONE_PARTICIPANT,
         _ => "too few resamples of the participants have a map",
@@ -498,7 +408,7 @@ fn follows(
         let fit = match (&scaled.map, columns) {
             (None, _) => MapFit::undefined(scaled.why()),
             (_, None) => MapFit::undefined("a realization has no such property"),
-            (Some(map), Some(columns)) => fit(map, all, &columns, name, draws),
+            (Some(map), Some(columns)) => fit((map, scaled.scale), all, &columns, name, draws),
         };
         (PropertyName::from(name.as_str()), fit)
     };
@@ -506,7 +416,7 @@ fn follows(
 }
 
 fn fit(
-    map: &Map,
+    (map, scale): (&Map, Scale),
     all: &[Dissimilarities],
     columns: &[Vec<f64>],
     name: &str,
@@ -515,7 +425,7 @@ fn fit(
     let constant = "a property is the same of all realizations";
     let found = followed(map, columns, &mut draws(&format!("follows/{name}")));
     let random = &mut draws(&format!("resampled/{name}"));
-    let interval = found.and_then(|_| resampled(all, map, columns, random)?.r_ci95);
+    let interval = found.and_then(|_| resampled(all, (map, scale), columns, random)?.r_ci95);
     let why = match (found, all.len()) {
         (None, _) => constant,
         (_, 1) => ONE_PARTICIPANT,

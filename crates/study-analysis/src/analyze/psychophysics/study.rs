@@ -5,10 +5,11 @@ use super::counting::{Counting, PartRows};
 use super::discriminations::of_tracks;
 use super::findings::{
     PartFacts, PartFinding, PartQuestion, identified, maps_of, of_groups_and_sessions, of_model,
-    of_preferences, of_realizations, settings_of, told_apart,
+    of_preferences, of_rankings, of_realizations, settings_of, told_apart,
 };
 use super::of_adjustment::of_adjustment;
 use super::of_identification::of_identification;
+use super::of_ranking::of_ranking;
 use super::of_scales::{of_magnitudes, of_mushra};
 use super::of_similarity::of_similarity;
 use super::over_participants::Measured;
@@ -84,6 +85,10 @@ pub fn parts(study: &StudyData<'_>, include: Include) -> Vec<PartAnalysis> {
                 "groups and sessions are not compared in this part: its map is that of all participants and \
                  sessions together",
             ),
+            Task::Ranking(_) => Some(
+                "groups and sessions are not compared in this part: its worths are those of all participants and \
+                 sessions together",
+            ),
             Task::Adjustment(_) => Some(
                 "groups and sessions are not compared in this part: its means are those of all participants and \
                  sessions together",
@@ -127,13 +132,14 @@ pub fn parts(study: &StudyData<'_>, include: Include) -> Vec<PartAnalysis> {
 /// The findings of a part, and the comparisons on which they rest.
 fn findings(facts: &PartFacts, own: &Found) -> (Vec<PartFinding>, Vec<Pair>) {
     let (results, over) = (&own.results, &own.results.over);
-    let (mut found, pairs) = match (&results.pairs, &over.magnitude) {
-        (Some(preferences), _) => of_preferences(facts, preferences),
-        (None, Some(magnitude)) => {
+    let (mut found, pairs) = match (&results.pairs, &over.magnitude, &over.ranking) {
+        (Some(preferences), _, _) => of_preferences(facts, preferences),
+        (None, None, Some(rankings)) => of_rankings(facts, rankings),
+        (None, Some(magnitude), _) => {
             let model = results.magnitude_mixed.as_ref();
             of_realizations(facts, model, magnitude.vaf.as_ref())
         }
-        (None, None) => {
+        (None, None, None) => {
             let model = over.psy_mixed.as_ref();
             let (found, pairs) = of_model(facts, PartQuestion::Thresholds, model);
             (Vec::from_iter(found), pairs)
@@ -189,6 +195,7 @@ fn of_part_task(
             let trials = (rows, intervals);
             Some(of_similarity(study.protocol, part, own, trials, rules))
         }
+        Task::Ranking(own) => Some(of_ranking(part, own, (rows, intervals), rules)),
         Task::Adjustment(own) => {
             let trials = (rows, intervals);
             Some(of_adjustment(study.protocol, part, own, trials, rules))
@@ -411,7 +418,12 @@ fn with_vaf(found: &Preferences, vaf: &BTreeMap<String, f64>, rules: &Rules) -> 
     correlation
 }
 
-fn preference(part: &Part, row: &RatingRow, intervals: &Intervals<'_>) -> Option<Preference> {
+/// The answer to a pair; `None` if there is none.
+pub(super) fn preference(
+    part: &Part,
+    row: &RatingRow,
+    intervals: &Intervals<'_>,
+) -> Option<Preference> {
     let item = |interval: u32| {
         let felt = intervals.counted(row).iter();
         let model = felt

@@ -3,6 +3,7 @@
 use super::adjustment::{SettingRow, adjustment};
 use super::identification::{LabelRow, identification, labels_of};
 use super::preferences::{Choice, Preference, in_both_orders, preferences};
+use super::ranking::{RankingRow, ranking};
 use super::results::PartResults;
 use super::scales::{MagnitudeRow, MushraRoles, MushraRow, magnitude, mushra};
 use super::similarity::{Properties, SimilarityRow, similarity};
@@ -28,18 +29,21 @@ pub enum TableKind {
     Identification,
     /// Similarity: `participant,first,second,rating`.
     Similarity,
+    /// Rankings: `participant[,ranking],realization,rank`.
+    Ranking,
     /// Adjustment: `participant,start,level[,standard]`.
     Adjustment,
 }
 
 impl TableKind {
     /// The kinds that are no trials, with their names.
-    const OTHERS: [(Self, &str); 6] = [
+    const OTHERS: [(Self, &str); 7] = [
         (Self::Pairs, "pairs"),
         (Self::Magnitude, "magnitude"),
         (Self::Mushra, "mushra"),
         (Self::Identification, "identification"),
         (Self::Similarity, "similarity"),
+        (Self::Ranking, "ranking"),
         (Self::Adjustment, "adjustment"),
     ];
 
@@ -149,6 +153,10 @@ pub fn analyze_table(
             let (ratings, streams) = (rows.differences()?, (settings.seed, "table"));
             results.over.similarity = Some(similarity(&ratings, &Properties::new(), streams));
         }
+        TableKind::Ranking => {
+            let streams = (settings.seed, "table");
+            results.over.ranking = Some(ranking(&rows.ranks()?, streams));
+        }
         TableKind::Adjustment => {
             let ((set, standard), streams) = (rows.settings()?, (settings.seed, "table"));
             results.over.adjustment = Some(adjustment(&set, standard, streams));
@@ -170,6 +178,7 @@ pub fn read_table(name: &str, input: impl BufRead, kind: TableKind) -> Result<()
         TableKind::Mushra => rows.ratings().map(|_| ()),
         TableKind::Identification => rows.labels().map(|_| ()),
         TableKind::Similarity => rows.differences().map(|_| ()),
+        TableKind::Ranking => rows.ranks().map(|_| ()),
         TableKind::Adjustment => rows.settings().map(|_| ()),
     }
 }
@@ -257,6 +266,7 @@ impl<'a> Rows<'a> {
                 ("identification", "participant[,realization],target,answer")
             }
             TableKind::Similarity => ("similarity", "participant,first,second,rating"),
+            TableKind::Ranking => ("rankings", "participant[,ranking],realization,rank"),
             TableKind::Adjustment => ("adjustment", "participant,start,level[,standard]"),
         };
         found.ok_or_else(|| TableError::Column {
@@ -483,6 +493,22 @@ impl<'a> Rows<'a> {
                 first: row.1[first].to_owned(),
                 second: row.1[second].to_owned(),
                 rating: self.number(row, ("rating", rating), (0.0, f64::MAX))?,
+            })
+        };
+        self.records.iter().map(one).collect()
+    }
+
+    /// Ranks; without a column `ranking` each participant has one.
+    fn ranks(&self) -> Result<Vec<RankingRow>, TableError> {
+        let participant = self.required("participant")?;
+        let (realization, rank) = (self.required("realization")?, self.required("rank")?);
+        let ranking = self.column("ranking");
+        let one = |row: &(u64, csv::StringRecord)| {
+            Ok(RankingRow {
+                participant: row.1[participant].to_owned(),
+                ranking: ranking.map_or("", |at| &row.1[at]).to_owned(),
+                realization: row.1[realization].to_owned(),
+                rank: self.number(row, ("rank", rank), (f64::MIN, f64::MAX))?,
             })
         };
         self.records.iter().map(one).collect()

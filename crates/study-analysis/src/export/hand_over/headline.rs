@@ -2,9 +2,12 @@
 
 use crate::analyze::Analysis;
 use crate::analyze::psychophysics::PartAnalysis;
-use crate::analyze::psychophysics::results::{Adjusted, Identified, Preferences, Similarities};
+use crate::analyze::psychophysics::results::{
+    Adjusted, Identified, Preferences, Rankings, Similarities,
+};
 use crate::analyze::results::{Correlation, Field, Key, Number as _};
 use std::collections::BTreeMap;
+use study_plan::protocol::OutcomeFamily;
 
 /// Most realizations with a VAF of which R goes through every permutation.
 const MAX_PERMUTED: usize = 8;
@@ -19,6 +22,8 @@ const LINEAR: &str = "2e-5";
 /// Of a likelihood that both maximize by Newton's method.
 const FITTED: &str = "1e-6";
 const ORDINAL: &str = "2e-3";
+/// Of a generalized mixed model, whose maximum R's optimizers miss by a little.
+const GENERALIZED: &str = "1e-3";
 
 /// Of the analysis of ratings.
 pub(super) fn of_ratings(analysis: &Analysis) -> Vec<Number> {
@@ -60,6 +65,18 @@ pub(super) fn of_ratings(analysis: &Analysis) -> Vec<Number> {
     ];
     let crossed = &results.ordinal.clmm_vaf_crossed;
     numbers.add("clmm_vaf_crossed", crossed, &ordinal, ORDINAL);
+    for outcome in &analysis.outcomes {
+        // R's glmer does not maximize the likelihood of gamma.
+        if outcome.rules.model == Some(OutcomeFamily::Gamma) {
+            continue;
+        }
+        let id = outcome.rules.id.as_str();
+        if let Some(model) = results.outcomes.get(id).and_then(|own| own.model.as_ref()) {
+            let (id, ratio) = (format!("outcomes/{id}/model"), ["chi2", "df", "p"]);
+            numbers.add(&format!("{id}/differ"), &model.differ, &ratio, GENERALIZED);
+            numbers.each(&format!("{id}/effect"), &model.effects, &ratio, GENERALIZED);
+        }
+    }
     numbers.0
 }
 
@@ -97,6 +114,9 @@ pub(super) fn of_part(part: &PartAnalysis) -> Vec<Number> {
     }
     if let Some(found) = &over.similarity {
         numbers.of_similarity(found);
+    }
+    if let Some(found) = &over.ranking {
+        numbers.of_rankings(found);
     }
     if let Some(found) = &over.adjustment {
         numbers.of_adjustment(found);
@@ -225,6 +245,24 @@ impl Numbers {
         );
         let pair = ["n", "mean", "sd", "rescaled"];
         self.each(&format!("{id}/pair"), &found.pairs, &pair, CLOSED);
+    }
+
+    fn of_rankings(&mut self, found: &Rankings) {
+        let id = "ranking";
+        self.add(id, found, &["n", "n_participants"], CLOSED);
+        let agreed = ["n", "w", "chi2", "df", "p_chi2"];
+        let agreement = format!("{id}/agreement");
+        self.add(&agreement, &found.agreement, &agreed, CLOSED);
+        let of_item = format!("{id}/realization");
+        let described = ["n", "mean_rank", "sd", "first"];
+        self.each(&of_item, &found.items, &described, CLOSED);
+        let fitted = ["worth", "log_worth", "log_worth_se"];
+        self.each(&of_item, &found.items, &fitted, FITTED);
+        let tie = ["log_delta", "log_delta_se"];
+        self.each(&format!("{id}/ties"), &found.ties, &tie, FITTED);
+        let of_pair = format!("{id}/pair");
+        self.each(&of_pair, &found.pairs, &["n", "above", "tied"], CLOSED);
+        self.each(&of_pair, &found.pairs, &["difference", "se"], FITTED);
     }
 
     /// What R computes without draws.

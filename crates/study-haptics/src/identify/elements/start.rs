@@ -3,9 +3,9 @@
 //! What a Maxwell branch holds at the first sample comes from the motion before it, which is not
 //! recorded. It fades within a few relaxation times, but as long as it lasts it is of the order of
 //! the whole force. So it is no part of the model but one unknown number for each branch and
-//! recording, which the recorded force tells: by least squares over all samples, with a constant
-//! error beside it so that another zero of the sensor is not taken for it. Initial states are
-//! treated so in system identification (Ljung 1999).
+//! recording, which the recorded force tells: by least squares over all samples, or those that were
+//! not left out, with a constant error beside it so that another zero of the sensor is not taken for
+//! it. Initial states are treated so in system identification (Ljung 1999).
 
 use super::{between, force_n};
 use crate::identify::Training;
@@ -18,7 +18,8 @@ use study_wire::predict::{Lookup, locate};
 /// z of all springs at the first sample of each recording.
 pub(super) type Starts = Vec<Vec<f64>>;
 
-/// Share of a column's square that keeps what fades at once at 0.
+/// Share of a column's mean square over all samples that keeps at 0 what fades at once, or before the
+/// first sample that tells.
 const RIDGE: f64 = 1e-3;
 /// Rounds of the coordinate descent, which are enough for five unknowns.
 const ROUNDS: usize = 200;
@@ -81,10 +82,15 @@ pub(super) fn all(training: &Training<'_>, elements: &Elements) -> Starts {
         .collect()
 }
 
-/// z of the springs of elements at the first sample of a recording; 0 where there is no spring.
-pub(in crate::identify) fn of(elements: &Elements, recording: &Recording) -> [f64; MAX_SPRINGS] {
+/// z of the springs of elements at the first sample of a recording, by the force of the samples
+/// that `tells` names; 0 where there is no spring.
+pub(in crate::identify) fn of(
+    elements: &Elements,
+    recording: &Recording,
+    tells: impl Fn(usize) -> bool,
+) -> [f64; MAX_SPRINGS] {
     let mut z = [0.0; MAX_SPRINGS];
-    let found = weighted(elements, recording, |_| 1.0);
+    let found = weighted(elements, recording, |i| f64::from(u8::from(tells(i))));
     z.iter_mut().zip(&found).for_each(|(z, found)| *z = *found);
     z
 }
@@ -104,6 +110,8 @@ fn weighted(elements: &Elements, recording: &Recording, weight: impl Fn(usize) -
     // the constant error, then what the force gains by z = 1 of each branch at the first sample
     let q = 1 + relaxing.len();
     let (mut normal, mut right) = (vec![vec![0.0; q]; q], vec![0.0; q]);
+    // of all samples, and the sum of the weights
+    let (mut squares, mut weights) = (vec![0.0; q], 0.0);
     let mut left = vec![1.0; relaxing.len()];
     let mut row = vec![1.0; q];
     follow_one(recording, springs, &start, |i, z| {
@@ -120,15 +128,21 @@ fn weighted(elements: &Elements, recording: &Recording, weight: impl Fn(usize) -
             row[1 + j] = left[j] * between(&elements.spring_n[*k], node, share);
         }
         let weight = weight(i);
+        weights += weight;
         let error_n = recording.f_n[i] - force_n(elements, recording, i, z);
         for (j, one) in row.iter().enumerate() {
+            squares[j] += one * one;
             right[j] += weight * one * error_n;
             for (sum, other) in normal[j].iter_mut().zip(&row) {
                 *sum += weight * one * other;
             }
         }
     });
-    let found = within_one(normal, &right);
+    let ridge = RIDGE * weights / recording.len() as f64;
+    for (j, row) in normal.iter_mut().enumerate().skip(1) {
+        row[j] += ridge * squares[j];
+    }
+    let found = within_one(&normal, &right);
     for ((k, _), z) in relaxing.iter().zip(&found[1..]) {
         start[*k] = *z;
     }
@@ -136,12 +150,9 @@ fn weighted(elements: &Elements, recording: &Recording, weight: impl Fn(usize) -
 }
 
 /// The least-squares solution with all unknowns but the first in [−1, 1].
-fn within_one(mut normal: Vec<Vec<f64>>, right: &[f64]) -> Vec<f64> {
+fn within_one(normal: &[Vec<f64>], right: &[f64]) -> Vec<f64> {
     let q = right.len();
     let mut found = vec![0.0; q];
-    for (j, row) in normal.iter_mut().enumerate().skip(1) {
-        row[j] *= 1.0 + RIDGE;
-    }
     for _ in 0..ROUNDS {
         for j in 0..q {
             let product: f64 = normal[j].iter().zip(&found).map(|(n, x)| n * x).sum();
@@ -164,7 +175,7 @@ mod tests {
     fn a_bounded_start_is_the_least_square_within_its_bounds() {
         // ½ xᵀ A x − bᵀ x with the free minimum at (0, 2, 0): held at 1, x₀ = 1/2 by hand
         let normal = vec![vec![2.0, 1.0, 0.0], vec![1.0, 2.0, 0.0], vec![0.0; 3]];
-        let found = within_one(normal, &[2.0, 4.0, 0.0]);
+        let found = within_one(&normal, &[2.0, 4.0, 0.0]);
         assert_eq!(found, [0.5, 1.0, 0.0]);
     }
 }

@@ -19,6 +19,8 @@ const USUAL_PLAY: f64 = 0.02;
 const NEARLY: f64 = 1.1;
 /// Least ratio of an estimate to its error: a search over many terms and recordings meets three by chance.
 pub(super) const LEAST_RATIO: f64 = 4.0;
+/// What is below so many of the errors that the output has is not called found, in whichever way it is shown.
+const LEAST_RATIO_OF_FOUND: f64 = 2.0;
 /// Least ratio (99 %) where the squared error on blocks left out is larger without the term by at least [`MUCH`].
 const LEAST_RATIO_OF_MUCH: f64 = 2.326;
 /// A share of the squared error on blocks left out that is much.
@@ -50,19 +52,24 @@ pub(super) struct Found {
 }
 
 impl Found {
-    /// Whether the recordings show the term.
+    /// Whether the recordings show the term, and its estimate exceeds two of the errors that are printed beside it.
     pub(super) fn is_found(self) -> bool {
+        self.is_shown() && self.value >= LEAST_RATIO_OF_FOUND * self.standard_error
+    }
+
+    /// Whether the recordings show the term, however large it is: a model that fits nearly as well may have half of it or twice as much.
+    pub(super) fn is_shown(self) -> bool {
         let statistical = (self.standard_error.powi(2) - self.model_error.powi(2)).sqrt();
         let ratio = self.value / self.standard_error;
         let in_all_models = self.value > self.model_error.max(LEAST_RATIO * statistical);
         let predicts_much = ratio > LEAST_RATIO_OF_MUCH && self.gain > MUCH;
-        let found = ratio > LEAST_RATIO || self.shows && (in_all_models || predicts_much);
-        self.is_determined && self.gain > 0.0 && found
+        let shown = ratio > LEAST_RATIO || self.shows && (in_all_models || predicts_much);
+        self.is_determined && self.gain > 0.0 && shown
     }
 
     /// Whether a table may take the term up: the recordings show it, or it predicts more than [`LITTLE`].
     pub(super) fn may_be_carried(self) -> bool {
-        self.is_found() || self.gain > LITTLE
+        self.is_shown() || self.gain > LITTLE
     }
 }
 
@@ -357,4 +364,33 @@ fn local_scales(rows: &[Row], residual: &[f64]) -> Vec<f64> {
         (mean * square.max(LEAST_SCALE * LEAST_SCALE)).sqrt()
     };
     rows.iter().map(scale).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// All models that fit nearly as well have the term, but one has hardly any of it.
+    #[test]
+    fn what_is_below_two_of_its_printed_errors_is_not_found() {
+        let of = |value: f64, standard_error: f64, model_error: f64, gain: f64| Found {
+            value,
+            standard_error,
+            model_error,
+            gain,
+            is_determined: true,
+            shown_from: Some(2.0),
+            shows: true,
+            upper_bound: Some(1.0),
+        };
+        for (value, found) in [(1.4, false), (1.9, false), (2.0, true), (3.9, true)] {
+            let term = of(value, 1.0, 0.97, 0.005);
+            assert_eq!((term.is_shown(), term.is_found()), (true, found), "{value}");
+            // a table takes up what is shown, as before
+            assert!(term.may_be_carried(), "{value}");
+        }
+        // by what it predicts, above 2.33
+        assert!(of(2.4, 1.0, 0.5, 0.3).is_found());
+        assert!(!of(2.2, 1.0, 0.5, 0.3).is_shown());
+    }
 }

@@ -166,6 +166,9 @@ fn what_the_recordings_do_not_determine_is_told() {
             iterations: 1,
             reach_mm: [-7.0, 7.0],
         };
+        let unsure_terms = fitted.terms().into_iter().filter(|term| !term.identified);
+        let unsure_terms: Vec<&str> = unsure_terms.map(|term| term.name).collect();
+        assert!(unsure_terms.contains(&PARAMETERS[unsure].0));
         let name = |warning| match warning {
             Warning::NotDetermined { parameter, .. } => parameter,
             other => panic!("{other:?}"),

@@ -260,7 +260,7 @@ fn what_the_recordings_carry_is_read_and_written_in_any_units() {
     let coverage = r.provenance.coverage.as_ref().unwrap();
     assert_eq!(coverage.v_mm_s, [50.0, 100.0]);
     assert_eq!(coverage.directions[0].samples, [[0, 7], [1, 2]]);
-    assert_eq!(coverage.top_mm_s(), 90.5);
+    assert_eq!(coverage.directions[0].top_mm_s, 90.5);
     assert!(coverage.gaps_mm().iter().all(Vec::is_empty));
     assert_eq!((coverage.full_strokes, coverage.partial_strokes), (3, 0));
     assert_eq!(coverage.held_mm, [[0.0, 0.5]]);

@@ -15,7 +15,7 @@ const UNLIKE: f64 = 5.0;
 pub struct Source<'c> {
     /// The curve.
     pub curve: &'c ForceCurve,
-    /// Name of its file, without the folder.
+    /// Name of its file, without the folder, for messages.
     pub file: &'c str,
     /// SHA-256 hash of the file, hexadecimal.
     pub sha256: &'c str,
@@ -34,6 +34,8 @@ pub struct Stated<'c> {
     pub license: Option<&'c str>,
     /// Rows a second of curves without a time.
     pub rate_hz: Option<f64>,
+    /// Whether the names of the files stand in the header. Otherwise the recording is the same whatever they are called.
+    pub file_names: bool,
 }
 
 /// Doubts that all curves are of one target in one unit: the force or the displacement of one varies by
@@ -66,7 +68,8 @@ pub fn unlike(curves: &[Source<'_>]) -> Vec<String> {
 }
 
 /// One recording of all curves, one after the other, as the bytes of its CSV file. Each line of the
-/// header begins with what it says: `measured force curve` with the next ones in short, `target`, `instrument`, `source` (one for each curve),
+/// header begins with what it says: `measured force curve` with the next ones in short, `target`, `instrument`, `source` (one for each curve, with
+/// the SHA-256 of its file),
 /// `quasi-static` where a time was made up, `resolution`, `credit`, `license`.
 ///
 /// Velocity and acceleration are differences within a curve.
@@ -83,10 +86,13 @@ pub fn join(curves: &[Source<'_>], stated: Stated<'_>) -> Vec<u8> {
         let x = &curve.x_mm;
         let v: Vec<f64> = (0..n).map(|i| velocity(&t, x, i)).collect();
         let a: Vec<f64> = (0..n).map(|i| acceleration(&t, x, i)).collect();
+        let name = match stated.file_names {
+            true => format!("{}, ", Untrusted(source.file)),
+            false => String::new(),
+        };
         let _ = writeln!(
             sources,
-            "source: {}, sha256 {}; {}, {n} rows from {begin_s:.3} s{}",
-            Untrusted(source.file),
+            "source: {name}sha256 {}; {}, {n} rows from {begin_s:.3} s{}",
             source.sha256,
             curve.layout.as_str(),
             match curve.release_first {

@@ -87,6 +87,7 @@ fn curves_become_one_recording_whose_header_says_where_they_are_from() {
     ];
     let stated = Stated {
         credit: Some("A lab"),
+        file_names: true,
         ..Stated::default()
     };
     let bytes = join(&sources, stated);
@@ -110,6 +111,24 @@ fn curves_become_one_recording_whose_header_says_where_they_are_from() {
     assert!(close(&recording.v_mm_s[..3], [10.0, 0.5, -9.0]));
     assert!(close(&recording.v_mm_s[3..], [2000.0, 100.0, -1800.0]));
     assert_eq!(join(&sources, stated), bytes);
+    // another lab, which calls the files otherwise, has the same recording
+    let [here, there] = [["a.csv", "b.csv"], ["1.csv", "2.csv"]].map(|names| {
+        let sources = [
+            source(&first, names[0], "aa"),
+            source(&second, names[1], "bb"),
+        ];
+        let unnamed = Stated {
+            file_names: false,
+            ..stated
+        };
+        join(&sources, unnamed)
+    });
+    assert_eq!(here, there);
+    let recording = recording::read("r", here.as_slice()).unwrap();
+    assert_eq!(
+        recording.header_line("source:"),
+        Some("sha256 aa; columns of displacement and force, 3 rows from 0.000 s")
+    );
 }
 
 #[test]
@@ -122,6 +141,7 @@ fn text_of_the_files_cannot_begin_a_line_of_the_header() {
     }];
     let stated = Stated {
         target: Some("x\nlicense: mine"),
+        file_names: true,
         ..Stated::default()
     };
     let bytes = join(&sources, stated);
@@ -154,7 +174,7 @@ fn every_bad_file_is_told_with_its_line() {
         ),
         (
             TIDY.replace("100,1,0,A switch", "100"),
-            "line 3: 1 fields, but displacement is column 2",
+            "line 3: 1 of 4 fields: complete or remove the row",
         ),
         (
             TIDY.replace("100,1,0", "100,0,0").replace("0.1", "0"),
@@ -182,7 +202,11 @@ fn every_bad_file_is_told_with_its_line() {
         ),
         (
             FINE.replace("0.0005", "0"),
-            "line 4: the recording rate is `0`",
+            "line 4: the recording rate is `0`: it has to be a time from 0.000001 to 1000 s",
+        ),
+        (
+            FINE.replace("0.0005", "1e-300"),
+            "line 4: the recording rate is `1e-300`: it has to be a time from",
         ),
         (
             FINE.replace("UNIT = N", "UNIT = V"),
@@ -199,6 +223,34 @@ fn every_bad_file_is_told_with_its_line() {
     ] {
         let message = message(&text);
         assert!(message.starts_with(expected), "{message}\n{expected}");
+    }
+}
+
+/// What is missing of a row that was cut would be read as 0.
+#[test]
+fn a_file_that_ends_within_a_row_is_refused() {
+    for (whole, end, cut, found) in [
+        (TIDY, "50,0.1,0,A switch\n", "50,0.", "line 4: 2 of 4"),
+        (TIDY, "50,0.1,0,A switch\n", "50", "line 4: 1 of 4"),
+        (FINE, "0.5,0.100\n", "0.5", "line 8: 1 of 2"),
+        (TABLE, ",12:00:01 PM,7/3/2025,\n", "", "line 8: 7 of 9"),
+    ] {
+        let begin = whole.strip_suffix(end).unwrap();
+        assert_eq!(
+            message(&format!("{begin}{cut}")),
+            format!(
+                "{found} fields: the file ends within this row; export it again, or remove the row"
+            )
+        );
+    }
+    // without a line break at the end, or with fields that are empty, a row is complete
+    let names = "force\tdisplacement\tname\n";
+    for text in [
+        TIDY.trim_end().to_owned(),
+        TIDY.replace(",A switch", ","),
+        format!("{names}0\t0\t\n100\t1\t\n50\t0.1\t"),
+    ] {
+        assert_eq!(read(&text).unwrap().x_mm, [0.0, 1.0, 0.1]);
     }
 }
 
@@ -233,6 +285,11 @@ fn a_time_in_numbers_gives_the_rate_and_a_wrong_one_is_named() {
             "0.460 s apart here and 0.020 s usually",
         ),
         (["0", "12:00:01", "0.04", "0.06"], 3, "the time is"),
+        (
+            ["0", "1e-300", "2e-300", "3e-300"],
+            1,
+            "rows a second, and from 0.001 to 1000000 are possible",
+        ),
         (
             ["12:00:03", "12:00:04", "12:00:01", "12:00:02"],
             4,

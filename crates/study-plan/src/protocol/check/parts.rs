@@ -6,8 +6,11 @@ use crate::protocol::{
     DeviceKind, Identification, IntervalOrder, Magnitude, Method, Mushra, Part, Protocol, Question,
     Role, Task, TrackRules,
 };
+use study_base::apa;
 use study_base::diagnostic::Fault;
 use study_base::text::{ModelId, PartId, counted};
+use study_stats::level::rejects;
+use study_stats::ranking::smallest_p;
 
 /// Fewest levels of a magnitude estimation that need no warning.
 const MAGNITUDE_LEVELS: usize = 5;
@@ -61,6 +64,7 @@ pub(super) fn trials(protocol: &Protocol, part: &Part) -> u32 {
         Task::Similarity(own) => {
             all(own.pairs().pairs.len(), own.repetitions).saturating_add(own.practice)
         }
+        Task::Ranking(own) => own.repetitions.saturating_add(own.practice),
         Task::Adjustment(own) => all(2, own.repetitions).saturating_add(own.practice),
     }
 }
@@ -72,6 +76,7 @@ pub(super) fn seconds(protocol: &Protocol, part: &Part, reference_s: f64) -> f64
         Task::Rating(_) | Task::Identification(_) => 1,
         Task::Magnitude(_) | Task::Mushra(_) => 1 + usize::from(part.task.reference().is_some()),
         Task::Pairs(_) | Task::Search(_) | Task::Similarity(_) => 2,
+        Task::Ranking(own) => own.models.len(),
         Task::Discrimination { tracks: ids } => tracks(protocol, ids)
             .map(|track| track.method.sequences()[0].len())
             .max()
@@ -87,7 +92,8 @@ pub(super) fn seconds(protocol: &Protocol, part: &Part, reference_s: f64) -> f64
         | Task::Pairs(_)
         | Task::Discrimination { .. }
         | Task::Search(_)
-        | Task::Similarity(_) => pace::COMPARE_S,
+        | Task::Similarity(_)
+        | Task::Ranking(_) => pace::COMPARE_S,
         Task::Adjustment(_) => pace::STEP_S,
     };
     let felt_s = part.exposure.max_s.map_or(free_s, |max| max.min(free_s));
@@ -124,6 +130,7 @@ pub(super) fn warnings(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Faul
             counted_out::practice(part),
             one_order(part),
             few_pairs(protocol, part),
+            few_rankers(protocol, part),
         ];
         let doubts = doubts.into_iter().flatten();
         let doubts = doubts.chain(maps::doubts(protocol, part));
@@ -152,6 +159,7 @@ fn presented(protocol: &Protocol, model: &ModelId) -> bool {
     let by_part = protocol.parts.iter().any(|part| match &part.task {
         Task::Pairs(own) => own.pairs.iter().any(|pair| pair.contains(model)),
         Task::Similarity(own) => own.models.contains(model),
+        Task::Ranking(own) => own.models.contains(model),
         task => {
             let own = task.presentations();
             own.is_some_and(|own| own.models.contains(model) || own.practice.contains(model))
@@ -172,6 +180,7 @@ pub fn is_about_realizations(protocol: &Protocol) -> bool {
             let models = &own.presentations.models;
             models.iter().all(|m| protocol.level_of(m).is_none())
         }
+        Task::Ranking(own) => own.models.iter().all(|m| protocol.level_of(m).is_none()),
         Task::Rating(_) | Task::Mushra(_) | Task::Pairs(_) => true,
     };
     let tested = protocol.models.iter().any(|m| m.role == Role::Test);
@@ -264,6 +273,24 @@ fn few_pairs(protocol: &Protocol, part: &Part) -> Option<Fault> {
             counted(space.axes.len(), "axis", "axes")
         ))
         .hint("docs/search.md shows how near the best point a search comes")
+    })
+}
+
+/// So few participants and realizations that no agreement is beyond chance. One participant agrees with nobody.
+fn few_rankers(protocol: &Protocol, part: &Part) -> Option<Fault> {
+    let Task::Ranking(own) = &part.task else {
+        return None;
+    };
+    let people = protocol.design.participants as usize;
+    let least = smallest_p(own.models.len(), people);
+    (people > 1 && !rejects(least, protocol.analysis.alpha())).then(|| {
+        let what = format!(
+            "the part `{}` has {people} participants who rank {} realizations: even if all rank alike, p {}",
+            part.id,
+            own.models.len(),
+            apa::p(least)
+        );
+        Fault::warning(what).hint("add participants or realizations")
     })
 }
 

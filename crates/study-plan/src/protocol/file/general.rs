@@ -68,9 +68,10 @@ pub(super) const SESSION: &[Key] = keys! {
     /// the operator chooses: restart the block (not of a search), continue (which is recorded), or record a
     /// drop-out.
     "resume_within_h": Kind::not_negative("h"), "2.5", default("4");
-    /// The longest pause between feeling and answering: the program was left or paused, waited
-    /// for the device or the disk, or the computer was suspended. After a longer one the trial
-    /// is felt again, unless a question of it is answered already.
+    /// The longest pause between feeling and answering, or between two intervals of a trial: the
+    /// program was left or paused, waited for the device or the disk, or stood still, as on a
+    /// suspended computer. After a longer one the trial is felt again, unless a question of it is
+    /// answered already.
     "longest_pause_s": Kind::not_negative("s"), "120", default("60");
 };
 

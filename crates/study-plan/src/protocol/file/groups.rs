@@ -182,6 +182,21 @@ pub(super) fn agree(
                     own.keep(|m| models.contains(m) || is_level(m));
                     (task.models.clone(), own.different.len())
                 }
+                Task::Ranking(task) if task.models.iter().all(is_level) => continue,
+                Task::Ranking(task) => {
+                    let own = task.models.iter().filter(|m| models.contains(m)).count();
+                    if (1..task.models.len()).contains(&own) {
+                        let what = format!(
+                            "group `{}` has {own} of the {} realizations of the ranking `{}`",
+                            group.id,
+                            task.models.len(),
+                            part.id
+                        );
+                        let hint = "give it all of them, or a part of its own, by `parts`";
+                        fault(&place, "models", Fault::error(what).hint(hint));
+                    }
+                    (task.models.clone(), own)
+                }
                 Task::Discrimination { .. } | Task::Search(_) | Task::Adjustment(_) => continue,
             };
             if left == 0 {

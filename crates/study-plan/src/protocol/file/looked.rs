@@ -4,12 +4,14 @@ use super::adjustment::RawAdjustment;
 use super::agree::{Sections, at, unknown};
 use super::pairs::RawPairs;
 use super::parts::RawLabel;
+use super::ranking::{RawRanking, RawSet};
 use super::similarity::RawSimilarity;
 use super::spaces::PartialSpace;
 use crate::protocol::pairs::{every, neighbors};
+use crate::protocol::ranking::MOST_RANKED;
 use crate::protocol::similarity::unconnected;
 use crate::protocol::{
-    Adjustment, Criterion, DeviceKind, FamilyRules, Label, Presentations, Role, Similarity,
+    Adjustment, Criterion, DeviceKind, FamilyRules, Label, Presentations, Ranking, Role, Similarity,
 };
 use study_base::diagnostic::Fault;
 use study_base::diagnostic::table::Document;
@@ -312,6 +314,42 @@ impl Looked<'_> {
             order: raw.order.clone(),
             repetitions: raw.repetitions,
             identical: raw.identical,
+            practice: raw.practice,
+        })
+    }
+
+    /// What a part of ranking presents. Fewer than two realizations, and too many to remember, are reported.
+    pub(super) fn ranking(
+        &self,
+        raw: &RawRanking,
+        families: Option<&[FamilyRules]>,
+        path: &str,
+    ) -> Option<Ranking> {
+        let (key, models) = match &raw.felt {
+            RawSet::Models(models) => {
+                self.models(models, &format!("{path}.models"));
+                ("models", models.clone())
+            }
+            RawSet::Levels(family, levels) => {
+                let family = self.family(family, families?, path)?;
+                (
+                    "levels",
+                    self.levels(family, Some(levels.as_slice()), path)?,
+                )
+            }
+        };
+        let n = models.len();
+        if !(2..=MOST_RANKED).contains(&n) {
+            let what = format!("a ranking has 2 to {MOST_RANKED} realizations, not {n}");
+            let hint = "a part of kind \"pairs\" compares more of them, two at a time";
+            self.fault(path, key, Fault::error(what).hint(hint));
+            return None;
+        }
+        Some(Ranking {
+            models,
+            order: raw.order.clone(),
+            repetitions: raw.repetitions,
+            ties: raw.ties,
             practice: raw.practice,
         })
     }

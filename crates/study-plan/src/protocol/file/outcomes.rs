@@ -7,7 +7,8 @@ use crate::protocol::columns::is_parts_column;
 use crate::protocol::factors::GROUP;
 use crate::protocol::keys::{Id, Kind, Shape, Variants, Words as _, keys};
 use crate::protocol::outcomes::{
-    Answers, BetterEnd, Clock, MAX_OUTCOMES, Measure, OutcomeRules, Telemetry, Transform,
+    Answers, BetterEnd, Clock, MAX_OUTCOMES, Measure, OutcomeFamily, OutcomeRules, Telemetry,
+    Transform,
 };
 use crate::protocol::section::{Section, Variant, shapes};
 use study_base::diagnostic::Fault;
@@ -28,6 +29,12 @@ pub(super) static OUTCOMES: Variants = Variants {
         /// What is analyzed: the numbers, or their logarithms. Times and forces are skewed, and what changes
         /// them does so by a factor; their logarithms are nearer to what the tests assume.
         "transform": Kind::Word(Transform::WORDS), r#""log""#, default(r#""none""#);
+        /// A generalized mixed model that is fitted besides, as a second opinion that decides nothing: `"poisson"` of
+        /// counts, `"binomial"` of successes in `of` trials, `"gamma"` of numbers above 0, such as times and forces.
+        "model": Kind::Word(OutcomeFamily::WORDS), r#""poisson""#;
+        /// With `model = "binomial"`: of how many trials the number is the successes, such as the attempts of which
+        /// somebody counts the hits.
+        "of": Kind::Whole(1, 1_000_000), "10";
     },
     shapes: &SHAPES,
 };
@@ -102,6 +109,12 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Vec<PartialOutcome> {
             }
             let better: Option<BetterEnd> = section.word("better");
             let transform: Option<Transform> = section.word("transform");
+            let model: Option<OutcomeFamily> = section.word("model");
+            let is_given = section.value("of").is_some();
+            let of: Option<u32> = section.whole("of");
+            if let Some((key, fault)) = faulty_model(model, is_given, measure.as_ref()) {
+                section.fault_at(key, fault);
+            }
             PartialOutcome {
                 path: section.path().to_owned(),
                 outcome: (|| {
@@ -110,6 +123,8 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Vec<PartialOutcome> {
                         measure: measure?,
                         better,
                         transform: transform?,
+                        model,
+                        of,
                     })
                 })(),
                 id,
@@ -122,6 +137,48 @@ impl PartialOutcome {
     pub(super) fn finish(self) -> Option<OutcomeRules> {
         self.outcome
     }
+}
+
+/// What is wrong with a generalized mixed model, and at which key.
+fn faulty_model(
+    model: Option<OutcomeFamily>,
+    has_trials: bool,
+    measure: Option<&Measure>,
+) -> Option<(&'static str, Fault)> {
+    let is_binomial = model == Some(OutcomeFamily::Binomial);
+    if has_trials != is_binomial {
+        return Some(match is_binomial {
+            true => {
+                let fault = Fault::error("a binomial model needs the number of trials");
+                (
+                    "model",
+                    fault.hint("of = 10, where the number is the hits of 10 attempts"),
+                )
+            }
+            false => {
+                let fault = Fault::error("`of` belongs to a binomial model");
+                (
+                    "of",
+                    fault.hint("add model = \"binomial\", or leave it out"),
+                )
+            }
+        });
+    }
+    let measure = measure?;
+    let counts = matches!(
+        model,
+        Some(OutcomeFamily::Poisson | OutcomeFamily::Binomial)
+    );
+    (counts && !measure.can_be_counted()).then(|| {
+        let what = format!(
+            "a {} model is of counts, and the {} is none",
+            if is_binomial { "binomial" } else { "Poisson" },
+            measure.noun()
+        );
+        let hint =
+            "name strokes or one question that is answered by a count, or use model = \"gamma\"";
+        ("model", Fault::error(what).hint(hint))
+    })
 }
 
 /// Reports names that something else has, the same measurement twice, and outcomes of a study without

@@ -2,11 +2,13 @@
 
 use super::adjustment::{ADJUSTMENT, RawAdjustment};
 use super::pairs::{RawPairs, which};
+use super::ranking::{RANKING, RawRanking};
 use super::similarity::{RawSimilarity, SIMILARITY};
 use super::spaces::RULES;
 use super::standard::{RawStandard, standard};
 use crate::procedure::SearchRule;
 use crate::protocol::keys::{Id, Key, Kind, Shape, Variants, Words as _, keys};
+use crate::protocol::ranking::question;
 use crate::protocol::section::{Section, Variant, shapes};
 use crate::protocol::{Criterion, Drawn, Exposure, Feedback, IntervalOrder, Order, Presentations};
 use std::collections::BTreeMap;
@@ -96,7 +98,7 @@ const SEARCH: &[Key] = keys! {
 };
 
 /// The kinds of trial. A new one is declared here and in [`crate::protocol::Task`].
-pub(super) const KINDS: [Variant<RawTask>; 9] = [
+pub(super) const KINDS: [Variant<RawTask>; 10] = [
     Variant::new(
         "rating",
         "One realization is felt and rated.",
@@ -232,6 +234,12 @@ pub(super) const KINDS: [Variant<RawTask>; 9] = [
         similarity,
     ),
     Variant::new(
+        "ranking",
+        "Several realizations are felt one after another, and each is given a rank. Needs the format `study-protocol/3`.",
+        RANKING,
+        ranking,
+    ),
+    Variant::new(
         "adjustment",
         "A level of a family is set, one step of its ladder at a time, until it feels equal to a standard or as it should. Needs the format `study-protocol/3`.",
         ADJUSTMENT,
@@ -250,6 +258,20 @@ pub(super) struct RawPart {
     /// `None` inside: that of `[trial]`.
     pub(super) exposure: Option<Option<Exposure>>,
     pub(super) task: Option<RawTask>,
+}
+
+impl RawPart {
+    /// Whether a question has the id of one with which the trials of the part begin.
+    pub(super) fn begins_with(&self, id: &QuestionId) -> bool {
+        let Some(part) = &self.id else {
+            return false;
+        };
+        let intervals = match &self.task {
+            Some(RawTask::Ranking(own)) => own.felt.len(),
+            _ => 1,
+        };
+        (1..=intervals).any(|interval| question(part, interval) == *id)
+    }
 }
 
 #[derive(Debug)]
@@ -306,6 +328,7 @@ pub(super) enum RawTask {
         gap_s: f64,
     },
     Similarity(RawSimilarity),
+    Ranking(RawRanking),
     Adjustment(RawAdjustment),
 }
 
@@ -550,6 +573,10 @@ fn search(section: &mut Section<'_, '_>) -> Option<RawTask> {
 
 fn similarity(section: &mut Section<'_, '_>) -> Option<RawTask> {
     super::similarity::similarity(section).map(RawTask::Similarity)
+}
+
+fn ranking(section: &mut Section<'_, '_>) -> Option<RawTask> {
+    super::ranking::ranking(section).map(RawTask::Ranking)
 }
 
 fn adjustment(section: &mut Section<'_, '_>) -> Option<RawTask> {

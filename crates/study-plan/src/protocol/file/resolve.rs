@@ -11,6 +11,7 @@ use super::spaces::PartialSpace;
 use super::standard::RawStandard;
 use super::tracks::RawTrack;
 use super::{Content, Named};
+use crate::protocol::ranking::question;
 use crate::protocol::{
     Compared, FamilyRules, Identification, Magnitude, Method, Mushra, OrderVersion, Pairs, Part,
     Presentations, QuestionKind, SearchTask, SpaceRules, Standard, Task, TrackRules, kinds,
@@ -68,8 +69,9 @@ impl Raw {
         self.families.iter().flat_map(of).chain(spaces).collect()
     }
 
-    /// The questions with which trials of pairs and of discrimination begin.
-    pub(super) fn questions(&self) -> Vec<PartialQuestion> {
+    /// The questions with which the trials of a part begin, by part: one, but of a ranking one for each interval. Rating parts have
+    /// none.
+    pub(super) fn questions(&self) -> Vec<Vec<PartialQuestion>> {
         let question = |part: &RawPart| {
             let id = part.id.as_ref()?.as_str();
             match part.task.as_ref()? {
@@ -116,6 +118,8 @@ impl Raw {
                     });
                     Some(PartialQuestion::made(&part.path, id, &own.prompt, scale))
                 }
+                // It has several.
+                RawTask::Ranking(_) => None,
                 // The level that was set.
                 RawTask::Adjustment(own) => {
                     let number = QuestionKind::Number(kinds::Number {
@@ -144,7 +148,11 @@ impl Raw {
                 }
             }
         };
-        self.parts.iter().filter_map(question).collect()
+        let of_part = |part: &RawPart| match (&part.task, &part.id) {
+            (Some(RawTask::Ranking(own)), Some(id)) => Some(own.questions(&part.path, id)),
+            _ => question(part).map(|own| vec![own]),
+        };
+        self.parts.iter().filter_map(of_part).collect()
     }
 
     /// Parts without an answer of their own.
@@ -289,6 +297,7 @@ impl Raw {
                 Some(RawTask::Similarity(own)) => {
                     own.family.as_ref().is_some_and(|own| own.0 == *id)
                 }
+                Some(RawTask::Ranking(own)) => own.felt.is_of(id),
                 Some(RawTask::Adjustment(own)) => own.family == *id,
                 _ => false,
             };
@@ -467,6 +476,11 @@ impl Raw {
                     own.gap_s,
                 )
             }
+            RawTask::Ranking(own) => {
+                let ranking = looked.ranking(own, families, path)?;
+                asks.extend((1..=ranking.models.len()).map(|interval| question(&id, interval)));
+                (Task::Ranking(ranking), own.gap_s)
+            }
             RawTask::Adjustment(own) => {
                 asks.push(QuestionId::new(id.as_str()).ok()?);
                 (
@@ -499,8 +513,7 @@ impl Raw {
         }
         let elsewhere = |id: &QuestionId| {
             let mut named = self.parts.iter().flat_map(|p| p.questions.iter().flatten());
-            let of_part = |p: &RawPart| p.id.as_ref().is_some_and(|p| p.as_str() == id.as_str());
-            named.any(|n| n == id) || self.parts.iter().any(of_part)
+            named.any(|n| n == id) || self.parts.iter().any(|part| part.begins_with(id))
         };
         let ids = questions.iter().filter_map(|q| q.id.clone());
         ids.filter(|id| !elsewhere(id)).collect()

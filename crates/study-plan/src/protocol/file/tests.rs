@@ -578,6 +578,7 @@ mod outcomes;
 mod parts;
 mod questionnaires;
 mod random;
+mod ranking;
 mod relative;
 mod similarity;
 mod standard;

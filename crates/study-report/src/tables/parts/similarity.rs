@@ -81,7 +81,7 @@ pub(super) fn pairs(results: &PartResults) -> Table {
         let mean = [a, b].map(|p| p.1.rescaled.number().unwrap_or(f64::INFINITY));
         mean[0].total_cmp(&mean[1])
     });
-    let note = "Rescaled: after each participant's ratings were divided by their mean, in points of the scale. Distance: in the map.";
+    let note = "Rescaled: after the participants' ratings were brought to the same mean, in points of the scale. Distance: in the map.";
     let notes = found(results).and_then(|own| {
         let identical = own.identical.as_ref()?;
         Some(format!(

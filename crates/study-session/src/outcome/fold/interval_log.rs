@@ -37,8 +37,9 @@ fn row(
         Stimuli::One { .. }
         | Stimuli::Rated { .. }
         | Stimuli::Pair { .. }
-        | Stimuli::Adjusted { .. }
-        | Stimuli::Search { .. } => None,
+        | Stimuli::Search { .. }
+        | Stimuli::Set { .. }
+        | Stimuli::Adjusted { .. } => None,
     };
     let playback = presentation.ended.map(|(_, ended)| ended.playback);
     IntervalRow {

@@ -199,8 +199,9 @@ fn correct(
         Stimuli::One { model } => part?.task.identification()?.is_correct(model, answer),
         Stimuli::Rated { .. }
         | Stimuli::Pair { .. }
-        | Stimuli::Adjusted { .. }
-        | Stimuli::Search { .. } => None,
+        | Stimuli::Search { .. }
+        | Stimuli::Set { .. }
+        | Stimuli::Adjusted { .. } => None,
     }
 }
 

@@ -178,6 +178,8 @@ mod tests {
             measure,
             better: None,
             transform: Transform::Identity,
+            model: None,
+            of: None,
         };
         let load = Answers {
             questions: vec![id("mental"), id("effort")],

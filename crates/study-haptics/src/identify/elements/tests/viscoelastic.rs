@@ -164,6 +164,69 @@ fn rubber_of_two_times_that_are_close_is_predicted() {
     });
 }
 
+/// In cross-validation the stroke that is left out does not tell in which state springs enter it.
+#[test]
+fn a_force_that_is_left_out_tells_no_start() {
+    let rubber = Rubber {
+        travel_mm: 14.0,
+        hardening_n: 5.5,
+        branches: [(4.0, 0.67), (0.0, 1.0)],
+        moved_s: 2.6,
+    };
+    let mut recording = rubber.record(1, trained, 10.0);
+    let elements = model::Elements {
+        mass_kg: 0.0,
+        x_mm: vec![0.0, 14.0],
+        force_n: vec![0.0, 5.5],
+        damping_n_s_per_mm: [vec![0.0; 2], vec![0.0; 2]],
+        springs: vec![Spring::Maxwell {
+            slip_mm: 14.0,
+            relaxation_s: 0.67,
+        }],
+        spring_n: vec![vec![4.0; 2]],
+    };
+    let first = recording.len() / 10;
+    let by_rest = |recording: &Recording| start_of(&elements, recording, |i| i >= first)[0];
+    let by_all = |recording: &Recording| start_of(&elements, recording, |_| true)[0];
+    let before = [by_rest(&recording), by_all(&recording)];
+    assert!(before[0].abs() > 0.01, "{before:?}");
+    for f_n in &mut recording.f_n[..first] {
+        *f_n += 3.0;
+    }
+    assert_eq!(by_rest(&recording), before[0]);
+    assert!((by_all(&recording) - before[1]).abs() > 0.1);
+    assert_eq!(start_of(&elements, &recording, |_| false)[0], 0.0);
+}
+
+/// A branch that fades within ten samples is predicted from the first one on.
+#[test]
+fn the_first_sample_has_the_force_of_the_start() {
+    let rubber = Rubber {
+        travel_mm: 14.0,
+        hardening_n: 0.0,
+        branches: [(20.0, 0.02), (0.0, 1.0)],
+        moved_s: 3.4,
+    };
+    let recording = rubber.record(1, trained, 5.0);
+    let elements = model::Elements {
+        mass_kg: 0.0,
+        x_mm: vec![0.0, 14.0],
+        force_n: vec![0.0; 2],
+        damping_n_s_per_mm: [vec![0.0; 2], vec![0.0; 2]],
+        springs: vec![Spring::Maxwell {
+            slip_mm: 14.0,
+            relaxation_s: 0.02,
+        }],
+        spring_n: vec![vec![20.0; 2]],
+    };
+    let predicted_n = crate::identify::mechanism::predict_elements(&elements, &recording, |_| true);
+    assert!(recording.f_n[0].abs() > 0.4, "{}", recording.f_n[0]);
+    for i in [0, 1, 5] {
+        let error_n = predicted_n[i] - recording.f_n[i];
+        assert!(error_n.abs() < 0.03, "{i}: {error_n}");
+    }
+}
+
 /// `cargo test --release -p study-haptics --lib -- sixty_thousand --ignored --nocapture`
 #[test]
 #[ignore = "seconds, which depend on the machine"]

@@ -1,7 +1,9 @@
 //! `[[outcomes]]`.
 
 use super::super::parse;
-use crate::protocol::{BetterEnd, Clock, Measure, Telemetry, Transform, fingerprint};
+use crate::protocol::{
+    BetterEnd, Clock, Measure, OutcomeFamily, Telemetry, Transform, fingerprint,
+};
 
 const STUDY: &str = r#"
 format = "study-protocol/3"
@@ -211,6 +213,8 @@ fn answers_are_outcomes_where_they_are_numbers() {
     let good = r#"
     { id = "load", from = "answers", questions = ["mental", "effort"], better = "lower" },
     { id = "wrong", from = "answers", questions = ["errors"], unit = "errors", better = "lower" },
+    { id = "hits", from = "answers", questions = ["rough"], model = "binomial", of = 7 },
+    { id = "time", from = "clock", model = "gamma" },
 "#;
     let (protocol, found) = read(good);
     let protocol = protocol.unwrap_or_else(|| panic!("{found}"));
@@ -220,7 +224,14 @@ fn answers_are_outcomes_where_they_are_numbers() {
         [
             "load (mean of 2 answers, points, lower is better)",
             "wrong (answer to errors, errors, lower is better)",
+            "hits (answer to rough, points, binomial model of 7 besides)",
+            "time (exploration time, s, gamma model besides)",
         ]
+    );
+    let hits = &protocol.outcomes[2];
+    assert_eq!(
+        (hits.model, hits.of),
+        (Some(OutcomeFamily::Binomial), Some(7))
     );
     for (outcome, told) in [
         (r#"{ id = "x", from = "answers" }"#, "has no `questions`"),
@@ -239,6 +250,26 @@ fn answers_are_outcomes_where_they_are_numbers() {
         (
             r#"{ id = "x", from = "answers", questions = ["effort", "effort"] }"#,
             "`effort` is there twice",
+        ),
+        (
+            r#"{ id = "x", from = "answers", questions = ["errors"], model = "binomial" }"#,
+            "a binomial model needs the number of trials",
+        ),
+        (
+            r#"{ id = "x", from = "answers", questions = ["errors"], model = "poisson", of = 5 }"#,
+            "`of` belongs to a binomial model",
+        ),
+        (
+            r#"{ id = "x", from = "answers", questions = ["errors"], model = "normal" }"#,
+            "it is one of `poisson`, `binomial`, `gamma`",
+        ),
+        (
+            r#"{ id = "x", from = "clock", model = "poisson" }"#,
+            "a Poisson model is of counts, and the exploration time is none",
+        ),
+        (
+            r#"{ id = "x", from = "answers", questions = ["mental", "effort"], model = "binomial", of = 100 }"#,
+            "a binomial model is of counts, and the mean of 2 answers is none",
         ),
     ] {
         let (protocol, found) = read(outcome);

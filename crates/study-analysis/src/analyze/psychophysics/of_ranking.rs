@@ -1,0 +1,75 @@
+//! Rankings of a study.
+
+use super::part_data::{Found, Intervals, PartData};
+use super::ranking::{RankingRow, ranking};
+use super::results::PartResults;
+use crate::analyze::Rules;
+use crate::analyze::warning::Warning;
+use std::collections::{BTreeMap, BTreeSet};
+use study_base::text::{QuestionId, counted};
+use study_plan::protocol::parts::Part;
+use study_plan::protocol::{Answer, Ranking};
+use study_session::outcome::RatingRow;
+
+/// The ranks of a part.
+pub(super) fn of_ranking(
+    part: &Part,
+    own: &Ranking,
+    (rows, intervals): (&[&RatingRow], &Intervals<'_>),
+    rules: &Rules,
+) -> Found {
+    let ranked = |row: &&RatingRow| -> Vec<RankingRow> {
+        let felt = intervals.counted(row);
+        let rank = |(at, question): (usize, &QuestionId)| {
+            let mut interval = felt.iter().filter(|i| i.interval as usize == at + 1);
+            let model = interval.find_map(|i| i.model.as_ref())?;
+            Some(RankingRow {
+                participant: row.participant.as_str().to_owned(),
+                ranking: format!("{} {}", row.session, row.trial),
+                realization: model.as_str().to_owned(),
+                rank: row.answers.get(question).and_then(Answer::number)?,
+            })
+        };
+        let asked = own.asked(&part.asks).iter().enumerate();
+        asked.filter_map(rank).collect()
+    };
+    let ranks: Vec<RankingRow> = rows.iter().flat_map(ranked).collect();
+    let found = ranking(&ranks, (rules.seed, part.id.as_str()));
+    let mut results = PartResults::undefined("");
+    results.over.ranking = Some(found);
+    Found {
+        task: "ranking",
+        trials: rankings(&ranks).len(),
+        results,
+        warnings: tied(&ranks).filter(|_| !own.ties).into_iter().collect(),
+        names: Vec::new(),
+        data: PartData::default(),
+    }
+}
+
+/// The ranks of each ranking.
+fn rankings(ranks: &[RankingRow]) -> BTreeMap<(&str, &str), Vec<f64>> {
+    let mut all: BTreeMap<(&str, &str), Vec<f64>> = BTreeMap::new();
+    for row in ranks {
+        all.entry((&row.participant, &row.ranking))
+            .or_default()
+            .push(row.rank);
+    }
+    all
+}
+
+/// Equal ranks in a part without ties: a correction, in which each rank is changed on its own, can make them.
+fn tied(ranks: &[RankingRow]) -> Option<Warning> {
+    let is_tied = |own: &&Vec<f64>| {
+        let different: BTreeSet<u64> = own.iter().map(|rank| rank.to_bits()).collect();
+        different.len() < own.len()
+    };
+    let n = rankings(ranks).values().filter(is_tied).count();
+    (n > 0).then(|| Warning {
+        code: "tied-ranks",
+        text: format!(
+            "{} equal ranks, which were corrected: they count as ties",
+            counted(n, "ranking has", "rankings have")
+        ),
+    })
+}

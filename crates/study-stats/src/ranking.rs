@@ -1,0 +1,322 @@
+//! Rankings: each participant gives every item of a set a rank, of which several can be the same. Whether participants
+//! agree ([`concordance`]), worths of the items ([`worths`]), and how often one is ranked above another ([`shares`]).
+//!
+//! The model is that of Plackett (1975) and Luce (1959) with the ties of Davidson (1970) for sets of any size (Turner,
+//! van Etten, Firth & Kosmidis 2020, Computational Statistics 35, §2.1). A ranking is a sequence of choices: from the items
+//! A that are left the set S of those with the smallest rank is taken, with a probability in proportion to δ(|S|) times
+//! the geometric mean of the worths in S, over all sets of A whose size is 1 or was tied by somebody; δ(1) = 1. The logarithms of these
+//! weights are linear in those of worths and δ. Of two items this is the model of [`super::pairs`].
+
+use super::friedman::{Friedman, friedman};
+use super::pairs::{
+    Abilities, Comparison, Effect, Fitted, Link, Model, NoAbilities, Row, ability, existence,
+    fitted,
+};
+use super::random::RandomSource;
+use super::rank::doubled_ranks;
+
+/// One ranking.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ranking {
+    /// By item: a smaller rank is above a larger one, equal ones are tied; only their order counts. `None`: not ranked.
+    pub ranks: Vec<Option<f64>>,
+    /// The participant.
+    pub cluster: usize,
+}
+
+/// Most sets of tied items that can be taken in one choice.
+const MOST_SETS: f64 = 5_000.0;
+
+/// Estimated worths.
+#[derive(Debug, Clone)]
+pub struct Worths {
+    /// Logarithms of the worths, which sum to zero, with their differences and errors.
+    pub abilities: Abilities,
+    /// Of each number of items that somebody tied, ascending: ln δ.
+    pub ties: Vec<(usize, Effect)>,
+    /// The logarithm of the likelihood.
+    pub log_likelihood: f64,
+}
+
+impl Worths {
+    /// The worths, which sum to one: the probability that an item has the first rank among all, if it is not tied there.
+    pub fn first(&self) -> Vec<f64> {
+        let powers: Vec<f64> = self.abilities.abilities.iter().map(|a| a.exp()).collect();
+        let sum: f64 = powers.iter().sum();
+        powers.iter().map(|power| power / sum).collect()
+    }
+}
+
+/// A set that is taken from those that are left.
+struct Choice {
+    taken: Vec<usize>,
+    left: Vec<usize>,
+}
+
+/// The choices of a ranking, but for that from a single item.
+fn choices(ranking: &Ranking) -> Vec<Choice> {
+    let ranked = ranking.ranks.iter().enumerate();
+    let mut left: Vec<(usize, f64)> = ranked.filter_map(|(i, r)| Some((i, (*r)?))).collect();
+    left.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
+    let mut all = Vec::new();
+    while left.len() > 1 {
+        let best = left[0].1;
+        let tied = left.iter().take_while(|(_, rank)| *rank == best).count();
+        let items: Vec<usize> = left.iter().map(|(item, _)| *item).collect();
+        all.push(Choice {
+            taken: items[..tied].to_vec(),
+            left: items,
+        });
+        left.drain(..tied);
+    }
+    all
+}
+
+/// All sets of `size` of some items.
+fn sets(items: &[usize], size: usize) -> Vec<Vec<usize>> {
+    if size == 0 {
+        return vec![Vec::new()];
+    }
+    let Some((first, rest)) = items.split_first().filter(|_| size <= items.len()) else {
+        return Vec::new();
+    };
+    let with_first = sets(rest, size - 1).into_iter().map(|mut set| {
+        set.push(*first);
+        set
+    });
+    with_first.chain(sets(rest, size)).collect()
+}
+
+/// Number of sets of `size` of `n` items, at most `n`.
+fn number_of_sets(n: usize, size: usize) -> f64 {
+    (0..size).map(|i| (n - i) as f64 / (i + 1) as f64).product()
+}
+
+/// Every pair of a ranking, as a comparison.
+fn comparisons(ranking: &Ranking) -> Vec<Comparison> {
+    let ranked = ranking.ranks.iter().enumerate();
+    let ranked: Vec<(usize, f64)> = ranked.filter_map(|(i, r)| Some((i, (*r)?))).collect();
+    let mut all = Vec::new();
+    for (at, (first, own)) in ranked.iter().enumerate() {
+        for (second, other) in &ranked[at + 1..] {
+            let one = |holds: bool| if holds { 1.0 } else { 0.0 };
+            all.push(Comparison {
+                first: *first,
+                second: *second,
+                first_preferred: one(own < other),
+                second_preferred: one(own > other),
+                tied: one(own == other),
+                cluster: ranking.cluster,
+            });
+        }
+    }
+    all
+}
+
+/// Maximum-likelihood worths of items 0 … `items` − 1, with standard errors from the observed information. Differences
+/// have those of the sandwich over participants, too ([`Abilities::difference`]).
+///
+/// ```
+/// # use study_stats::ranking::{Ranking, worths};
+/// // One of three participants prefers the second item, two the first.
+/// let ranks = [[1.0, 2.0], [1.0, 2.0], [2.0, 1.0]];
+/// let rankings: Vec<Ranking> = ranks.iter().enumerate()
+///     .map(|(cluster, own)| Ranking { ranks: own.iter().copied().map(Some).collect(), cluster })
+///     .collect();
+/// let found = worths(2, &rankings).unwrap();
+/// assert!((found.first()[0] - 2.0 / 3.0).abs() < 1e-9);
+/// ```
+///
+/// # Errors
+/// [`NoAbilities`] if there is no maximum, or more than 5,000 sets of tied items could be taken in one choice.
+pub fn worths(items: usize, rankings: &[Ranking]) -> Result<Worths, NoAbilities> {
+    let pairs: Vec<Comparison> = rankings.iter().flat_map(comparisons).collect();
+    let with_ties = pairs.iter().any(|pair| pair.tied > 0.0);
+    existence::check(items, &pairs, with_ties, false)?;
+    if pairs.iter().all(|pair| pair.tied > 0.0) {
+        return Err(NoAbilities::AllTied);
+    }
+    let made: Vec<(usize, Choice)> = (rankings.iter())
+        .flat_map(|ranking| {
+            let cluster = ranking.cluster;
+            choices(ranking).into_iter().map(move |c| (cluster, c))
+        })
+        .collect();
+    let mut tied: Vec<usize> = made.iter().map(|(_, choice)| choice.taken.len()).collect();
+    tied.retain(|size| *size > 1);
+    tied.sort_unstable();
+    tied.dedup();
+    let of = |left: usize| -> f64 {
+        let sizes = tied.iter().filter(|size| **size <= left);
+        sizes.map(|size| number_of_sets(left, *size)).sum()
+    };
+    if made.iter().any(|(_, c)| of(c.left.len()) > MOST_SETS) {
+        return Err(NoAbilities::TooManySets);
+    }
+    let size = items - 1 + tied.len();
+    let weight = |set: &[usize]| -> Vec<f64> {
+        let mut sum = vec![0.0; size];
+        for item in set {
+            let own = ability(*item, items, size);
+            sum.iter_mut().zip(own).for_each(|(s, own)| *s += own);
+        }
+        sum.iter_mut().for_each(|s| *s /= set.len() as f64);
+        if let Ok(place) = tied.binary_search(&set.len()) {
+            sum[items - 1 + place] = 1.0;
+        }
+        sum
+    };
+    let row = |(cluster, choice): &(usize, Choice)| {
+        let mut outcomes = vec![(1.0, weight(&choice.taken))];
+        let mut taken = choice.taken.clone();
+        taken.sort_unstable();
+        for size in std::iter::once(1).chain(tied.iter().copied()) {
+            for mut set in sets(&choice.left, size) {
+                set.sort_unstable();
+                if set != taken {
+                    outcomes.push((0.0, weight(&set)));
+                }
+            }
+        }
+        Row {
+            cluster: *cluster,
+            outcomes,
+        }
+    };
+    let rows: Vec<Row> = made.iter().map(row).collect();
+    let model = Model {
+        link: Link::Davidson,
+        order: false,
+    };
+    // A saturated model has the probability 1 of each choice.
+    let of_choices = |at: &[f64]| {
+        let taken = rows
+            .iter()
+            .map(|row| row.probabilities(model.link, at)[0].ln());
+        let free: usize = rows.iter().map(|row| row.outcomes.len() - 1).sum();
+        (-2.0 * taken.sum::<f64>(), free)
+    };
+    let found: Fitted = fitted(items, &rows, model, size, of_choices)?;
+    Ok(Worths {
+        abilities: found.abilities,
+        ties: tied.iter().copied().zip(found.ties).collect(),
+        log_likelihood: found.log_likelihood,
+    })
+}
+
+/// How often one item was ranked above another.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Shares {
+    /// Rankings in which it has the smaller rank.
+    pub above: f64,
+    /// Rankings in which it has the larger rank.
+    pub below: f64,
+    /// Rankings in which both have the same.
+    pub tied: f64,
+}
+
+/// How often item `a` was ranked above item `b`, over the rankings that have both.
+pub fn shares(rankings: &[Ranking], a: usize, b: usize) -> Shares {
+    let mut found = Shares::default();
+    for ranking in rankings {
+        let rank = |item: usize| ranking.ranks.get(item).copied().flatten();
+        let (Some(own), Some(other)) = (rank(a), rank(b)) else {
+            continue;
+        };
+        if own < other {
+            found.above += 1.0;
+        } else if own > other {
+            found.below += 1.0;
+        } else {
+            found.tied += 1.0;
+        }
+    }
+    found
+}
+
+/// Number of random orders in [`concordance`].
+pub const DRAWS: u32 = 9_999;
+
+/// Whether participants rank items alike.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Concordance {
+    /// Kendall's W (1939), corrected for ties, with χ² and its p.
+    pub friedman: Friedman,
+    /// p of W over the orders of the ranks within participants.
+    pub p: Option<f64>,
+    /// Whether all orders were counted. Otherwise p is (b + 1)/(B + 1), with b of B = [`DRAWS`] random orders whose W is at least
+    /// as large.
+    pub exact: bool,
+    /// The smallest p that so many participants could have without ties.
+    pub smallest_p: f64,
+}
+
+/// The smallest p of W that participants can have who rank so many items without ties: that of equal orders.
+///
+/// ```
+/// # use study_stats::ranking::smallest_p;
+/// assert!((smallest_p(3, 2) - 1.0 / 6.0).abs() < 1e-15);
+/// ```
+pub fn smallest_p(items: usize, participants: usize) -> f64 {
+    let orders: f64 = (1..=items).map(|i| i as f64).product();
+    let others = participants.saturating_sub(1);
+    orders.powi(-i32::try_from(others).unwrap_or(i32::MAX))
+}
+
+/// Kendall's W of rows with the ranks of a participant each, of which only the order counts. If items do not differ,
+/// all orders of the ranks of a participant are equally likely. `None` with fewer than two participants or items.
+///
+/// ```
+/// # use study_stats::{random::SplitMix64, ranking::concordance};
+/// let rows = [[1.0, 2.0, 3.0], [1.0, 2.0, 3.0], [1.0, 2.5, 2.5]];
+/// let found = concordance(&rows, &mut SplitMix64::new(1)).unwrap();
+/// assert!(found.exact && found.friedman.kendall_w.unwrap() > 0.9);
+/// ```
+pub fn concordance<R: AsRef<[f64]>>(
+    rows: &[R],
+    random: &mut impl RandomSource,
+) -> Option<Concordance> {
+    let friedman = friedman(rows)?;
+    let items = friedman.mean_ranks.len();
+    let smallest = smallest_p(items, rows.len());
+    let exact = friedman.exact_p.is_some();
+    let mut drawn = || {
+        let mut ranks: Vec<Vec<usize>> = (rows.iter())
+            .map(|row| doubled_ranks(row.as_ref()))
+            .map(|row| {
+                row.iter()
+                    .map(|r| usize::try_from(*r).unwrap_or(0))
+                    .collect()
+            })
+            .collect();
+        let center = rows.len() * (items + 1);
+        let spread = |ranks: &[Vec<usize>]| -> usize {
+            let sums = (0..items).map(|item| ranks.iter().map(|row| row[item]).sum::<usize>());
+            sums.map(|sum| sum.abs_diff(center).pow(2)).sum()
+        };
+        let observed = spread(&ranks);
+        let mut as_large = 1u32;
+        for _ in 0..DRAWS {
+            ranks.iter_mut().for_each(|row| random.shuffle(row));
+            as_large += u32::from(spread(&ranks) >= observed);
+        }
+        f64::from(as_large) / f64::from(DRAWS + 1)
+    };
+    let p = match (friedman.exact_p, friedman.chi2) {
+        (Some(p), _) => Some(p),
+        (None, Some(_)) => Some(drawn()),
+        (None, None) => None,
+    };
+    Some(Concordance {
+        friedman,
+        p,
+        exact,
+        smallest_p: match exact {
+            true => smallest,
+            false => smallest.max(1.0 / f64::from(DRAWS + 1)),
+        },
+    })
+}
+
+#[cfg(test)]
+mod tests;

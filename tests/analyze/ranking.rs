@@ -1,0 +1,149 @@
+//! Ranking: tables of ranks, and a rehearsed study.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use crate::parts::{cells, of_table, rehearsed, study};
+use crate::trials::{analyze, close, csv, golden, joined, text, values};
+use std::fs;
+
+#[test]
+fn ranking_has_its_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = golden("ranking_sim");
+    let table = csv("participant,ranking,realization,rank", &file, joined);
+    let arguments = ["--task", "ranking", "--json"];
+    let found = values(&mut analyze(folder.path(), &table, &arguments));
+    for id in [
+        "agreement/w",
+        "realization/m2/log_worth_se",
+        "ties/3/log_delta",
+        "pair/m1|m2/p_holm",
+        "participant/P5/with_others",
+    ] {
+        close(&found, &file, &format!("ranking/{id}"));
+    }
+    let page = text(&mut analyze(folder.path(), &table, &["--task", "ranking"]));
+    for part in ["mean rank", "m1 − m2", "Ties of 2: ln δ = −1.58", "own W"] {
+        assert!(page.contains(part), "{part}:\n{page}");
+    }
+    let word = "participant,realization,rank\nP1,a,first\n";
+    let done = analyze(folder.path(), word, &["--task", "ranking"])
+        .assert()
+        .code(1);
+    let said = String::from_utf8(done.get_output().stderr.clone()).unwrap();
+    assert!(said.contains("t.csv:2: rank is `first`"), "{said}");
+}
+
+/// Salad dressings ranked by tartness by 32 judges (Vargo 1989, in Critchlow & Fligner 1991). Values of R as in
+/// crates/study-stats/tests/reference/ranking.R.
+#[test]
+fn the_salads_of_vargo_differ_in_tartness() {
+    let counted = [
+        ([4, 3, 2, 1], 1),
+        ([3, 4, 2, 1], 1),
+        ([4, 3, 1, 2], 1),
+        ([4, 1, 3, 2], 6),
+        ([3, 1, 4, 2], 1),
+        ([4, 2, 1, 3], 3),
+        ([4, 1, 2, 3], 11),
+        ([2, 1, 4, 3], 2),
+        ([2, 3, 1, 4], 1),
+        ([3, 1, 2, 4], 2),
+        ([2, 1, 3, 4], 1),
+        ([1, 2, 3, 4], 2),
+    ];
+    // Without a column for it, each has one ranking.
+    let mut table = "participant,realization,rank\n".to_owned();
+    let mut judge = 0;
+    for (ranks, judges) in counted {
+        for _ in 0..judges {
+            judge += 1;
+            for (salad, rank) in ["A", "B", "C", "D"].iter().zip(ranks) {
+                table += &format!("J{judge},{salad},{rank}\n");
+            }
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = ["--task", "ranking", "--json"];
+    let found = values(&mut analyze(folder.path(), &table, &arguments));
+    let number = |id: &str| found[format!("ranking/{id}")].as_f64().unwrap();
+    for (id, expected, tolerance) in [
+        ("n", 32.0, 0.0),
+        ("agreement/w", 0.428_125, 1e-9),
+        ("agreement/chi2", 41.1, 1e-9),
+        ("realization/B/mean_rank", 1.4375, 1e-12),
+        ("realization/A/log_worth", -1.329_572_098, 1e-6),
+        ("realization/B/log_worth", 1.400_341_881, 1e-6),
+        ("realization/B/log_worth_se", 0.252_124_869, 1e-6),
+        ("pair/A|B/difference", -2.729_913_980, 1e-6),
+        ("pair/A|B/se_clustered", 0.554_871_119, 1e-6),
+        ("pair/A|B/above", 4.0 / 32.0, 1e-12),
+        // B is above each other one; of C it is the least sure.
+        ("best/difference", 1.168_375_468, 1e-6),
+        ("best/p", 0.032_279_305, 1e-6),
+    ] {
+        let found = number(id);
+        assert!((found - expected).abs() <= tolerance, "{id}: {found}");
+    }
+    assert!(number("agreement/p") < 0.001);
+}
+
+/// The study and a table of its ranks have the same statistics.
+#[test]
+fn a_rehearsed_ranking_is_that_of_its_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let part = rehearsed(folder.path(), "ranking");
+    let results = folder.path().join("out/ranking");
+    let ranks = ["order", "order-2", "order-3", "order-4"];
+    let columns = [&["participant", "trial", "model"][..], &ranks].concat();
+    let rows = cells(&results.join("ratings.csv"), &columns);
+    assert_eq!(rows.len(), 2 * 2);
+    let columns = ["participant", "trial", "interval", "model"];
+    let felt = cells(&results.join("intervals.csv"), &columns);
+    let mut table = "participant,ranking,realization,rank\n".to_owned();
+    for row in &rows {
+        assert_eq!(row[2], "");
+        let mut own: Vec<&str> = row[3..].iter().map(String::as_str).collect();
+        for (interval, rank) in (1..).zip(&row[3..]) {
+            let interval: String = format!("{interval}");
+            let model = felt.iter().find(|f| f[..2] == row[..2] && f[2] == interval);
+            table += &format!("{},{},{},{rank}\n", row[0], row[1], model.unwrap()[3]);
+        }
+        // Each rank is given once.
+        own.sort_unstable();
+        assert_eq!(own, ["1", "2", "3", "4"]);
+    }
+    assert_eq!(
+        (&part["task"], &part["trials"]),
+        (&"ranking".into(), &4.into())
+    );
+    let values = part["values"].as_object().unwrap();
+    let of_table = of_table(folder.path(), &table, &["ranking"]);
+    for (id, value) in values {
+        let (a, b) = (value.as_f64(), of_table[id].as_f64());
+        let close = (a.zip(b)).is_none_or(|(a, b)| (a - b).abs() <= 1e-9 * b.abs().max(1.0));
+        assert!(a.is_some() == b.is_some() && close, "{id}: {value}");
+    }
+    assert!(values.len() > 60, "{}", values.len());
+    let asked: Vec<&str> = (part["findings"].as_array().unwrap().iter())
+        .map(|finding| finding["question"].as_str().unwrap())
+        .collect();
+    assert_eq!(asked, ["ranked-alike", "ranked-first"]);
+    let (code, page, err) = study(&["analyze", "out/ranking"], folder.path());
+    assert_eq!(code, 0, "{err}");
+    for said in [
+        "Do participants rank the realizations alike?",
+        "Is one realization ranked above each other one?",
+        "Mean ranks: ",
+    ] {
+        assert!(page.contains(said), "{said}:\n{page}");
+    }
+    let analysis = results.join("analysis");
+    for table in ["part_ranks.csv", "part_rank_pairs.csv", "part_rankings.csv"] {
+        assert!(analysis.join(table).is_file(), "{table}");
+    }
+    let report = fs::read_to_string(analysis.join("report.html")).unwrap();
+    assert!(report.contains("the model of Plackett (1975) and Luce (1959)"));
+    let (code, out, err) = study(&["verify", "out"], folder.path());
+    assert_eq!(code, 0, "{out}{err}");
+}
