@@ -343,6 +343,25 @@ def practice_of(seed, part, models, rounds, draw, kind, number):
         yield from once
 
 
+def adjustment_of(seed, part, below, above, repetitions, practice, kind, number):
+    def drawn(stream, levels, n):
+        taken = []
+        while len(taken) < n:
+            once = list(levels)
+            stream.shuffle(once)
+            taken += once
+        return taken[:n]
+
+    stream = Stream(seed, "schedule", "part", part, "practice", kind, str(number))
+    low, high = drawn(stream, below, practice), drawn(stream, above, practice)
+    first = stream.below(2)
+    yield from ((low, high)[(at + first) % 2][at] for at in range(practice))
+    stream = Stream(seed, "schedule", "part", part, "starts", kind, str(number))
+    low, high = drawn(stream, below, repetitions), drawn(stream, above, repetitions)
+    for two in zip(low, high):
+        yield from two[::-1] if stream.below(2) else two
+
+
 def constant_levels(seed, track, levels, repetitions, kind, number):
     stream = Stream(seed, "track", track, kind, str(number))
     for _ in range(repetitions):
@@ -362,6 +381,7 @@ def main():
     what.add_argument("--practice", help="ids by comma, of a part with a criterion")
     what.add_argument("--similarity", help="such as a/b,a/c, pairs of different ones of a part")
     what.add_argument("--ranking", help="ids by comma, of a part")
+    what.add_argument("--adjustment", help="BELOW:ABOVE, the starts of each side by comma")
     parser.add_argument("--part", help="its id")
     parser.add_argument("--repetitions", type=int)
     parser.add_argument("--order", help="blocked, shuffled, williams, latin-square or fixed")
@@ -370,7 +390,7 @@ def main():
     parser.add_argument("--interval-order", default="balanced", choices=["balanced", "random"])
     parser.add_argument("--order-version", type=int, default=1, choices=[1, 2])
     parser.add_argument("--identical", default="", help="ids by comma, compared with themselves")
-    parser.add_argument("--practice-pairs", type=int, default=0)
+    parser.add_argument("--practice-pairs", "--practice-trials", type=int, default=0)
     parser.add_argument("--practice-rankings", type=int, default=0)
     parser.add_argument("--rounds", type=int)
     parser.add_argument("--draw", default="rounds", choices=["rounds", "independent"])
@@ -415,6 +435,12 @@ def main():
             own = order(len(ranked), a.kind, number)
             how = (ranked, a.practice_rankings, own, a.kind, number)
             return rankings_of(a.seed, a.part, *how)
+    elif a.adjustment:
+        head, sides = "start", [side.split(",") for side in a.adjustment.split(":")]
+
+        def lines(number):
+            how = (a.repetitions, a.practice_pairs, a.kind, number)
+            return adjustment_of(a.seed, a.part, *sides, *how)
     elif a.track:
         head, tracks = "track,intervals,easy", [Track(text) for text in a.track]
 

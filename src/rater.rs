@@ -13,13 +13,16 @@
 //! seed, the rater's number and the order of the calls. The number of random draws of an
 //! answer never depends on the realization.
 
+mod adjusting;
 mod comparison;
 mod impression;
 mod remarks;
 
+pub use adjusting::Aim;
 pub use comparison::Percepts;
 pub use impression::{Impression, Reference};
 
+use adjusting::Adjusting;
 use comparison::Comparing;
 
 use study_base::rng::Stream;
@@ -47,6 +50,7 @@ pub struct Rater {
     /// Probability of a comment.
     comment_rate: f64,
     comparing: Comparing,
+    adjusting: Adjusting,
 }
 
 /// Midpoint of the scale of opinions, which goes from 1 to 7.
@@ -65,6 +69,7 @@ impl Rater {
             stream,
             effect,
             comparing: Comparing::new(seed, number),
+            adjusting: Adjusting::new(seed, number),
         }
     }
 

@@ -48,6 +48,7 @@ pub(crate) fn values(text: &str) -> Result<Map<String, Json>, Error> {
         "identification" => vec![(String::new(), identification(input)?)],
         "similarity" => vec![(String::new(), similarity(input)?)],
         "ranking" => vec![(String::new(), ranking(input)?)],
+        "adjustment" => vec![(String::new(), adjustment(input)?)],
         other => return Err(Error::Unknown("the kind", other.to_owned())),
     };
     let mut printed = Map::new();
@@ -542,6 +543,26 @@ fn ranking(input: &Settings) -> Result<Values, Error> {
         .collect::<Result<Vec<_>, Error>>()?;
     let found = analysis::ranking(&rows, (SEED, "table"));
     Ok(named("ranking", &found))
+}
+
+fn adjustment(input: &Settings) -> Result<Values, Error> {
+    let rows = (input.rows()?.iter())
+        .map(|row| {
+            let start = row.name("start").unwrap_or_default();
+            Ok(analysis::SettingRow {
+                participant: row.name("participant").unwrap_or_default(),
+                level: row.number("level")?,
+                ascending: match start.as_str() {
+                    "below" => true,
+                    "above" => false,
+                    _ => return Err(Error::Unknown("the start", start)),
+                },
+                changes: row.number("changes").ok(),
+            })
+        })
+        .collect::<Result<Vec<_>, Error>>()?;
+    let found = analysis::adjustment(&rows, input.known("standard"), (SEED, "table"));
+    Ok(named("adjustment", &found))
 }
 
 fn mushra(input: &Settings) -> Result<Values, Error> {

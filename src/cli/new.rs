@@ -100,6 +100,8 @@ enum TrialKind {
     Similarity,
     /// Ranks of several realizations
     Ranking,
+    /// A level that is set until it feels equal to a standard
+    Adjustment,
     /// Yes or no, with catch trials
     #[value(name = "yesno")]
     YesNo,
@@ -123,6 +125,7 @@ impl TrialKind {
             Self::Identification => (include_str!("new/identification.toml"), &CROSSED),
             Self::Similarity => (include_str!("new/similarity.toml"), &[STATIC]),
             Self::Ranking => (include_str!("new/ranking.toml"), &RANKED),
+            Self::Adjustment => (include_str!("new/adjustment.toml"), &[STATIC]),
             Self::YesNo => (include_str!("new/yesno.toml"), &[STATIC]),
             Self::Abx => (include_str!("new/abx.toml"), &[MODELS[0], MODELS[2]]),
         }

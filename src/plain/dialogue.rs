@@ -5,7 +5,7 @@ use super::pages::{self, Page};
 use crate::tui::keys;
 use study_base::text::{QuestionId, Untrusted, sentence};
 use study_plan::protocol::phrases::{Phrase, Words};
-use study_plan::protocol::{Answer, Given, Question};
+use study_plan::protocol::{Answer, Given, Question, Turn};
 use study_session::outcome::{Author, Choice};
 use study_session::page::{self, Does, NOT_BEGUN};
 use study_session::session::view::{Correctable, DeviceState, Mirror, Telemetry};
@@ -397,6 +397,9 @@ impl Dialogue {
                 }
             },
             Screen::SaveTrouble { .. } => Ok(vec![Input::RetrySave]),
+            Screen::Playing { .. } if turn(&key, view).is_some() => {
+                Ok(turn(&key, view).map(Input::Adjust).into_iter().collect())
+            }
             Screen::Form {
                 form, questions, ..
             } => {
@@ -531,6 +534,17 @@ fn preset(participant: &str, roster: Option<&Roster>) -> String {
     match (participant, roster.and_then(Roster::unfinished)) {
         ("", Some((unfinished, _))) => unfinished.to_string(),
         _ => participant.to_owned(),
+    }
+}
+
+/// What a typed line changes where a level is set.
+fn turn(line: &str, view: &View) -> Option<Turn> {
+    let own = view.adjusting.as_ref().filter(|own| !own.at_standard)?;
+    match line {
+        "-" | "−" if own.can_lower => Some(Turn::Lower),
+        "+" if own.can_higher => Some(Turn::Higher),
+        "r" if own.has_standard => Some(Turn::Standard),
+        _ => None,
     }
 }
 

@@ -1,13 +1,14 @@
 //! The lines of a page.
 
 use super::answers;
+use crate::tui::keys;
 use crate::tui::views::prose::choices;
 use crate::tui::wrap;
 use study_base::text::sentence;
 use study_plan::protocol::Question;
 use study_plan::protocol::phrases::{Phrase, Words};
 use study_session::outcome::FormId;
-use study_session::page::{self, Does, Kind, attending};
+use study_session::page::{self, Button, Does, Kind, attending};
 use study_session::session::{Screen, View};
 
 /// A page in words.
@@ -99,6 +100,12 @@ impl Page {
             other => other,
         };
         self.lines.push(words.get(attend).to_owned());
+        let set = view.adjusting.as_ref().filter(|own| !own.at_standard);
+        if let Some(own) = set {
+            let mut lines = answers::text(&own.prompt);
+            lines.append(&mut self.lines);
+            self.lines = lines;
+        }
         // Said once; a countdown would never end to be read.
         let whole = content.playback.as_ref().and_then(|p| p.whole.as_ref());
         self.wait = whole.map(|whole| sentence(whole));
@@ -107,6 +114,12 @@ impl Page {
             (None, true) => words.get(Phrase::PlainRate).to_owned(),
             (None, false) => words.get(Phrase::PlainContinue).to_owned(),
         };
+        if set.is_some() {
+            let choice = |b: &Button| format!("{}: {}.", typed(said(b.does), words), b.label);
+            let enabled = content.buttons.iter().filter(|b| b.enabled).map(choice);
+            let all = content.wait.iter().cloned().chain(enabled);
+            self.prompt = all.collect::<Vec<_>>().join(" ");
+        }
     }
 
     fn prose(&mut self, view: &View, content: &page::Page) {
@@ -139,6 +152,15 @@ impl Page {
             }
             _ => content.advice.clone().unwrap_or_default(),
         };
+    }
+}
+
+/// What is typed for a step, where a key has an arrow.
+fn said(does: Does) -> &'static str {
+    match does {
+        Does::Lower => "-",
+        Does::Higher => "+",
+        other => keys::of(other),
     }
 }
 

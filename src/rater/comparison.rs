@@ -8,6 +8,7 @@
 
 mod ranking;
 
+use super::adjusting::equal;
 use super::{Effect, Impression, MIDPOINT, Rater, Reference};
 use ranking::ranked;
 use std::collections::BTreeMap;
@@ -58,6 +59,8 @@ pub struct Percepts {
     /// Of two realizations with labels, or of a part of similarity, the distance between them, N; the one
     /// that sorts first comes first.
     between: BTreeMap<(ModelId, ModelId), f64>,
+    /// Of each part of adjustment the place in its ladder that feels equal to its standard.
+    equal: BTreeMap<PartId, f64>,
 }
 
 impl Percepts {
@@ -76,7 +79,9 @@ impl Percepts {
             distances: BTreeMap::new(),
             from_reference: BTreeMap::new(),
             between: between(protocol, tables, &reference),
+            equal: BTreeMap::new(),
         };
+        percepts.equal = equal(protocol, tables, &percepts.impressions, &reference);
         for part in &protocol.parts {
             let Task::Mushra(own) = &part.task else {
                 continue;
@@ -152,6 +157,11 @@ impl Percepts {
         } else {
             0.0
         })
+    }
+
+    /// The place in the ladder of a part of adjustment, from 0, that feels equal to its standard.
+    pub fn equal(&self, part: &PartId) -> Option<f64> {
+        self.equal.get(part).copied()
     }
 
     /// The impression of a realization.
@@ -350,7 +360,10 @@ impl Rater {
             _ => {}
         }
         let method = match &trial.stimuli {
-            Stimuli::One { .. } | Stimuli::Rated { .. } | Stimuli::Set { .. } => return None,
+            Stimuli::One { .. }
+            | Stimuli::Rated { .. }
+            | Stimuli::Set { .. }
+            | Stimuli::Adjusted { .. } => return None,
             Stimuli::Pair { .. } | Stimuli::Search { .. } => None,
             Stimuli::Track { track, .. } => Some(protocol.track(track)?.method),
         };

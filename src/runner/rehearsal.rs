@@ -7,15 +7,18 @@
 
 use super::clock::VirtualClock;
 use super::{Runner, Setup};
-use crate::rater::{Percepts, Rater};
+use crate::rater::{Aim, Percepts, Rater};
 use chrono::{DateTime, FixedOffset};
 use std::time::Duration;
 use study_base::text::{ModelId, QuestionId};
-use study_plan::protocol::{Answer, Protocol, Question, Trial};
+use study_plan::protocol::{Answer, Protocol, Question, Stimuli, Trial, Turn};
+use study_session::session::view::Adjusting;
 use study_session::session::{Config, Ending, Input, Screen, View};
 
 /// Time that a rater spends on a screen without a question, s.
 const GLANCE_S: f64 = 2.0;
+/// Time with a level that is set, relative to that with a realization.
+const LEVEL: f64 = 0.2;
 /// Maximum number of turns; a session that does not end by then has a bug.
 const MAX_TURNS: u32 = 5_000_000;
 
@@ -133,6 +136,8 @@ struct Felt<'a> {
 struct Plan {
     /// Remaining exploration time, s; `None`: not drawn yet for this playback.
     exploring_s: Option<f64>,
+    /// Where the hand goes in a trial of adjustment.
+    aim: Option<(u32, Aim)>,
 }
 
 impl Plan {
@@ -183,13 +188,25 @@ impl Plan {
             } => {
                 // In small steps, so that telemetry arrives as in a real session.
                 const PIECE_S: f64 = 0.25;
-                let left = self
-                    .exploring_s
-                    .get_or_insert_with(|| rater.exploration_s());
+                let most_s = exposure.max_s.map_or(f64::INFINITY, |max| 0.8 * max);
+                let left = self.exploring_s.get_or_insert_with(|| {
+                    let whole_s = rater.exploration_s();
+                    match view.adjusting {
+                        Some(_) => (LEVEL * whole_s).min(most_s),
+                        None => whole_s,
+                    }
+                });
                 let until = exposure.left_s(*since_s).unwrap_or(PIECE_S);
                 pass(PIECE_S.min(left.max(0.02)).min(until));
                 *left -= PIECE_S;
-                if *left <= 0.0 && !keep_exploring {
+                let over = *left <= 0.0;
+                let turn = match &view.adjusting {
+                    Some(own) if over => self.adjust(own, rater, felt),
+                    _ => None,
+                };
+                if let Some(turn) = turn {
+                    vec![Input::Adjust(turn)]
+                } else if over && !keep_exploring {
                     vec![Input::Advance]
                 } else {
                     Vec::new()
@@ -197,7 +214,7 @@ impl Plan {
             }
             Screen::Stopped { can_rate } => {
                 pass(GLANCE_S);
-                vec![if *can_rate {
+                vec![if *can_rate && view.adjusting.is_none() {
                     Input::RateStopped
                 } else {
                     Input::PlayAgain
@@ -217,6 +234,28 @@ impl Plan {
             }
             Screen::SaveTrouble { .. } => Vec::new(),
         }
+    }
+}
+
+impl Plan {
+    /// What the hand does to the level that it feels; `None` if it goes on.
+    fn adjust(&mut self, own: &Adjusting, rater: &mut Rater, felt: &Felt<'_>) -> Option<Turn> {
+        let (trial, _) = felt.trial.filter(|_| !own.at_standard)?;
+        let part = trial.part.as_ref()?;
+        let task = felt.protocol.part(part)?.task.adjustment()?;
+        let Stimuli::Adjusted { start, .. } = &trial.stimuli else {
+            return None;
+        };
+        let known = self.aim.filter(|(of, _)| *of == trial.trial);
+        let Some((_, aim)) = known else {
+            let aim = rater.aim(task, start, felt.percepts.equal(part));
+            self.aim = Some((trial.trial, aim));
+            return match aim.compares && own.has_standard {
+                true => Some(Turn::Standard),
+                false => aim.turn(task, felt.model?),
+            };
+        };
+        aim.turn(task, felt.model?)
     }
 }
 

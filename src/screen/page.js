@@ -94,6 +94,7 @@
 
   const button = (does, label, cls) => {
     const node = make("button", { type: "button", className: cls, textContent: label });
+    node.dataset.does = does;
     node.addEventListener("click", () => send(does));
     return node;
   };
@@ -307,6 +308,9 @@
     } else if (e.key === "Enter") {
       if (e.repeat) e.preventDefault();
       else if (idle) main.querySelector(".buttons .main:not(:disabled)")?.click();
+    } else if (idle && !e.repeat && (e.key === "ArrowLeft" || e.key === "ArrowRight")) {
+      const does = e.key === "ArrowLeft" ? "lower" : "higher";
+      main.querySelector(`.buttons [data-does="${does}"]:not(:disabled)`)?.click();
     }
   });
 

@@ -1,5 +1,6 @@
 //! From ratings to statistics, report and figures.
 
+mod adjustment;
 mod checks;
 mod command;
 #[path = "../support/designs.rs"]

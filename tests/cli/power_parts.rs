@@ -274,12 +274,13 @@ fn what_is_not_simulated_is_said() {
         "identification",
         "similarity",
         "ranking",
+        "adjustment",
     ] {
         let protocol = new(kind, dir);
         let (code, _, err) = study(&["power", &protocol], dir);
         assert_eq!(code, 1, "{err}");
         for part in [
-            "not magnitude estimation, MUSHRA, identification, similarity and ranking",
+            "not magnitude estimation, MUSHRA, identification, similarity, ranking and adjustment",
             "--scale continuous",
         ] {
             assert!(err.contains(part), "{err}");

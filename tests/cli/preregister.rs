@@ -284,6 +284,15 @@ fn tracks_and_estimates_are_declared() {
                 "Power was not computed:",
             ],
         ),
+        (
+            "adjustment",
+            &[
+                "a level of `detent` is set 3 times from below and as often from above, one step of its 21 levels at a time, until it feels equal to 1; where it starts is drawn",
+                "Part `equal`: Do settings differ from the standard? Decided by: t test over participants",
+                "Part `equal`: Do settings depend on the side from which they start? Decided by: t test over participants",
+                "Power was not computed:",
+            ],
+        ),
     ] {
         let folder = tempfile::tempdir().unwrap();
         let at = folder.path();

@@ -244,6 +244,7 @@ fn the_templates_of_parts_are_valid_and_broken_ones_are_not() {
         "identification",
         "similarity",
         "ranking",
+        "adjustment",
         "yesno",
         "abx",
         "search",

@@ -17,7 +17,7 @@ fn a_new_study_of_each_kind_names_the_schema_beside_it() {
     let home = tempfile::tempdir().unwrap();
     let (code, schema, _) = study(&["schema"], home.path());
     assert_eq!(code, 0);
-    let kinds = "rating factorial pairs 2ifc staircase questplus magnitude mushra yesno abx search identification similarity ranking";
+    let kinds = "rating factorial pairs 2ifc staircase questplus magnitude mushra yesno abx search identification similarity ranking adjustment";
     for kind in kinds.split(' ') {
         let (code, _, err) = study(&["new", kind, "--kind", kind], home.path());
         assert_eq!((code, err.as_str()), (0, ""));

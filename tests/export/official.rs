@@ -175,6 +175,7 @@ fn studies(home: &Path) -> Vec<(PathBuf, &'static [&'static str])> {
         several("identification", 6),
         several("similarity", 6),
         several("ranking", 6),
+        several("adjustment", 6),
     ]
 }
 

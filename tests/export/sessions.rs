@@ -238,6 +238,16 @@ fn the_headline_of_groups_and_sessions_is_that_of_the_analysis() {
                 "ranking/pair/lambda-0.9991|spring/above",
             ],
         ),
+        (
+            "adjustment",
+            "",
+            &[
+                "adjustment/pse",
+                "adjustment/error/p",
+                "adjustment/start/t",
+                "adjustment/spread/sd",
+            ],
+        ),
     ] {
         let home = tempfile::tempdir().unwrap();
         let folder = match kind {

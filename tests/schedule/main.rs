@@ -1,5 +1,6 @@
 //! Orders: golden, uniform, reproducible.
 
+mod adjustment;
 mod answers;
 mod command;
 #[path = "../support/designs.rs"]

@@ -110,7 +110,7 @@ fn ours(protocol: &Protocol, part: &str, head: &str, kind: fn(u32) -> Seat) -> S
 }
 
 /// `None` without Python.
-fn theirs(arguments: &[String]) -> Option<String> {
+pub(crate) fn theirs(arguments: &[String]) -> Option<String> {
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/schedule.py");
     if Command::new("python3").arg("--version").output().is_err() {
         return None;
@@ -129,9 +129,9 @@ fn theirs(arguments: &[String]) -> Option<String> {
     )
 }
 
-const KINDS: [fn(u32) -> Seat; 3] = [Seat::Row, Seat::Pilot, Seat::Simulated];
+pub(crate) const KINDS: [fn(u32) -> Seat; 3] = [Seat::Row, Seat::Pilot, Seat::Simulated];
 
-fn words(texts: &[&str]) -> Vec<String> {
+pub(crate) fn words(texts: &[&str]) -> Vec<String> {
     texts.iter().map(|text| (*text).to_owned()).collect()
 }
 

@@ -2,6 +2,7 @@
 //! the tests play. Every step of every test also passes the walls in `rig`.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod adjustment;
 mod agreement;
 mod between;
 mod blinding;

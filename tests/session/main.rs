@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod adjusting_channels;
+mod adjustment_by_keys;
 mod another_build;
 mod blinding;
 mod bridges;

@@ -81,7 +81,7 @@ pub(crate) fn models() -> String {
 }
 
 /// The events of the session so far.
-fn events(folder: &Path) -> Vec<Json> {
+pub(crate) fn events(folder: &Path) -> Vec<Json> {
     // Of several sessions, the last.
     let sessions = folder.join("results/p/sessions/P01");
     let session = ["2", "1"].map(|number| sessions.join(number));
@@ -98,7 +98,7 @@ fn events(folder: &Path) -> Vec<Json> {
     text.concat().lines().filter_map(event).collect()
 }
 
-fn of(event: &Json, name: &str) -> bool {
+pub(crate) fn of(event: &Json, name: &str) -> bool {
     event["event"] == name
 }
 
@@ -172,7 +172,7 @@ fn play_until(
     panic!("the session ended before");
 }
 
-fn start_with(folder: &Path, more: &[&str]) -> Terminal {
+pub(crate) fn start_with(folder: &Path, more: &[&str]) -> Terminal {
     let arguments = [&["run", "p", "--operator", "lw"], more].concat();
     // The clock of a hurried session runs ahead: not where a serial device or the time between
     // two sessions counts.

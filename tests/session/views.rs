@@ -141,6 +141,7 @@ pub(crate) fn view(screen: Screen) -> View {
         force: true,
         has_reference: false,
         numbered: false,
+        adjusting: None,
         progress: before.then_some(Progress {
             practice: false,
             current: 7,

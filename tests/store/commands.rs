@@ -318,7 +318,7 @@ fn verify_of_a_new_study_says_that_something_is_not_checked_only_where_it_is() {
     let analysis = "Not checked: analysis/, which `study analyze` writes again.";
     assert_eq!(verify(0), [analysis]);
     fs::write(folder.join("new/turn-signal/protocol/1/protocol.toml"), "x").unwrap();
-    let tables = "Not checked: the derived tables, tracks, searches and ends of practice, because the frozen protocol cannot be read.";
+    let tables = "Not checked: the derived tables, tracks, searches, ends of practice and steps of adjustments, because the frozen protocol cannot be read.";
     assert_eq!(verify(4), [tables, analysis]);
 }
 

@@ -3,11 +3,12 @@
 
 #![allow(clippy::unwrap_used)]
 
-use crate::world::{Kept, at, protocol, real, session, telemetry};
+use crate::world::{Kept, at, model, protocol, real, request, session, telemetry};
 use std::fs;
 use std::path::Path;
-use study_session::outcome::Event;
-use study_session::store::{Finding, StudyFolder};
+use study_plan::protocol::Answer;
+use study_session::outcome::{Event, FormId, Moment};
+use study_session::store::{Finding, SeatKind, StudyFolder};
 
 fn open(results: &Path) -> StudyFolder {
     StudyFolder::open_or_create(results, &Kept::new().frozen(), at(0)).unwrap()
@@ -169,4 +170,73 @@ fn practice_that_ended_before_or_after_its_criterion_is_a_problem() {
             "{problem}"
         );
     }
+}
+
+/// The changes of a level are replayed: one to the other end of the ladder is a problem, and so is an answer that is not the
+/// level that was felt last.
+#[test]
+fn a_change_of_many_steps_and_another_answer_are_problems() {
+    let home = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        let (code, out, err) = crate::support::study(arguments, home.path());
+        assert_eq!(code, 0, "{out}{err}");
+    };
+    run(&["new", "--seed", "20261123", "set", "--kind", "adjustment"]);
+    run(&["rehearse", "set", "--participants", "2", "--out", "out"]);
+    let text = fs::read_to_string(home.path().join("set/protocol.toml")).unwrap();
+    let protocol = study_plan::protocol::file::parse("p", &text)
+        .protocol
+        .unwrap();
+    let rehearsed = StudyFolder::open(&home.path().join("out/set")).unwrap();
+    assert_eq!(
+        problems(&rehearsed.verify(Some(&protocol)).unwrap()),
+        [""; 0]
+    );
+    let all = rehearsed.sessions().unwrap();
+    let events: Vec<Event> = all[0].entries.iter().map(|e| e.event.clone()).collect();
+
+    // The same session in a journal of its own, but for one event.
+    let planted = |change: fn(&mut Event) -> bool| {
+        let results = tempfile::tempdir().unwrap();
+        let study = open(results.path());
+        let id = all[0].participant.as_str();
+        let mut claimed = study.claim(&request(id, SeatKind::Simulated)).unwrap();
+        let mut journal = claimed.folder.journal().unwrap();
+        let mut events = events.clone();
+        assert!(events.iter_mut().any(change));
+        let timed: Vec<(Moment, &Event)> = (0..).map(at).zip(&events).collect();
+        journal.append_all(&timed).unwrap();
+        let mut found = problems(&study.verify(Some(&protocol)).unwrap());
+        found.retain(|problem| problem.contains("adjustment `equal`"));
+        found
+    };
+    assert_eq!(planted(|_| true), [""; 0]);
+    let jumped = planted(|event| match event {
+        Event::Adjusted {
+            to,
+            standard: false,
+            ..
+        } => {
+            let step: usize = to.as_str().rsplit('.').next().unwrap().parse().unwrap();
+            *to = model(if step > 10 { "detent.1" } else { "detent.21" });
+            true
+        }
+        _ => false,
+    });
+    assert_eq!(jumped.len(), 1, "{jumped:?}");
+    assert!(jumped[0].ends_with("which is not a step"), "{jumped:?}");
+    let answered = planted(|event| match event {
+        Event::Answered {
+            form: FormId::Trial { .. },
+            answer: Answer::Number(level),
+            ..
+        } => {
+            *level += 0.05;
+            true
+        }
+        _ => false,
+    });
+    assert_eq!(answered.len(), 1, "{answered:?}");
+    let another = "and another level was felt last";
+    assert!(answered[0].ends_with(another), "{answered:?}");
 }

@@ -75,6 +75,7 @@ impl Kind {
             }
             Self::Task(TableKind::Similarity) => &["participant", "first", "second", "rating"],
             Self::Task(TableKind::Ranking) => &["participant", "ranking", "realization", "rank"],
+            Self::Task(TableKind::Adjustment) => &["participant", "start", "level", "standard"],
         }
     }
 
@@ -85,6 +86,7 @@ impl Kind {
             Self::Task(TableKind::Trials(_)) => &["participant"],
             Self::Task(TableKind::Identification) => &["participant", "target", "answer"],
             Self::Task(TableKind::Ranking) => &["participant", "realization", "rank"],
+            Self::Task(TableKind::Adjustment) => &["participant", "start", "level"],
             Self::Task(_) => self.columns(),
         }
     }
@@ -98,6 +100,7 @@ impl Kind {
             Self::Task(TableKind::Magnitude) => &["estimate"],
             Self::Task(TableKind::Mushra | TableKind::Similarity) => &["rating"],
             Self::Task(TableKind::Ranking) => &["rank"],
+            Self::Task(TableKind::Adjustment) => &["level"],
         }
     }
 

@@ -446,7 +446,7 @@ fn analyzed(ratings: &Ratings, rules: &Rules, progress: Option<&Progress>) -> An
 }
 
 /// Whether the primary question is analyzed as a rating: numbers other than estimates of
-/// magnitude, ranks and ratings of two realizations, or the share of an answer.
+/// magnitude, ranks, levels that were set and ratings of two realizations, or the share of an answer.
 pub fn is_rated(protocol: &Protocol) -> bool {
     !protocol.has_other_numbers(&protocol.analysis.primary) && question(protocol, None).is_ok()
 }

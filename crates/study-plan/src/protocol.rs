@@ -7,6 +7,7 @@
 //! [`keys`] declares what a file can hold, and `docs/protocol.md` documents every
 //! key.
 
+pub mod adjustment;
 pub mod answer;
 pub mod check;
 pub mod columns;
@@ -44,6 +45,7 @@ mod section;
 pub mod similarity;
 pub mod spaces;
 
+pub use adjustment::{Adjustment, AdjustmentWords, Turn};
 pub use answer::{Answer, Given, Refusal};
 pub use confirms::Confirms;
 pub use control::{Control, Pick};

@@ -16,6 +16,7 @@
 //!
 //! Positions count from 1.
 
+mod adjustment;
 pub mod balance;
 mod completions;
 pub mod constraints;
@@ -36,6 +37,7 @@ use crate::protocol::{
     Drawn, FileOrders, Identification, Magnitude, Mushra, Occasion, Order, PartsOrder, Protocol,
     Stimuli, Task,
 };
+use adjustment::AdjustmentOrders;
 use constraints::Violation;
 use pairs::PairOrders;
 use search::SearchOrders;
@@ -268,6 +270,7 @@ enum Kind {
     Tracks(TrackOrders),
     Search(SearchOrders),
     Ranking(Sequence),
+    Adjustment(AdjustmentOrders),
 }
 
 /// A trial of a part before it is numbered.
@@ -357,6 +360,9 @@ impl Planner {
                     own.models.clone(),
                     None,
                 )?),
+                Task::Adjustment(own) => {
+                    Kind::Adjustment(AdjustmentOrders::new(seed, &part.id, own))
+                }
             };
             Ok(PartOrders {
                 part: id.cloned(),
@@ -366,8 +372,12 @@ impl Planner {
                     .map(|criterion| (criterion.rounds, criterion.draw)),
                 seed,
                 reference: part.task.reference().cloned(),
-                drawn: Some(part.task.clone())
-                    .filter(|task| matches!(task, Task::Similarity(_) | Task::Ranking(_))),
+                drawn: Some(part.task.clone()).filter(|task| {
+                    matches!(
+                        task,
+                        Task::Similarity(_) | Task::Ranking(_) | Task::Adjustment(_)
+                    )
+                }),
                 kind,
             })
         };
@@ -431,7 +441,7 @@ impl Planner {
     pub fn verify(&self, participants: u32) -> Result<(), ScheduleError> {
         self.parts.iter().try_for_each(|part| match &part.kind {
             Kind::Rating(sequence) | Kind::Ranking(sequence) => sequence.verify(participants),
-            Kind::Pairs(_) | Kind::Tracks(_) | Kind::Search(_) => Ok(()),
+            Kind::Pairs(_) | Kind::Tracks(_) | Kind::Search(_) | Kind::Adjustment(_) => Ok(()),
         })
     }
 }
@@ -445,6 +455,7 @@ impl PartOrders {
             Kind::Tracks(tracks) => tracks.plan(seat),
             Kind::Search(search) => search.plan(seat),
             Kind::Ranking(sequence) => ranking::ranked(sequence, seat)?,
+            Kind::Adjustment(adjustment) => adjustment.plan(seat),
         };
         let last = |of: fn(&Trial) -> u32, practice: bool| {
             let same = trials.iter().filter(|t| t.practice == practice);
@@ -490,6 +501,9 @@ impl PartOrders {
             }
             (Some(Task::Ranking(own)), Some(part)) => {
                 return ranking::practiced(self.seed, part, own, seat);
+            }
+            (Some(Task::Adjustment(own)), Some(part)) => {
+                return adjustment::practiced(self.seed, part, own, seat);
             }
             _ => {}
         }

@@ -5,6 +5,7 @@
 //! data do not allow are left out. Each figure has two widths, those of two
 //! columns and of one column of a journal.
 
+mod adjustment;
 mod counts;
 mod factors;
 mod flow;

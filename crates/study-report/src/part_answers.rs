@@ -55,6 +55,9 @@ fn answer(part: &PartAnalysis, f: &PartFinding) -> Option<Answer> {
     if f.question == PartQuestion::RankedAlike {
         answer.main.extend(ranks(part));
     }
+    if f.question == PartQuestion::Starts {
+        answer.main.extend(settings(part));
+    }
     if f.question == PartQuestion::Sessions {
         answer.main.extend(retest(part));
     }
@@ -133,6 +136,7 @@ pub(super) fn results(part: &PartAnalysis) -> String {
     text.extend(agreement(part));
     text.extend(identical(part));
     text.extend(ranks(part));
+    text.extend(settings(part));
     let tested = part.findings.iter().filter(|f| f.test.is_some());
     text.extend(tested.filter_map(|f| wording::of_part(part, f).paper()));
     text.extend(dimensions(part));
@@ -260,6 +264,27 @@ fn ranks(part: &PartAnalysis) -> Option<String> {
         .map(|(name, mean)| format!("{name} {}", apa::two(*mean)))
         .collect();
     (!listed.is_empty()).then(|| format!("Mean ranks: {}.", listed.join(", ")))
+}
+
+/// Where levels feel equal, and how much settings scatter.
+fn settings(part: &PartAnalysis) -> Option<String> {
+    let found = part.results.over.adjustment.as_ref()?;
+    let pse = apa::plain(found.pse.number()?);
+    let ci95 = found.pse_ci95.ends();
+    let ci95 = ci95.map_or_else(String::new, |(low, high)| {
+        format!(", 95 % CI [{}, {}]", apa::plain(low), apa::plain(high))
+    });
+    let spread = found.spread.sd.number().map_or_else(String::new, |sd| {
+        let share = found.spread.relative.number();
+        let share = share.map_or_else(String::new, |share| format!(" ({} of it)", apa::percent(share)));
+        format!(
+            " Settings of a participant scattered by {}{share} from one side, one standard deviation.",
+            apa::plain(sd)
+        )
+    });
+    Some(format!(
+        "The point of subjective equality was {pse} on average{ci95}.{spread}"
+    ))
 }
 
 /// How different something is from itself.

@@ -270,7 +270,7 @@ fn left_out(left: &LeftOut) -> Vec<String> {
     }
     if !left.never.is_empty() {
         found.push(format!(
-            "the power of magnitude estimation, MUSHRA, identification, similarity, ranking and searches is not computed: part {}",
+            "the power of magnitude estimation, MUSHRA, identification, similarity, ranking, adjustment and searches is not computed: part {}",
             ids(&left.never)
         ));
     }

@@ -279,6 +279,8 @@ analysis = { primary = "better" }
             PartQuestion::MapFollows("VAF".to_owned()),
             PartQuestion::RankedAlike,
             PartQuestion::RankedFirst,
+            PartQuestion::Adjusted,
+            PartQuestion::Starts,
             PartQuestion::Groups,
             PartQuestion::GroupsConditions,
             PartQuestion::Sessions,

@@ -20,6 +20,7 @@ pub use question::{Asked, Field};
 use crate::session::{Screen, View};
 use serde::{Deserialize, Serialize};
 use study_base::text::{Untrusted, capital, cut_end};
+use study_plan::protocol::Turn;
 use study_plan::protocol::phrases::{Phrase, Words};
 
 /// A page.
@@ -187,6 +188,12 @@ pub enum Does {
     Back,
     /// Rates after a stop.
     RateStopped,
+    /// Takes a step down, where a level is set.
+    Lower,
+    /// Takes a step up.
+    Higher,
+    /// Feels the standard again, beside which a level is set.
+    Compare,
     /// Declines the first question.
     Decline,
     /// Stops the device.
@@ -206,6 +213,18 @@ pub enum Does {
     /// Leaves the session.
     #[serde(skip_deserializing)]
     Quit,
+}
+
+impl Does {
+    /// What it changes where a level is set.
+    pub fn turn(self) -> Option<Turn> {
+        match self {
+            Self::Lower => Some(Turn::Lower),
+            Self::Higher => Some(Turn::Higher),
+            Self::Compare => Some(Turn::Standard),
+            _ => None,
+        }
+    }
 }
 
 /// A question before something that cannot be undone.

@@ -25,6 +25,7 @@
 //! Effects must be carried out in order. [`Effect::Limp`] also cancels a load: no
 //! [`Input::DeviceLoaded`] for it may follow.
 
+mod adjusting;
 mod away;
 mod between;
 mod failures;
@@ -265,6 +266,7 @@ impl Session {
             Input::MarkBad { reason } => self.mark_bad(reason, at),
             Input::PlayAgain => self.play_again(at),
             Input::RateStopped => self.rate_stopped(at),
+            Input::Adjust(turn) => self.adjust(turn, at),
             Input::Back => self.back(),
             Input::Pause => self.pause(at),
         }

@@ -29,6 +29,7 @@
 //! | How do estimated magnitudes grow? | [`magnitude`] |
 //! | How well are several stimuli identified, and which are confused? | [`identification`] |
 //! | How different do stimuli seem, and along which dimensions? | [`similarity`] |
+//! | At which level do two stimuli feel equal, as subjects set it? | [`adjustment`] |
 //! | Who is screened in a MUSHRA test? | [`mushra`] |
 //! | Does a test reject at its level? | [`level`] |
 //! | Can a printed mean and standard deviation be right? | [`grim`] |
@@ -52,6 +53,7 @@
 //! repository collects them, and says what every result was compared with.
 //! `examples/ratings.rs` is a short analysis.
 
+pub mod adjustment;
 pub mod agreement;
 pub mod anova;
 pub mod bayes;

@@ -7,8 +7,8 @@ use std::fmt::Write as _;
 use study_base::text::{ModelId, PartId, Untrusted, counted};
 use study_plan::procedure::{Rule, Staircase};
 use study_plan::protocol::{
-    Identification, Interval, IntervalOrder, Magnitude, Mushra, Pairs, Part, PartsOrder, Protocol,
-    Ranking, SearchTask, Stimuli, Task, TrackRules, Trial,
+    Adjustment, Identification, Interval, IntervalOrder, Magnitude, Mushra, Pairs, Part,
+    PartsOrder, Protocol, Ranking, SearchTask, Stimuli, Task, TrackRules, Trial,
 };
 use study_report::study::search_rule;
 
@@ -87,6 +87,7 @@ pub(super) fn render(protocol: &Protocol, plans: &Plans, width: usize) -> String
                 pairs(&mut out, protocol, part, &task.pairs(), &own, width);
             }
             Task::Ranking(task) => ranking(&mut out, protocol, part, task, &own, width),
+            Task::Adjustment(task) => adjustment(&mut out, protocol, task, &own, width),
         }
     }
     out
@@ -245,6 +246,38 @@ fn search(out: &mut String, task: &SearchTask, plans: &Plans, width: usize) {
     };
     orders(out, plans, 1, width, code);
     out.push_str("\nPairs follow from the answers; docs/search.md says how.\n");
+}
+
+/// At which level each setting starts; the others follow from the participant.
+fn adjustment(
+    out: &mut String,
+    protocol: &Protocol,
+    task: &Adjustment,
+    plans: &Plans,
+    width: usize,
+) {
+    let settings = counted(task.repetitions as usize, "setting", "settings");
+    let _ = writeln!(
+        out,
+        "{settings} of {} from below, and as many from above",
+        task.family
+    );
+    if let Some(standard) = &task.standard {
+        let _ = writeln!(out, "{standard} is felt first in each trial");
+    }
+    if task.practice > 0 {
+        let trials = counted(task.practice as usize, "trial", "trials");
+        let _ = writeln!(out, "Practice, before every order: {trials}, drawn");
+    }
+    let starts: Vec<ModelId> = task.below.iter().chain(&task.above).cloned().collect();
+    let codes = Codes::of(&starts);
+    legend(out, protocol, &starts, &codes);
+    let code = |trial: &Trial| match &trial.stimuli {
+        Stimuli::Adjusted { start, .. } => codes.of_model(start).to_owned(),
+        _ => String::new(),
+    };
+    orders(out, plans, codes.width(), width, code);
+    out.push_str("\nEach trial starts at this level; what follows is set by the participant.\n");
 }
 
 /// The order of tracks and of the intervals of their trials, and how often each sequence

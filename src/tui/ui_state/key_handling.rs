@@ -8,7 +8,7 @@ use crate::tui::keys::{self, Key};
 use crossterm::event::Event;
 use study_base::text::QuestionId;
 use study_plan::protocol::phrases::{Phrase, Words};
-use study_plan::protocol::{Answer, Question};
+use study_plan::protocol::{Answer, Question, Turn};
 use study_session::outcome::Choice;
 use study_session::page::{self, NOT_BEGUN};
 use study_session::session::{Input, Roster, Screen, View};
@@ -192,10 +192,13 @@ impl UiState {
                 Key::Enter => vec![Input::RetrySave],
                 _ => Vec::new(),
             },
+            Screen::Playing { .. } => match turn(key, view) {
+                Some(turn) => vec![Input::Adjust(turn)],
+                None => advance(key, view),
+            },
             Screen::Reference { .. }
             | Screen::Loading { .. }
             | Screen::Mount { .. }
-            | Screen::Playing { .. }
             | Screen::Stopping
             | Screen::DeviceTrouble { .. }
             | Screen::Saving
@@ -346,6 +349,17 @@ fn is_command(key: Key) -> bool {
         key,
         Key::Remark | Key::Correct | Key::MarkBad | Key::Decline | Key::Replay
     )
+}
+
+/// What a key changes where a level is set.
+fn turn(key: Key, view: &View) -> Option<Turn> {
+    let own = view.adjusting.as_ref().filter(|own| !own.at_standard)?;
+    match key {
+        Key::Left | Key::Char('-') if own.can_lower => Some(Turn::Lower),
+        Key::Right | Key::Char('+') if own.can_higher => Some(Turn::Higher),
+        Key::Char('r' | 'R') if own.has_standard => Some(Turn::Standard),
+        _ => None,
+    }
 }
 
 fn advance(key: Key, view: &View) -> Vec<Input> {

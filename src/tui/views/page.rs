@@ -21,7 +21,7 @@ use ratatui::layout::{Position, Rect};
 use ratatui::widgets::{Clear, Widget};
 use study_plan::protocol::Entry;
 use study_plan::protocol::phrases::Phrase;
-use study_session::page::{self, Kind};
+use study_session::page::{self, Button, Kind};
 use study_session::session::view::DeviceState;
 use study_session::session::{Screen, View};
 
@@ -254,7 +254,9 @@ impl<'a> Page<'a> {
             }
             _ => {}
         }
-        let enabled = self.content.buttons.iter().filter(|b| b.enabled);
+        // What changes a level is drawn above.
+        let offered = |b: &&Button| b.enabled && b.does.turn().is_none();
+        let enabled = self.content.buttons.iter().filter(offered);
         let mut all: Vec<Hint> = enabled
             .map(|b| (keys::of(b.does).to_owned(), b.label.clone()))
             .collect();

@@ -1,13 +1,12 @@
 //! The screen during playback: the prompt and the elapsed time.
 
 use crate::tui::theme::Theme;
-use crate::tui::widgets::{BIG_ROWS, bar, big, center, middle, row, rows, styled};
-use crate::tui::wrap;
+use crate::tui::widgets::{BIG_ROWS, bar, big, center, center_all, middle, row, rows, styled};
+use crate::tui::{keys, wrap};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
-use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, BorderType, Widget};
-use study_session::page::{Interval, Kind, Page};
+use study_session::page::{Button, Interval, Kind, Page};
 
 /// The screen while the device plays, or loads one of several intervals.
 #[derive(Debug)]
@@ -40,7 +39,14 @@ impl Widget for &Playing<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
         let page = self.page;
         // A constant height, so that nothing moves while it plays.
-        let tall = if page.interval.is_some() { 16 } else { 10 };
+        let turns: Vec<&Button> = (page.buttons.iter())
+            .filter(|b| b.does.turn().is_some())
+            .collect();
+        let turn_rows = u16::try_from(turns.len()).unwrap_or(0);
+        let tall = match page.interval.is_some() {
+            true => 16,
+            false => 10 + turn_rows,
+        };
         let mut y = area.height.saturating_sub(tall) / 2;
         let mut attend = &page.title;
         if let Some(interval) = &page.interval {
@@ -51,8 +57,13 @@ impl Widget for &Playing<'_> {
         let Some(playback) = &page.playback else {
             return center(buf, row(area, y), &styled(attend, self.theme.text()));
         };
-        let title = Span::styled(attend, self.theme.strong());
-        center(buf, row(area, y), &Line::from(title));
+        let columns = usize::from(area.width).max(1);
+        let attend = wrap::paragraph(attend, columns, 2);
+        let more = u16::try_from(attend.len()).unwrap_or(1).saturating_sub(1);
+        // A second line goes above, so that nothing else moves.
+        y = y.saturating_sub(more);
+        center_all(buf, rows(area, y, more + 1), &attend, self.theme.strong());
+        y += more;
         let mut playing = format!("●  {}", playback.state);
         if let Some(left) = &playback.left {
             playing.push_str(&format!("  ·  {left}"));
@@ -67,6 +78,14 @@ impl Widget for &Playing<'_> {
         }
         if let Some(more) = &page.wait {
             center(buf, row(area, y + 9), &styled(more, self.theme.text()));
+        }
+        for (n, button) in (0..).zip(turns) {
+            let text = format!("{}  {}", keys::of(button.does), button.label);
+            let style = match button.enabled {
+                true => self.theme.key(),
+                false => self.theme.quiet(),
+            };
+            center(buf, row(area, y + 10 + n), &styled(text, style));
         }
     }
 }

@@ -3,7 +3,7 @@
 //! docs/page.md, and none has the name of a realization.
 
 use super::part_rig::{
-    beside_a_reference, identification, pairs, ranking, read, similarity, track,
+    adjustment, beside_a_reference, identification, pairs, ranking, read, similarity, track,
 };
 use super::rig::{DeviceMood, Rig, StoreMood};
 use super::studies::{MODELS, PRACTICE, question, rich};
@@ -60,6 +60,7 @@ repetitions = 1
         ),
         similarity("identical = true\npractice = 2"),
         ranking("ties = true\npractice = 1\nrepetitions = 2\nexposure = { replays = 1 }"),
+        adjustment("standard = 2.0\npractice = 1"),
     ]
 }
 
@@ -84,19 +85,22 @@ enum Act {
 }
 
 fn act(draws: &mut Stream) -> Act {
-    const OTHER: [Does; 6] = [
+    const OTHER: [Does; 9] = [
         Does::Decline,
         Does::Back,
         Does::Replay,
         Does::RateStopped,
         Does::PlayAgain,
         Does::Refuse,
+        Does::Lower,
+        Does::Higher,
+        Does::Compare,
     ];
     match draws.below(40) {
         0..=1 => Act::Wrong,
         2..=3 => Act::Old,
-        4..=9 => Act::Other(OTHER[draws.below(6) as usize]),
-        10..=12 => Act::Stop,
+        4..=10 => Act::Other(OTHER[draws.below(9) as usize]),
+        11..=12 => Act::Stop,
         13 => Act::Pause,
         14..=15 => Act::Wait,
         16 => Act::Fault,
@@ -333,7 +337,9 @@ fn lines(want: &Want) -> Vec<String> {
             Does::Refuse => vec!["n", "n"],
             Does::Back => vec!["/back"],
             Does::Replay => vec!["/replay"],
-            Does::RateStopped => vec!["r"],
+            Does::RateStopped | Does::Compare => vec!["r"],
+            Does::Lower => vec!["-"],
+            Does::Higher => vec!["+"],
             _ => vec![""],
         }
         .into_iter()
@@ -553,6 +559,9 @@ fn random_sessions_have_the_same_journal_in_lines_by_the_browser_and_through_a_f
         "RateStopped",
         "PlayAgain",
         "Refuse",
+        "Lower",
+        "Higher",
+        "Compare",
     ] {
         assert!(
             outcomes.contains(&(format!("Other({does})"), true)),

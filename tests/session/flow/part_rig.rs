@@ -168,6 +168,32 @@ models = ["XQZ-7", "KJW-3", "VVB-9"]
     parsed.protocol.unwrap_or_else(|| panic!("{shown}"))
 }
 
+/// A level of damping that is set, from 1.5 and 2.5; `more` is added to the part.
+pub(super) fn adjustment(more: &str) -> Protocol {
+    let text = format!(
+        r#"
+[analysis]
+primary = "equal"
+[[parts]]
+id = "equal"
+kind = "adjustment"
+prompt = "Until both feel equal."
+lower = "less"
+higher = "more"
+confirm = "equal now"
+family = "damping"
+start_below = [1.5]
+start_above = [2.5]
+repetitions = 2
+{more}
+"#
+    );
+    let head = HEAD.replace("study-protocol/2", "study-protocol/3");
+    let parsed = parse("p", &format!("{head}{text}"));
+    let shown = parsed.findings.render(false);
+    parsed.protocol.unwrap_or_else(|| panic!("{shown}"))
+}
+
 /// The answer of an observer who hears a level of 1.55 and above, and else says the other.
 pub(super) fn observed(rig: &Rig) -> Vec<(QuestionId, Answer)> {
     let open = rig.session.history().open().unwrap();

@@ -192,6 +192,7 @@ impl Rig {
                             Event::AttemptStarted { trial: t, attempt: a, .. }
                             | Event::PlaybackEnded { trial: t, attempt: a, .. }
                             | Event::Replayed { trial: t, attempt: a }
+                            | Event::Adjusted { trial: t, attempt: a, .. }
                         ) if t == trial && a == attempt
                     );
                     assert!(asked, "a load that is not in the journal");

@@ -1,9 +1,10 @@
 //! Statistics of thresholds and comparisons: tracks, psychometric functions, detection,
-//! paired preferences, magnitude estimation, MUSHRA, identification, similarity, ranking. Each function takes what was
+//! paired preferences, magnitude estimation, MUSHRA, identification, similarity, ranking, adjustment. Each function takes what was
 //! answered and returns statistics as records; `docs/statistics-psychophysics.md`
 //! defines them.
 
 mod abilities;
+mod adjustment;
 mod again;
 mod counting;
 pub(crate) mod decided;
@@ -14,6 +15,7 @@ mod findings;
 mod fits;
 mod identification;
 mod marginal;
+mod of_adjustment;
 mod of_identification;
 mod of_ranking;
 mod of_scales;
@@ -36,6 +38,7 @@ mod table;
 mod tracks;
 mod trials;
 
+pub use adjustment::{SettingRow, adjustment};
 pub use detection::{Detection, Task, detection};
 pub(crate) use discriminations::{have_ratios, settings as track_settings};
 pub use findings::{PartFinding, PartQuestion};

@@ -890,6 +890,93 @@ for (part in kept("ranking")) {
   }
 }
 
+#' ## Adjustment
+#'
+#' A participant's point of subjective equality is the mean of the mean settings from below and from above. It is compared
+#' with the standard, and both sides with each other, by t tests over participants. Settings scatter within participants and
+#' sides; the interval of that, by the bootstrap, is in `values.json` only.
+
+for (part in kept("adjustment")) {
+  put <- of_part(part)
+  answers <- ratings[ratings$included & ratings$part == part, ]
+  answers$value <- answers[[setting(paste("adjustment", part))]]
+  answers <- answers[!is.na(answers$value), ]
+  if (nrow(answers) == 0) next
+  felt <- read_table("intervals")
+  felt <- felt[!is.na(felt$target) & felt$target, ]
+  felt <- felt[order(felt$interval), ]
+  key <- function(data) paste(data$participant, data$session, data$trial, data$attempt, sep = "\r")
+  levels_of <- split(as.character(felt$model), key(felt))[key(answers)]
+  side <- sapply(levels_of, function(own) setting(paste("start", part, own[1])))
+  changes <- sapply(levels_of, function(own) sum(own[-1] != own[-length(own)]))
+  who <- as.character(answers$participant)
+  people <- sorted(who)
+  of_side <- function(p, which) answers$value[who == p & side == which]
+  mean_of <- function(which) sapply(people, function(p) {
+    own <- of_side(p, which)
+    if (length(own) > 0) mean(own) else NA
+  })
+  over_sides <- function(count) sapply(people, function(p) count(of_side(p, "below")) + count(of_side(p, "above")))
+  below <- mean_of("below")
+  above <- mean_of("above")
+  pse <- ifelse(is.na(below), above, ifelse(is.na(above), below, (below + above) / 2))
+  squares <- over_sides(function(own) if (length(own) > 0) sum((own - mean(own))^2) else 0)
+  df <- over_sides(function(own) max(length(own) - 1, 0))
+  print(round(cbind(below, above, pse, sd = sqrt(squares / df)), 3))
+  put("adjustment/n", nrow(answers))
+  put("adjustment/n_participants", length(people))
+  put("adjustment/changes", mean(changes))
+  put("adjustment/pse", mean(pse))
+  for (p in people) {
+    id <- paste0("adjustment/participant/", p, "/")
+    put(paste0(id, "n"), sum(who == p))
+    put(paste0(id, "pse"), pse[[p]])
+    if (!is.na(below[[p]])) put(paste0(id, "ascending"), below[[p]])
+    if (!is.na(above[[p]])) put(paste0(id, "descending"), above[[p]])
+    if (df[[p]] > 0) put(paste0(id, "sd"), sqrt(squares[[p]] / df[[p]]))
+  }
+  interval <- function(id, x) {
+    half <- qt(0.975, length(x) - 1) * sd(x) / sqrt(length(x))
+    put(paste0(id, "_lo"), mean(x) - half)
+    put(paste0(id, "_hi"), mean(x) + half)
+  }
+  tested <- function(id, x) {
+    if (length(x) < 2) return(invisible())
+    interval(paste0(id, "ci95"), x)
+    put(paste0(id, "df"), length(x) - 1)
+    # Participants who are alike have no test.
+    if (max(x) - min(x) > 1e-10) {
+      t <- mean(x) / (sd(x) / sqrt(length(x)))
+      put(paste0(id, "t"), t)
+      put(paste0(id, "p"), 2 * pt(-abs(t), length(x) - 1))
+    }
+  }
+  if (length(pse) > 1) {
+    interval("adjustment/pse_ci95", pse)
+    put("adjustment/pse_sd", sd(pse))
+  }
+  standard <- as.numeric(setting(paste("standard", part)))
+  if (is.finite(standard)) {
+    put("adjustment/error/standard", standard)
+    put("adjustment/error/mean", mean(pse - standard))
+    if (standard > 0) put("adjustment/error/relative", mean(pse - standard) / standard)
+    tested("adjustment/error/", pse - standard)
+  }
+  both <- !is.na(below) & !is.na(above)
+  if (any(both)) {
+    put("adjustment/start/ascending", mean(below[both]))
+    put("adjustment/start/descending", mean(above[both]))
+    put("adjustment/start/difference", mean((below - above)[both]))
+    tested("adjustment/start/", (below - above)[both])
+  }
+  if (sum(df) > 0) {
+    spread <- sqrt(sum(squares) / sum(df))
+    put("adjustment/spread/sd", spread)
+    put("adjustment/spread/df", sum(df))
+    if (mean(pse) > 0) put("adjustment/spread/relative", spread / mean(pse))
+  }
+}
+
 #' ## Pairs
 #'
 #' Abilities by maximum likelihood, as a log-linear model of the counts: the weight of the

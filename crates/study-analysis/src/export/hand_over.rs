@@ -323,6 +323,7 @@ fn settings(
             Task::Search(_) => "search",
             Task::Similarity(_) => "similarity",
             Task::Ranking(_) => "ranking",
+            Task::Adjustment(_) => "adjustment",
         };
         put(&format!("{kind} {}", part.id), question);
         for session in sessions_of(protocol, part).into_iter().flatten() {
@@ -359,6 +360,16 @@ fn settings(
                 });
                 for (model, label) in labels {
                     put(&format!("label {} {model}", part.id), label);
+                }
+            }
+            Task::Adjustment(own) => {
+                let below = own.below.iter().map(|start| (start, "below"));
+                let above = own.above.iter().map(|start| (start, "above"));
+                for (start, side) in below.chain(above) {
+                    put(&format!("start {} {start}", part.id), side);
+                }
+                if let Some(level) = own.standard.as_ref().and_then(|s| protocol.level_of(s)) {
+                    put(&format!("standard {}", part.id), &level.to_string());
                 }
             }
             Task::Rating(_)

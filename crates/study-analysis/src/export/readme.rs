@@ -117,6 +117,15 @@ pub(super) fn methods(job: &Job<'_>) -> String {
                 counted(own.models.len(), "realization was", "realizations were"),
                 counted(own.repetitions as usize, "time", "times")
             ),
+            Task::Adjustment(own) => format!(
+                "a level of {} was set {} from below and as often from above, until it felt {}",
+                own.family,
+                counted(own.repetitions as usize, "time", "times"),
+                match &own.standard {
+                    Some(standard) => format!("equal to {standard}"),
+                    None => "as it should".to_owned(),
+                }
+            ),
             Task::Search(own) => format!(
                 "two points of the space {} were compared in {}, chosen from the answers before",
                 own.space,

@@ -141,7 +141,8 @@ fn plan(protocol: &Protocol, flags: &Overrides, part: &Part) -> Result<Plan, Pla
         | Task::Identification(_)
         | Task::Search(_)
         | Task::Similarity(_)
-        | Task::Ranking(_) => {
+        | Task::Ranking(_)
+        | Task::Adjustment(_) => {
             return Err(PlanError::NoPower(part.id.clone()));
         }
     };

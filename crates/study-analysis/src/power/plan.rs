@@ -47,7 +47,7 @@ pub enum PlanError {
     /// Another kind of part.
     #[error(
         "the power of part `{0}` is not computed: ratings, pairs and tracks are simulated, but not \
-         magnitude estimation, MUSHRA, identification, similarity and ranking; a search has no test"
+         magnitude estimation, MUSHRA, identification, similarity, ranking and adjustment; a search has no test"
     )]
     NoPower(PartId),
     /// A pilot of ratings for another part.
@@ -180,7 +180,7 @@ pub struct LeftOut {
     pub sessions: bool,
     /// Other parts that can be simulated.
     pub parts: Vec<PartId>,
-    /// Parts of magnitude estimation, MUSHRA, identification, similarity, ranking and search.
+    /// Parts of magnitude estimation, MUSHRA, identification, similarity, ranking, adjustment and search.
     pub never: Vec<PartId>,
 }
 
@@ -203,7 +203,8 @@ impl LeftOut {
                 | Task::Identification(_)
                 | Task::Search(_)
                 | Task::Similarity(_)
-                | Task::Ranking(_) => {
+                | Task::Ranking(_)
+                | Task::Adjustment(_) => {
                     found.never.push(part.id.clone());
                 }
                 Task::Rating(_) => {}

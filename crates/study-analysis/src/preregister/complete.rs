@@ -9,7 +9,7 @@ use study_plan::protocol::pairs::Pairs;
 use study_plan::protocol::parts::{Part, Task, TrackRules};
 use study_plan::protocol::presentations::Presentations;
 use study_plan::protocol::{
-    Answer, GroupRules, ModelEntry, Protocol, Ranking, Role, Scale, Similarity,
+    Adjustment, Answer, GroupRules, ModelEntry, Protocol, Ranking, Role, Scale, Similarity,
 };
 use study_session::outcome::ratings::{Ratings, Realization, Row, Subject};
 use study_session::outcome::{IntervalRow, RatingRow};
@@ -191,6 +191,7 @@ impl Made<'_> {
             Task::Search(_) => {}
             Task::Similarity(own) => self.similarity(part, own, who),
             Task::Ranking(own) => self.ranking(part, own, who),
+            Task::Adjustment(own) => self.adjustment(part, own, who),
         }
     }
 
@@ -260,6 +261,35 @@ impl Made<'_> {
         }
     }
 
+    fn adjustment(&mut self, part: &Part, own: &Adjustment, who: Who<'_>) {
+        let (Some(question), last) = (part.asks.first(), own.models.len().saturating_sub(1)) else {
+            return;
+        };
+        for repetition in 0..own.repetitions as usize {
+            for starts in [&own.below, &own.above] {
+                let Some(start) = starts.get(repetition % starts.len().max(1)) else {
+                    continue;
+                };
+                let place = (self.draws.unit() * last as f64).round() as usize;
+                let Some(set) = own.models.get(place) else {
+                    continue;
+                };
+                let level = self.protocol.level_of(set);
+                let answer = Answer::Number(level.unwrap_or(0.0));
+                let row = self.row(part, who, answer, question);
+                row.level = level;
+                let trial = row.trial;
+                let first = u32::from(own.standard.is_some());
+                for (interval, model) in (first + 1..).zip([start, set]) {
+                    self.intervals.push(IntervalRow {
+                        target: Some(true),
+                        ..interval_of(part, who, (trial, interval), model)
+                    });
+                }
+            }
+        }
+    }
+
     fn compared(
         &mut self,
         part: &Part,
@@ -303,29 +333,9 @@ impl Made<'_> {
         }
     }
 
-    fn felt(&mut self, part: &Part, who: Who<'_>, (trial, interval): (u32, u32), model: &ModelId) {
-        self.intervals.push(IntervalRow {
-            study: String::new(),
-            participant: who.participant.clone(),
-            session: who.session,
-            part: Some(part.id.clone()),
-            trial,
-            attempt: 1,
-            interval,
-            model: Some(model.clone()),
-            level: None,
-            level_proposed: None,
-            track: None,
-            track_trial: None,
-            target: None,
-            catch: None,
-            gap_s: None,
-            replays: 0,
-            exploration_s: None,
-            strokes: None,
-            fidelity: None,
-            host_late_ms: None,
-        });
+    fn felt(&mut self, part: &Part, who: Who<'_>, presented: (u32, u32), model: &ModelId) {
+        self.intervals
+            .push(interval_of(part, who, presented, model));
     }
 
     /// The share of correct answers rises along the ladder.
@@ -389,5 +399,36 @@ impl Made<'_> {
         });
         let last = self.rows.len() - 1;
         &mut self.rows[last]
+    }
+}
+
+/// A presentation of a trial, by its number and that of the interval.
+fn interval_of(
+    part: &Part,
+    who: Who<'_>,
+    (trial, interval): (u32, u32),
+    model: &ModelId,
+) -> IntervalRow {
+    IntervalRow {
+        study: String::new(),
+        participant: who.participant.clone(),
+        session: who.session,
+        part: Some(part.id.clone()),
+        trial,
+        attempt: 1,
+        interval,
+        model: Some(model.clone()),
+        level: None,
+        level_proposed: None,
+        track: None,
+        track_trial: None,
+        target: None,
+        catch: None,
+        gap_s: None,
+        replays: 0,
+        exploration_s: None,
+        strokes: None,
+        fidelity: None,
+        host_late_ms: None,
     }
 }

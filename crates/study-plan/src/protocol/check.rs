@@ -3,6 +3,7 @@
 //! No finding here prevents a study from running. Warnings that need the models'
 //! tables or the orders are given where these are loaded.
 
+mod adjustments;
 mod counted_out;
 mod exposure;
 mod ladders;
@@ -214,6 +215,8 @@ mod pace {
     pub(super) const EXPLORE_S: f64 = 25.0;
     /// The same for an interval that is compared with another.
     pub(super) const COMPARE_S: f64 = 10.0;
+    /// The same for each level of an adjustment.
+    pub(super) const STEP_S: f64 = 4.0;
 }
 
 /// Estimated duration of a session, min. Assumes 25 s of exploration and 15 s with

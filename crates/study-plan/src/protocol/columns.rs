@@ -389,8 +389,8 @@ table! {
         Track: text("track", "track").empty("the trial belongs to none"),
         TrackTrial: whole("track_trial", "trial of the track, from 1, in the planned order")
             .empty("the trial belongs to no track"),
-        Target: flag("target", "whether the interval has the comparison")
-            .empty("the trial belongs to no track"),
+        Target: flag("target", "whether the interval has the comparison; of an adjustment, whether it has the level that is set")
+            .empty("the trial belongs to no track and sets no level"),
         Catch: flag("catch", "whether the trial has no signal").empty("the trial belongs to no track"),
         GapS: number("gap_s", "from the confirmed end of the interval before to the confirmed start of this one")
             .unit("s").empty("it is the first interval"),

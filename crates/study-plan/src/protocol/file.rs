@@ -8,6 +8,7 @@
 //! [`ROOT`] declares every key. [`parse_orders`] reads the `orders.csv` that a
 //! protocol may name.
 
+mod adjustment;
 mod agree;
 mod analysis;
 mod confirms;
@@ -133,7 +134,7 @@ const FORMATS: &[Word] = &[
 const OF_FORMAT_2: [&str; 5] = ["parts", "families", "tracks", "groups", "sessions"];
 
 /// Keys that need [`FORMAT_3`], without the places in lists.
-pub const OF_FORMAT_3: [&str; 17] = [
+pub const OF_FORMAT_3: [&str; 18] = [
     "confirms",
     "design.order_version",
     "factors",
@@ -141,6 +142,7 @@ pub const OF_FORMAT_3: [&str; 17] = [
     "spaces",
     "models.levels",
     "parts.answers",
+    "parts.confirm",
     "parts.different",
     "parts.first",
     "parts.modulus",

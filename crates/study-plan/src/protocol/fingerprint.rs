@@ -224,10 +224,7 @@ pub fn parts(
         "outro": outro,
     });
     if !parts.is_empty() {
-        let texts = parts
-            .iter()
-            .map(|part| json!({ "id": part.id, "text": part.text }));
-        wording["parts"] = texts.collect();
+        wording["parts"] = parts.iter().map(texts).collect();
     }
     if !between.is_empty() {
         let items = between.iter().flat_map(|own| &own.questions);
@@ -289,6 +286,16 @@ fn asked(own: &Questionnaire) -> Value {
         "after": after,
         "questions": questions.iter().map(scale).collect::<Vec<_>>(),
     })
+}
+
+/// What of a part is read.
+fn texts(part: &Part) -> Value {
+    let mut texts = json!({ "id": part.id, "text": part.text });
+    // Absent from the fingerprints of protocols without it.
+    if let Some(own) = part.task.adjustment() {
+        texts["words"] = json!(own.words);
+    }
+    texts
 }
 
 /// What of a part determines its trials.

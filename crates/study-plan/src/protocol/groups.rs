@@ -138,7 +138,10 @@ impl Protocol {
                         task.keep(|m| models.contains(m) || self.level_of(m).is_some());
                     }
                     // All realizations of a ranking belong to all groups.
-                    Task::Discrimination { .. } | Task::Search(_) | Task::Ranking(_) => {}
+                    Task::Discrimination { .. }
+                    | Task::Search(_)
+                    | Task::Ranking(_)
+                    | Task::Adjustment(_) => {}
                 }
             }
         }

@@ -8,7 +8,8 @@
 use super::keys::words;
 use super::presentations::{Magnitude, Mushra, Presentations};
 use super::{
-    Answer, Identification, Pairs, Protocol, Ranking, Relative, SearchTask, Seat, Similarity,
+    Adjustment, Answer, Identification, Pairs, Protocol, Ranking, Relative, SearchTask, Seat,
+    Similarity,
 };
 use crate::procedure::{Ladder, ProcedureError, Rule, Track};
 use serde::{Deserialize, Serialize};
@@ -58,6 +59,8 @@ pub enum Task {
     Similarity(Similarity),
     /// Several realizations are felt, and each is given a rank.
     Ranking(Ranking),
+    /// A level of a family is set, step by step, until it feels equal to a standard or as it should.
+    Adjustment(Adjustment),
 }
 
 impl Task {
@@ -72,7 +75,8 @@ impl Task {
             | Self::Discrimination { .. }
             | Self::Search(_)
             | Self::Similarity(_)
-            | Self::Ranking(_) => None,
+            | Self::Ranking(_)
+            | Self::Adjustment(_) => None,
         }
     }
 
@@ -81,6 +85,7 @@ impl Task {
         match self {
             Self::Mushra(own) => own.reference.as_ref(),
             Self::Magnitude(own) => own.standard.as_ref().map(|standard| &standard.model),
+            Self::Adjustment(own) => own.standard.as_ref(),
             Self::Rating(_)
             | Self::Identification(_)
             | Self::Pairs(_)
@@ -88,6 +93,14 @@ impl Task {
             | Self::Search(_)
             | Self::Similarity(_)
             | Self::Ranking(_) => None,
+        }
+    }
+
+    /// What a part of adjustment sets.
+    pub fn adjustment(&self) -> Option<&Adjustment> {
+        match self {
+            Self::Adjustment(own) => Some(own),
+            _ => None,
         }
     }
 
@@ -476,10 +489,13 @@ impl Protocol {
         Track::new(&track.rule, &self.ladder(track), &mut stream)
     }
 
-    /// Whether the answers to a question are numbers but no ratings of a realization: estimates of magnitude, how different two are, or ranks.
+    /// Whether the answers to a question are numbers but no ratings of a realization: estimates of magnitude, how different two are,
+    /// ranks, or levels that were set.
     pub fn has_other_numbers(&self, question: &QuestionId) -> bool {
         self.parts.iter().any(|part| match part.task {
-            Task::Magnitude(_) | Task::Similarity(_) => part.asks.first() == Some(question),
+            Task::Magnitude(_) | Task::Similarity(_) | Task::Adjustment(_) => {
+                part.asks.first() == Some(question)
+            }
             Task::Ranking(_) => part.asks.contains(question),
             _ => false,
         })

@@ -61,6 +61,14 @@ pub enum Stimuli {
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         easy: bool,
     },
+    /// A level is set, from the level of its start.
+    Adjusted {
+        /// The level at which it starts.
+        start: ModelId,
+        /// What is felt before it.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        standard: Option<ModelId>,
+    },
     /// A trial of a search. Its two points follow from the answers before it.
     Search {
         /// The space.
@@ -94,7 +102,8 @@ impl Trial {
             Stimuli::Pair { .. }
             | Stimuli::Track { .. }
             | Stimuli::Search { .. }
-            | Stimuli::Set { .. } => None,
+            | Stimuli::Set { .. }
+            | Stimuli::Adjusted { .. } => None,
         }
     }
 
@@ -106,7 +115,8 @@ impl Trial {
             | Stimuli::Rated { .. }
             | Stimuli::Pair { .. }
             | Stimuli::Search { .. }
-            | Stimuli::Set { .. } => None,
+            | Stimuli::Set { .. }
+            | Stimuli::Adjusted { .. } => None,
         }
     }
 

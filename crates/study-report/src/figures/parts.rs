@@ -1,6 +1,7 @@
 //! The figures of a part that is no rating: psychometric functions with their data, tracks
 //! with their reversals, preferences, thresholds and sensitivities of the participants.
 
+use super::adjustment::settings;
 use super::forest::{Row, by_condition, forest};
 use super::functions::{
     MAX_PANELS, cut, grid, level_axis, level_label, of_everybody, place, psychometric,
@@ -38,6 +39,7 @@ pub fn of_part(number: usize, part: &PartAnalysis) -> Vec<Drawn> {
         confusions(&name("confusions"), part),
         map(&name("map"), part),
         worths(&name("worths"), part),
+        settings(&name("settings"), part),
     ];
     let note = match (part.simulated, part.pilot) {
         (true, _) => Some("includes simulated data"),

@@ -3,7 +3,7 @@
 use crate::figures::of_part;
 use crate::html::PartReport;
 use study_analysis::analyze::psychophysics::PartAnalysis;
-use study_base::text::counted;
+use study_base::text::{ModelId, counted};
 use study_plan::procedure::search::Acquire;
 use study_plan::procedure::{Choose, Rule, SearchRule};
 use study_plan::protocol::identification::{Criterion, Drawn, Feedback};
@@ -20,6 +20,12 @@ pub(super) fn part_reports(protocol: &Protocol, parts: &[PartAnalysis]) -> Vec<P
         figures: of_part(i + 1, analysis),
     };
     parts.iter().enumerate().map(report).collect()
+}
+
+/// What a level was set equal to.
+fn equal_to(protocol: &Protocol, standard: &ModelId) -> String {
+    let level = protocol.level_of(standard);
+    level.map_or_else(|| standard.to_string(), |level| level.to_string())
 }
 
 /// Sentences on the trials of a part, for the methods.
@@ -159,6 +165,26 @@ fn trials(protocol: &Protocol, part: &Part) -> String {
                 "In each of {} all of {} were felt one after another, and then each was given its rank; {ties}.{practice}",
                 counted(own.repetitions as usize, "trial", "trials"),
                 counted(own.models.len(), "realization", "realizations")
+            ));
+        }
+        Task::Adjustment(own) => {
+            let practice = match own.practice {
+                0 => String::new(),
+                n => format!(
+                    " {} came before.",
+                    counted(n as usize, "practice trial", "practice trials")
+                ),
+            };
+            text.push(format!(
+                "In each trial a level of {} was set, one step of its {} at a time, until it felt {}: {} from below and as many from \
+                 above, in random order. The levels at which trials started were drawn.{practice}",
+                own.family,
+                counted(own.models.len(), "level", "levels"),
+                match &own.standard {
+                    Some(standard) => format!("equal to {}", equal_to(protocol, standard)),
+                    None => "as it should".to_owned(),
+                },
+                counted(own.repetitions as usize, "setting", "settings")
             ));
         }
         Task::Search(own) => text.push(format!(

@@ -1,6 +1,7 @@
 //! The tables of thresholds, sensitivities and preferences: the same on the terminal, in
 //! the report and as CSV.
 
+mod adjustment;
 mod identification;
 mod population;
 mod ranking;
@@ -22,7 +23,7 @@ use study_base::text::Untrusted;
 type Kind = (&'static str, fn(&PartResults) -> Table);
 
 /// All tables, in the order of a page; those without rows and notes are left out of it.
-pub(crate) const KINDS: [Kind; 30] = [
+pub(crate) const KINDS: [Kind; 31] = [
     ("part_thresholds.csv", thresholds),
     ("part_population.csv", population::population),
     ("part_population_contrasts.csv", population::contrasts),
@@ -47,6 +48,7 @@ pub(crate) const KINDS: [Kind; 30] = [
     ("part_ranks.csv", ranking::realizations),
     ("part_rank_pairs.csv", ranking::pairs),
     ("part_rankings.csv", ranking::participants),
+    ("part_adjustment.csv", adjustment::participants),
     ("part_scores.csv", scores),
     ("part_scores_after.csv", scores_after),
     ("part_subscales.csv", subscales),

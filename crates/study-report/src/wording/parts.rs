@@ -125,6 +125,20 @@ fn texts(question: &PartQuestion) -> Wording {
             shown: "{first} over {second} by {size} on the logarithm of the worth, {result} ({corrected}, {people})",
             ..PART
         },
+        PartQuestion::Adjusted => Wording {
+            ask: "Do settings differ from the standard?",
+            yes: "Settings differed from the standard",
+            not_shown: "It was not shown that settings differ from the standard",
+            shown: "difference {size}, {result} ({corrected}, {people})",
+            ..PART
+        },
+        PartQuestion::Starts => Wording {
+            ask: "Do settings depend on the side from which they start?",
+            yes: "Settings depended on the side from which they started",
+            not_shown: "It was not shown that settings depend on the side from which they start",
+            shown: "from below less from above {size}, {result} ({corrected}, {people})",
+            ..PART
+        },
         PartQuestion::Groups => Wording {
             ask: "Do the groups differ?",
             yes: "The groups differed",

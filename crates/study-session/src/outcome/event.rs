@@ -402,6 +402,16 @@ pub enum Event {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         interval: Option<u32>,
     },
+    /// What is felt was changed in a trial of adjustment; it is loaded once what plays has stopped. Since `study-protocol/3`.
+    Adjusted {
+        trial: u32,
+        attempt: u32,
+        /// What comes: a level that is at most a step from the one before, or the standard.
+        to: ModelId,
+        /// Whether it is the standard.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        standard: bool,
+    },
     /// All intervals of the attempt are felt again before it is answered.
     Replayed { trial: u32, attempt: u32 },
     /// The telemetry of the attempt could not be saved, or only in part.

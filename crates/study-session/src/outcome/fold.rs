@@ -16,6 +16,7 @@
 //! * An event of an attempt whose start is missing from a damaged journal stands
 //!   for the start: nothing that was measured or answered is lost with one line.
 
+mod adjusting;
 mod attempt_log;
 mod facts;
 mod interval_log;
@@ -32,7 +33,7 @@ use super::event::{Channel, Choice, Entry, Event, Failure, FormId, Moment, Start
 use search::Failing;
 use std::collections::{BTreeMap, BTreeSet};
 use study_base::text::{PartId, ParticipantId, QuestionId};
-use study_plan::protocol::{Answer, Trial};
+use study_plan::protocol::{Answer, Stimuli, Trial};
 use trial::TrialHistory;
 
 /// What the events of a session add up to.
@@ -231,6 +232,11 @@ impl History {
                     None => intervals.clone(),
                 };
                 attempt.level = *level;
+                if let Some(Stimuli::Adjusted { standard, .. }) =
+                    self.planned(*trial).map(|t| &t.stimuli)
+                {
+                    attempt.adjusts(standard.is_some());
+                }
                 self.begin(*trial, attempt);
             }
             Event::PlaybackStarted {
@@ -258,6 +264,16 @@ impl History {
                         stopped: *stopped,
                     };
                     attempt.interval_ended(interval.unwrap_or(1), ended, rendering.as_deref(), at);
+                }
+            }
+            Event::Adjusted {
+                trial,
+                attempt,
+                to,
+                standard,
+            } => {
+                if let Some(attempt) = self.attempt_mut(*trial, *attempt) {
+                    attempt.adjusted(to, *standard);
                 }
             }
             Event::Replayed { trial, attempt } => {

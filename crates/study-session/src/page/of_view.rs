@@ -5,10 +5,10 @@ use super::{
     Asked, Button, Dialog, Does, Interval, Kind, Page, PlaybackWords, Progress, clock,
     unsaved_lines,
 };
-use crate::session::view::{self, Banner, MessageKind};
+use crate::session::view::{self, Adjusting, Banner, MessageKind};
 use crate::session::{Screen, View};
 use std::fmt::Display;
-use study_base::text::counted;
+use study_base::text::{Untrusted, counted};
 use study_plan::protocol::phrases::{Phrase, Words};
 use study_plan::protocol::{DeviceKind, Entry, Exposure, Question};
 
@@ -88,8 +88,13 @@ pub fn page(view: &View) -> Page {
             page.title = words.get(stopped.title).to_owned();
             page.text = words.get(stopped.body).to_owned();
             page.button(Does::PlayAgain, stopped.again, true, words);
-            if *can_rate {
-                page.button(Does::RateStopped, stopped.rate, true, words);
+            match &view.adjusting {
+                _ if !can_rate => {}
+                Some(own) => {
+                    let label = Untrusted(&own.words.confirm).to_string();
+                    page.labeled(Does::RateStopped, &label, true);
+                }
+                None => page.button(Does::RateStopped, stopped.rate, true, words),
             }
         }
         Screen::DeviceTrouble { what, can_go_on } => {
@@ -190,9 +195,13 @@ impl Page {
     }
 
     fn button(&mut self, does: Does, phrase: Phrase, enabled: bool, words: &Words) {
+        self.labeled(does, words.get(phrase), enabled);
+    }
+
+    fn labeled(&mut self, does: Does, label: &str, enabled: bool) {
         self.buttons.push(Button {
             does,
-            label: words.get(phrase).to_owned(),
+            label: label.to_owned(),
             note: "",
             enabled,
         });
@@ -301,12 +310,33 @@ impl Page {
         let playback = PlaybackWords::new(view, *since_s, exposure);
         self.clock = Some(playback.left.as_ref().unwrap_or(&playback.time).clone());
         self.playback = Some(playback);
+        if let Some(own) = view.adjusting.as_ref().filter(|own| !own.at_standard) {
+            return self.adjusting(view, own);
+        }
         let on = match interval {
             None => Phrase::Rate,
             Some((at, of)) if at == of => Phrase::Answer,
             Some(_) => Phrase::Next,
         };
         self.button(Does::Advance, on, view.can_advance, words);
+    }
+}
+
+impl Page {
+    /// A level is felt, and changed until it is confirmed.
+    fn adjusting(&mut self, view: &View, own: &Adjusting) {
+        let words = &view.words;
+        self.text = std::mem::replace(&mut self.title, own.prompt.clone());
+        for (does, label, enabled) in [
+            (Does::Advance, &own.words.confirm, view.can_advance),
+            (Does::Lower, &own.words.lower, own.can_lower),
+            (Does::Higher, &own.words.higher, own.can_higher),
+        ] {
+            self.labeled(does, &Untrusted(label).to_string(), enabled);
+        }
+        if own.has_standard {
+            self.button(Does::Compare, Phrase::ReferenceInterval, true, words);
+        }
     }
 }
 

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, VecDeque};
 use study_plan::protocol::answer::tidy;
 use study_plan::protocol::phrases::Words;
-use study_plan::protocol::{Answer, Given, Question, Refusal};
+use study_plan::protocol::{Answer, Given, Question, Refusal, Turn};
 
 /// Version of the pages and replies that docs/page.md specifies.
 pub const FORMAT: &str = "study-page/1";
@@ -324,6 +324,9 @@ pub fn input(reply: &Reply, page: &Page, view: &View) -> Result<Input, String> {
         Does::PlayAgain | Does::Replay => Input::PlayAgain,
         Does::Back => Input::Back,
         Does::RateStopped => Input::RateStopped,
+        Does::Lower => Input::Adjust(Turn::Lower),
+        Does::Higher => Input::Adjust(Turn::Higher),
+        Does::Compare => Input::Adjust(Turn::Standard),
         Does::Stop => Input::Stop,
         // For the experimenter's terminal.
         Does::RestartBlock | Does::Continue | Does::DropOut | Does::RetrySave | Does::Quit => {

@@ -34,6 +34,7 @@ fn view(screen: Screen) -> View {
         force: true,
         has_reference: false,
         numbered: false,
+        adjusting: None,
         remarks: Vec::new(),
         can_advance: true,
         words: Arc::new(Words::default()),

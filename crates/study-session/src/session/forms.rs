@@ -70,7 +70,9 @@ impl Session {
         if step_of(form).is_some_and(|step| self.passed.contains(&step)) {
             return false;
         }
-        let questions = self.questions(form);
+        let set = self.set_in(form);
+        let mut questions = self.questions(form);
+        questions.retain(|q| Some(&q.id) != set);
         let reached = questions
             .iter()
             .rposition(|q| self.history.answer(form, &q.id).is_some())
@@ -268,7 +270,8 @@ impl Session {
             Stimuli::Rated { .. }
             | Stimuli::Pair { .. }
             | Stimuli::Search { .. }
-            | Stimuli::Set { .. } => None,
+            | Stimuli::Set { .. }
+            | Stimuli::Adjusted { .. } => None,
         }
     }
 
@@ -322,6 +325,10 @@ impl Session {
         self.accepts_records()?;
         let asked = self.questions(form).into_iter().find(|q| q.id == *question);
         let given = self.history.answer(form, question);
+        // A level that was felt cannot be typed.
+        if self.set_in(form) == Some(question) {
+            return Err(InputRefused::NothingToCorrect);
+        }
         let (Some(asked), Some(from), true) = (asked, given, self.history.is_current(form)) else {
             return Err(InputRefused::NothingToCorrect);
         };

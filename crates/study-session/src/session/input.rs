@@ -3,7 +3,7 @@
 use crate::outcome::{Author, Choice, Entry, Event, Fidelity, FormId, Playback, SelfWeighed};
 use study_base::text::{ModelId, ParticipantId, QuestionId};
 use study_plan::protocol::fingerprint::Fingerprints;
-use study_plan::protocol::{Answer, Assigned, DeviceKind, Seat};
+use study_plan::protocol::{Answer, Assigned, DeviceKind, Seat, Turn};
 
 /// An input from the operator, the device or the store.
 #[derive(Debug, Clone, PartialEq)]
@@ -64,6 +64,8 @@ pub enum Input {
     PlayAgain,
     /// After a stop: rate what was felt.
     RateStopped,
+    /// Change the level that is felt in a trial of adjustment, or feel the standard.
+    Adjust(Turn),
     /// Pause.
     Pause,
     /// Leave the program, confirmed by the operator. Waits until everything is saved;

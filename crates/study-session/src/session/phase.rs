@@ -2,7 +2,7 @@
 
 use super::Ending;
 use super::view::MessageKind;
-use crate::outcome::{FormId, Moment};
+use crate::outcome::{Channel, FormId, Moment};
 use study_plan::protocol::Question;
 
 /// Time within which the device must confirm a stop, s.
@@ -69,6 +69,8 @@ pub(super) enum Phase {
         limped: bool,
         /// A pause follows.
         pause: bool,
+        /// The level that was felt is confirmed.
+        confirmed: Option<Confirmed>,
     },
     /// Stopped: play again or rate.
     Stopped {
@@ -124,6 +126,13 @@ impl Phase {
             Self::Identify | Self::Claiming | Self::Leaving { .. } | Self::Over(_)
         )
     }
+}
+
+/// That a level which was set feels right.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Confirmed {
+    /// How that was entered.
+    pub(super) channel: Option<Channel>,
 }
 
 /// What a participant is told of an answer.

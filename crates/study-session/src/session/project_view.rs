@@ -42,6 +42,7 @@ impl Session {
             force: self.presents_force(),
             has_reference: self.has_reference(),
             numbered: self.is_numbered(),
+            adjusting: self.shown_adjustment(),
             can_advance: can_advance(&screen),
             words: self.words.clone(),
             screen,
@@ -182,7 +183,15 @@ impl Session {
     /// Whether the first interval of the trial under way is a reference.
     fn has_reference(&self) -> bool {
         let open = self.history.open();
-        open.is_some_and(|open| matches!(open.trial.stimuli, Stimuli::Rated { .. }))
+        open.is_some_and(|open| match &open.trial.stimuli {
+            Stimuli::Rated { .. } => true,
+            Stimuli::Adjusted { standard, .. } => standard.is_some(),
+            Stimuli::One { .. }
+            | Stimuli::Pair { .. }
+            | Stimuli::Track { .. }
+            | Stimuli::Search { .. }
+            | Stimuli::Set { .. } => false,
+        })
     }
 
     /// Whether the intervals of the trial under way have numbers for names, by which they are asked about.
@@ -193,6 +202,11 @@ impl Session {
 
     /// The interval under way and their number, if there are several.
     fn interval_of(&self) -> Option<(u32, u32)> {
+        let attempt = self.history.open()?.attempt;
+        // How often a level was changed is not shown.
+        if attempt.is_adjusted() {
+            return attempt.is_at_standard().then_some((1, 2));
+        }
         Some((self.interval()?, self.intervals()?))
     }
 
@@ -322,7 +336,9 @@ impl Session {
         let mut items = Vec::new();
         for (form, answers) in forms {
             let title = self.shown_title(form);
-            for question in self.questions(form) {
+            let set = self.set_in(form);
+            let questions = self.questions(form).into_iter();
+            for question in questions.filter(|q| Some(&q.id) != set) {
                 let given = answers.iter().find(|g| g.question == question.id);
                 items.extend(given.map(|given| Correctable {
                     form,

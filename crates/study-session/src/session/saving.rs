@@ -109,6 +109,7 @@ impl Session {
                     aborted: true,
                     limped: true,
                     pause: false,
+                    confirmed: None,
                 };
             }
             Phase::Stopping { limped, .. } => *limped = true,

@@ -38,6 +38,10 @@ impl Session {
             }
             Stimuli::Pair { pair } => return Some(Presenting::of(pair.to_vec())),
             Stimuli::Set { set } => return Some(Presenting::of(set.clone())),
+            Stimuli::Adjusted { start, standard } => {
+                let models = standard.iter().chain([start]).cloned();
+                return Some(Presenting::of(models.collect()));
+            }
             Stimuli::Search { swapped, .. } => {
                 let models = self.searched(trial, *swapped)?;
                 return Some(Presenting::of(models));

@@ -37,7 +37,7 @@ impl Session {
 
     /// Requests the next interval of the attempt under way from the device: each anew,
     /// also one that is equal to the last, so that a swap tells nothing.
-    fn load_interval(&mut self, at: Moment) {
+    pub(super) fn load_interval(&mut self, at: Moment) {
         let (Some(open), Some(model)) = (self.history.open(), self.playing_model()) else {
             return self.proceed(at);
         };
@@ -54,8 +54,7 @@ impl Session {
     /// The interval under way, from 1, if the trial has several.
     pub(super) fn interval(&self) -> Option<u32> {
         let attempt = self.history.open()?.attempt;
-        let several = attempt.intervals() > 1;
-        attempt.interval().filter(|_| several)
+        attempt.interval().filter(|_| attempt.is_numbered())
     }
 
     /// The number of intervals of the trial under way, if it has several.
@@ -180,9 +179,14 @@ impl Session {
     /// The confirmed end of the playback. Only after it can the trial be rated.
     pub(super) fn device_stopped(&mut self, playback: Playback, at: Moment) {
         let rendering = self.judged.take();
-        let (aborted, pause) = match self.phase {
-            Phase::Playing { .. } => (false, false),
-            Phase::Stopping { aborted, pause, .. } => (aborted, pause),
+        let (aborted, pause, confirmed) = match self.phase {
+            Phase::Playing { .. } => (false, false, None),
+            Phase::Stopping {
+                aborted,
+                pause,
+                confirmed,
+                ..
+            } => (aborted, pause, confirmed),
             _ => return,
         };
         let Some(open) = self.history.open() else {
@@ -210,7 +214,10 @@ impl Session {
         self.away_s = 0.0;
         match rendering {
             Some(found) if found.verdict == Verdict::Fault => self.wrong_force(&found, at),
-            _ => self.after_playback(at),
+            _ => match confirmed.filter(|_| !aborted) {
+                Some(confirmed) => self.settle(confirmed, at),
+                None => self.after_playback(at),
+            },
         }
         if pause {
             self.start_pause(at);
@@ -235,6 +242,9 @@ impl Session {
             self.feel_again(at);
             return self.proceed(at);
         }
+        if open.attempt.is_adjusted() && !self.history.any_answer(open.form()) {
+            return self.after_level(at);
+        }
         if open.attempt.interval().is_some() {
             let last = open.attempt.presentations.last();
             let on = |(_, ended): (Moment, Ended)| !ended.stopped;
@@ -257,6 +267,9 @@ impl Session {
     /// Whether the attempt under way has a confirmed end and enough of it was felt.
     pub(super) fn can_rate(&self) -> bool {
         self.history.open().is_some_and(|open| {
+            if open.attempt.is_adjusted() {
+                return self.can_settle(open.attempt);
+            }
             let mut ended = open.attempt.presentations.iter();
             open.attempt.ended.is_some() && ended.all(|p| self.suffices(p))
         })
@@ -264,7 +277,7 @@ impl Session {
 
     /// Whether a presentation of the attempt under way was felt long enough and with enough
     /// strokes. One without an end is none.
-    fn suffices(&self, presentation: &Presentation) -> bool {
+    pub(super) fn suffices(&self, presentation: &Presentation) -> bool {
         let (Some((_, ended)), Some(felt_s)) = (presentation.ended, presentation.felt_s()) else {
             return true;
         };
@@ -311,7 +324,12 @@ impl Session {
             self.notify("it was felt too long ago for a rating");
         } else if self.can_rate() {
             self.away_s += stopped_s;
-            self.open_trial_form(at);
+            if self.adjusting().is_some() {
+                let by = self.confirmed();
+                self.settle(by, at);
+            } else {
+                self.open_trial_form(at);
+            }
         } else {
             self.notify("not enough was felt for a rating");
         }
@@ -328,7 +346,7 @@ impl Session {
             self.record(replayed, at);
             return self.load_interval(at);
         }
-        if !matches!(self.phase, Phase::Stopped { .. }) {
+        if !matches!(self.phase, Phase::Stopped { .. }) || self.feel_level_again(at) {
             return;
         }
         self.fail(Failure::Stopped, "played again", at);
@@ -373,6 +391,9 @@ impl Session {
         if self.too_little(felt_s, strokes) {
             return self.notify("keep exploring");
         }
+        if self.adjusting().is_some() {
+            return self.leave_level(at);
+        }
         self.request_stop(false, false, at);
     }
 
@@ -386,13 +407,14 @@ impl Session {
         }
     }
 
-    fn request_stop(&mut self, aborted: bool, pause: bool, at: Moment) {
+    pub(super) fn request_stop(&mut self, aborted: bool, pause: bool, at: Moment) {
         self.out.push(Effect::Stop);
         self.phase = Phase::Stopping {
             since: at,
             aborted,
             limped: false,
             pause,
+            confirmed: None,
         };
     }
 

@@ -53,7 +53,11 @@ impl Session {
                 question,
                 answer,
                 ..
-            } => format!("{}: {question} = {}", self.form_title(*form), words(answer)),
+            } => match self.set_in(*form) == Some(question) {
+                // The level would be told.
+                true => format!("{}: {question}", self.form_title(*form)),
+                false => format!("{}: {question} = {}", self.form_title(*form), words(answer)),
+            },
             Event::Corrected {
                 form, question, to, ..
             } => format!(

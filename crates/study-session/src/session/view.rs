@@ -5,7 +5,7 @@ use crate::outcome::FormId;
 use std::sync::Arc;
 use study_base::text::QuestionId;
 use study_plan::protocol::phrases::{Phrase, Words};
-use study_plan::protocol::{Answer, DeviceKind, Entry, Exposure, Question};
+use study_plan::protocol::{AdjustmentWords, Answer, DeviceKind, Entry, Exposure, Question};
 
 /// The content of the screen.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,6 +50,8 @@ pub struct View {
     pub has_reference: bool,
     /// Whether the intervals of the trial have numbers for names.
     pub numbered: bool,
+    /// The adjustment under way, until its level is confirmed.
+    pub adjusting: Option<Adjusting>,
     /// The experimenter's last remarks in this sitting, newest first.
     pub remarks: Vec<String>,
     /// Whether Enter has an effect now.
@@ -81,6 +83,23 @@ impl View {
         };
         self.words.get(name).to_owned()
     }
+}
+
+/// A level that the participant sets. Only the ends of its ladder can be told from it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Adjusting {
+    /// What the participant is to do.
+    pub prompt: String,
+    /// What the steps and the confirmation are called.
+    pub words: AdjustmentWords,
+    /// Whether a step down is possible.
+    pub can_lower: bool,
+    /// Whether a step up is possible.
+    pub can_higher: bool,
+    /// Whether there is a standard, which can be felt again.
+    pub has_standard: bool,
+    /// Whether the standard is felt; then the level follows.
+    pub at_standard: bool,
 }
 
 /// The participant's progress.

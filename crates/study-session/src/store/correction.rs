@@ -75,6 +75,10 @@ impl StudyFolder {
                 None => format!("`{name}` was not answered; --trial names the trial of a rating"),
             })
         };
+        if request.to.is_some() && is_set(protocol, session, request) {
+            let why = format!("`{name}` is a level that was set: it was felt, and cannot be typed");
+            return Err(refused(why));
+        }
         let (form, from) = given(session, request).ok_or_else(none)?;
         let question = asked(protocol, form, &request.question).ok_or_else(none)?;
         let to = match &request.to {
@@ -167,6 +171,15 @@ impl StudyFolder {
             Some(_) => Ok(own),
         }
     }
+}
+
+/// Whether the answer is a level that was set in a trial of adjustment.
+fn is_set(protocol: &Protocol, session: &SessionData, request: &AnswerCorrection) -> bool {
+    let trial = request.trial.and_then(|n| session.history.planned(n));
+    let part = trial.and_then(|trial| protocol.part(trial.part.as_ref()?));
+    part.is_some_and(|part| {
+        part.task.adjustment().is_some() && part.asks.first() == Some(&request.question)
+    })
 }
 
 /// The answer that counts, and the form in which it was given.

@@ -1,5 +1,6 @@
 //! Verifying a results folder: every file is read again and compared.
 
+mod adjustments;
 mod clocks;
 mod not_checked;
 mod practice;
@@ -52,7 +53,7 @@ impl Finding {
 impl StudyFolder {
     /// Verifies the checksums and the chain of every journal, the hashes of the frozen
     /// protocol, the number of telemetry samples and, given a protocol, the levels of
-    /// tracks, the pairs of searches, the ends of practice and the derived tables.
+    /// tracks, the pairs of searches, the ends of practice, the steps of adjustments and the derived tables.
     ///
     /// # Errors
     /// [`StoreError`] if a folder or journal cannot be read at all.
@@ -70,6 +71,7 @@ impl StudyFolder {
                 tracks::verify_tracks(session, protocol, &place, &mut found);
                 searches::verify_searches(session, protocol, &place, &mut found);
                 practice::verify_practice(session, protocol, &place, &mut found);
+                adjustments::verify_adjustments(session, protocol, &place, &mut found);
             }
             self.verify_tables(&sessions, protocol, &mut found)?;
         }

@@ -348,3 +348,35 @@ fn only_a_started_servo_has_force() {
     assert_eq!(servo.step(&what, motion(15.0, 200.0)), 0.0);
     assert_eq!(servo.state(), ServoState::Limp);
 }
+
+/// Ten thousand changes by one step of a ladder, as while a level is set: a stop, the next table, a start. The force comes up
+/// from nothing and changes by 2 N/ms at most, also where the hand turns at once.
+#[test]
+fn ten_thousand_changes_of_table_come_up_from_nothing() {
+    let levels: Vec<[f64; 2]> = (0..21).map(|n| [0.03 + 0.001 * f64::from(n); 2]).collect();
+    let mut servo = Servo::new(bare());
+    let mut fastest_n = 0.0_f64;
+    for change in 0..10_000_usize {
+        // Up the ladder and down again.
+        let at = change % 40;
+        let what = damper(&levels[at.min(40 - at)]);
+        assert_eq!(servo.held_n(), 0.0);
+        servo.start();
+        let mut last_n = 0.0;
+        // The ramp and 25 ms more; the hand turns every 37.5 ms.
+        for period in 0..1700_usize {
+            let v_mm_s = if (period / 150 + change).is_multiple_of(2) {
+                200.0
+            } else {
+                -200.0
+            };
+            let now_n = servo.step(&what, motion(15.0, v_mm_s));
+            fastest_n = fastest_n.max((now_n - last_n).abs());
+            last_n = now_n;
+        }
+        assert_eq!(servo.state(), ServoState::Playing);
+        servo.limp();
+    }
+    // Of a period of 0.25 ms; where both rise, the ramp adds less than a thousandth.
+    assert!((0.4..=0.5 * 1.001).contains(&fastest_n), "{fastest_n}");
+}

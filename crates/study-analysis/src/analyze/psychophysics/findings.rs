@@ -5,6 +5,7 @@ mod rankings;
 pub(super) use rankings::of_rankings;
 
 use super::abilities::AbilityDifference;
+use super::adjustment::Adjusted;
 use super::again::Again;
 use super::identification::Identified;
 use super::over_participants::{ConditionModel, Contrast, FTest, GroupSensitivity};
@@ -48,6 +49,10 @@ pub enum PartQuestion {
     RankedAlike,
     /// Is the realization with the highest worth above each other one?
     RankedFirst,
+    /// Do settings differ from the standard?
+    Adjusted,
+    /// Do settings depend on the side from which they start?
+    Starts,
     /// Do the groups differ?
     Groups,
     /// Do the differences between conditions depend on the group?
@@ -73,6 +78,8 @@ impl PartQuestion {
             Self::MapFollows(of) => group_id("map-follows", &[of]),
             Self::RankedAlike => "ranked-alike".to_owned(),
             Self::RankedFirst => "ranked-first".to_owned(),
+            Self::Adjusted => "adjusted".to_owned(),
+            Self::Starts => "starts".to_owned(),
             Self::Groups => "groups".to_owned(),
             Self::GroupsConditions => "groups-conditions".to_owned(),
             Self::Sessions => "sessions".to_owned(),
@@ -398,6 +405,55 @@ fn map_follows(facts: &PartFacts, name: &str, fit: &MapFit, realizations: usize)
         );
     }
     finding
+}
+
+/// Whether settings differ from the standard, if that is a level, and whether they depend on their start.
+pub(super) fn settings_of(facts: &PartFacts, found: &Adjusted) -> Vec<PartFinding> {
+    let error = found.error.as_ref().map(|error| {
+        let question = PartQuestion::Adjusted;
+        let (mean, p) = (error.mean.number(), error.p.number());
+        let (Some(mean), Some(p)) = (mean, p) else {
+            return facts.undefined(question, &error.p, 0);
+        };
+        let test = Test::single(TestKind::OneSampleT, p, facts.alpha);
+        let test = test.with("t", error.t.number(), &[error.df.number()]);
+        of_difference(
+            facts,
+            question,
+            test,
+            estimate("difference", mean, &error.ci95),
+        )
+    });
+    let (start, question) = (&found.start, PartQuestion::Starts);
+    let (mean, p) = (start.difference.number(), start.p.number());
+    let sides = match (mean, p) {
+        (Some(mean), Some(p)) => {
+            let test = Test::single(TestKind::OneSampleT, p, facts.alpha);
+            let test = test.with("t", start.t.number(), &[start.df.number()]);
+            of_difference(
+                facts,
+                question,
+                test,
+                estimate("difference", mean, &start.ci95),
+            )
+        }
+        _ => facts.undefined(question, &start.p, 0),
+    };
+    error.into_iter().chain([sides]).collect()
+}
+
+fn of_difference(
+    facts: &PartFacts,
+    question: PartQuestion,
+    test: Test,
+    difference: Estimate,
+) -> PartFinding {
+    let direction = Direction::of(difference.value);
+    Finding {
+        direction: Some(direction).filter(|_| test.is_significant()),
+        estimate: Some(difference),
+        ..Finding::decided(question, test, facts.design(0))
+    }
 }
 
 /// Whether estimates differ between realizations, their contrasts, and whether VAF predicts them.

@@ -1,6 +1,7 @@
 //! The statistics of a part as records.
 
 pub use super::abilities::AbilityDifference;
+pub use super::adjustment::{Adjusted, ConstantError, OwnSettings, SettingSpread, SidesOfStart};
 pub use super::again::{Again, Groups, Profiles, Retest};
 pub use super::detection::Sensitivity;
 pub use super::fits::{
@@ -122,6 +123,8 @@ statistics! {
         similarity: Option<Similarities>,
         /// ranks of realizations
         ranking: Option<Rankings>,
+        /// levels that were set
+        adjustment: Option<Adjusted>,
         /// groups and sessions
         again: Again as "",
     }

@@ -5,8 +5,9 @@ use super::counting::{Counting, PartRows};
 use super::discriminations::of_tracks;
 use super::findings::{
     PartFacts, PartFinding, PartQuestion, identified, maps_of, of_groups_and_sessions, of_model,
-    of_preferences, of_rankings, of_realizations, told_apart,
+    of_preferences, of_rankings, of_realizations, settings_of, told_apart,
 };
+use super::of_adjustment::of_adjustment;
 use super::of_identification::of_identification;
 use super::of_ranking::of_ranking;
 use super::of_scales::{of_magnitudes, of_mushra};
@@ -88,6 +89,10 @@ pub fn parts(study: &StudyData<'_>, include: Include) -> Vec<PartAnalysis> {
                 "groups and sessions are not compared in this part: its worths are those of all participants and \
                  sessions together",
             ),
+            Task::Adjustment(_) => Some(
+                "groups and sessions are not compared in this part: its means are those of all participants and \
+                 sessions together",
+            ),
             Task::Rating(_)
             | Task::Discrimination { .. }
             | Task::Identification(_)
@@ -143,6 +148,8 @@ fn findings(facts: &PartFacts, own: &Found) -> (Vec<PartFinding>, Vec<Pair>) {
     found.extend((over.identification.as_ref()).map(|own| identified(facts, own)));
     let similarity = over.similarity.iter();
     found.extend(similarity.flat_map(|own| maps_of(facts, own)));
+    let adjustment = over.adjustment.iter();
+    found.extend(adjustment.flat_map(|own| settings_of(facts, own)));
     let told = |name: &String| Some(told_apart(facts, name, over.sdt_group.get(name.as_str())?));
     found.extend(own.names.iter().filter_map(told));
     found.extend(of_groups_and_sessions(facts, &over.again));
@@ -189,6 +196,10 @@ fn of_part_task(
             Some(of_similarity(study.protocol, part, own, trials, rules))
         }
         Task::Ranking(own) => Some(of_ranking(part, own, (rows, intervals), rules)),
+        Task::Adjustment(own) => {
+            let trials = (rows, intervals);
+            Some(of_adjustment(study.protocol, part, own, trials, rules))
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 //! Trials of somebody else's experiment, from a CSV.
 
+use super::adjustment::{SettingRow, adjustment};
 use super::identification::{LabelRow, identification, labels_of};
 use super::preferences::{Choice, Preference, in_both_orders, preferences};
 use super::ranking::{RankingRow, ranking};
@@ -30,17 +31,20 @@ pub enum TableKind {
     Similarity,
     /// Rankings: `participant[,ranking],realization,rank`.
     Ranking,
+    /// Adjustment: `participant,start,level[,standard]`.
+    Adjustment,
 }
 
 impl TableKind {
     /// The kinds that are no trials, with their names.
-    const OTHERS: [(Self, &str); 6] = [
+    const OTHERS: [(Self, &str); 7] = [
         (Self::Pairs, "pairs"),
         (Self::Magnitude, "magnitude"),
         (Self::Mushra, "mushra"),
         (Self::Identification, "identification"),
         (Self::Similarity, "similarity"),
         (Self::Ranking, "ranking"),
+        (Self::Adjustment, "adjustment"),
     ];
 
     /// The kind of a name.
@@ -153,6 +157,10 @@ pub fn analyze_table(
             let streams = (settings.seed, "table");
             results.over.ranking = Some(ranking(&rows.ranks()?, streams));
         }
+        TableKind::Adjustment => {
+            let ((set, standard), streams) = (rows.settings()?, (settings.seed, "table"));
+            results.over.adjustment = Some(adjustment(&set, standard, streams));
+        }
     }
     Ok((results, rows.records.len()))
 }
@@ -171,6 +179,7 @@ pub fn read_table(name: &str, input: impl BufRead, kind: TableKind) -> Result<()
         TableKind::Identification => rows.labels().map(|_| ()),
         TableKind::Similarity => rows.differences().map(|_| ()),
         TableKind::Ranking => rows.ranks().map(|_| ()),
+        TableKind::Adjustment => rows.settings().map(|_| ()),
     }
 }
 
@@ -258,6 +267,7 @@ impl<'a> Rows<'a> {
             }
             TableKind::Similarity => ("similarity", "participant,first,second,rating"),
             TableKind::Ranking => ("rankings", "participant[,ranking],realization,rank"),
+            TableKind::Adjustment => ("adjustment", "participant,start,level[,standard]"),
         };
         found.ok_or_else(|| TableError::Column {
             name: self.name.to_owned(),
@@ -502,6 +512,36 @@ impl<'a> Rows<'a> {
             })
         };
         self.records.iter().map(one).collect()
+    }
+
+    /// Levels that were set, and that of the standard, if the table has it.
+    fn settings(&self) -> Result<(Vec<SettingRow>, Option<f64>), TableError> {
+        let participant = self.required("participant")?;
+        let (start, level) = (self.required("start")?, self.required("level")?);
+        let any = (f64::MIN, f64::MAX);
+        let mut standard: Option<f64> = None;
+        for row in &self.records {
+            let Some(at) = self.column("standard") else {
+                break;
+            };
+            let own = self.number(row, ("standard", at), any)?;
+            let first = *standard.get_or_insert(own);
+            if own != first {
+                let expected = format!("{first}: a table has one standard");
+                return Err(self.fault(row.0, "standard", &row.1[at], expected));
+            }
+        }
+        let one = |row: &(u64, csv::StringRecord)| {
+            let side = self.word(row, ("start", start), &["below", "above"])?;
+            Ok(SettingRow {
+                participant: row.1[participant].to_owned(),
+                level: self.number(row, ("level", level), any)?,
+                ascending: side == 0,
+                changes: None,
+            })
+        };
+        let rows: Result<Vec<_>, TableError> = self.records.iter().map(one).collect();
+        Ok((rows?, standard))
     }
 
     /// The ratings, and which conditions are hidden reference and mid anchor.

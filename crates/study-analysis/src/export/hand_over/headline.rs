@@ -2,7 +2,9 @@
 
 use crate::analyze::Analysis;
 use crate::analyze::psychophysics::PartAnalysis;
-use crate::analyze::psychophysics::results::{Identified, Preferences, Rankings, Similarities};
+use crate::analyze::psychophysics::results::{
+    Adjusted, Identified, Preferences, Rankings, Similarities,
+};
 use crate::analyze::results::{Correlation, Field, Key, Number as _};
 use std::collections::BTreeMap;
 use study_plan::protocol::OutcomeFamily;
@@ -115,6 +117,9 @@ pub(super) fn of_part(part: &PartAnalysis) -> Vec<Number> {
     }
     if let Some(found) = &over.ranking {
         numbers.of_rankings(found);
+    }
+    if let Some(found) = &over.adjustment {
+        numbers.of_adjustment(found);
     }
     for (name, group) in &over.sdt_group {
         let id = format!("sdt_group/{}/above_chance", name.part());
@@ -258,6 +263,35 @@ impl Numbers {
         let of_pair = format!("{id}/pair");
         self.each(&of_pair, &found.pairs, &["n", "above", "tied"], CLOSED);
         self.each(&of_pair, &found.pairs, &["difference", "se"], FITTED);
+    }
+
+    /// What R computes without draws.
+    fn of_adjustment(&mut self, found: &Adjusted) {
+        let id = "adjustment";
+        let of_all = [
+            "n",
+            "n_participants",
+            "changes",
+            "pse",
+            "pse_ci95_lo",
+            "pse_ci95_hi",
+            "pse_sd",
+        ];
+        self.add(id, found, &of_all, CLOSED);
+        let tested = ["ci95_lo", "ci95_hi", "t", "df", "p"];
+        let error = [&["standard", "mean", "relative"][..], &tested[..]].concat();
+        self.add(&format!("{id}/error"), &found.error, &error, CLOSED);
+        let start = [&["ascending", "descending", "difference"][..], &tested[..]].concat();
+        self.add(&format!("{id}/start"), &found.start, &start, CLOSED);
+        let spread = ["sd", "df", "relative"];
+        self.add(&format!("{id}/spread"), &found.spread, &spread, CLOSED);
+        let own = ["n", "pse", "ascending", "descending", "sd"];
+        self.each(
+            &format!("{id}/participant"),
+            &found.participants,
+            &own,
+            CLOSED,
+        );
     }
 
     fn of_preferences(&mut self, pairs: &Preferences) {

@@ -1,6 +1,6 @@
 //! Number of trials, duration, and doubtful designs of studies with parts.
 
-use super::{Spans, answers_s, counted_out, maps, pace};
+use super::{Spans, adjustments, answers_s, counted_out, maps, pace};
 use crate::procedure::{Rule, Staircase};
 use crate::protocol::{
     DeviceKind, Identification, IntervalOrder, Magnitude, Method, Mushra, Part, Protocol, Question,
@@ -65,6 +65,7 @@ pub(super) fn trials(protocol: &Protocol, part: &Part) -> u32 {
             all(own.pairs().pairs.len(), own.repetitions).saturating_add(own.practice)
         }
         Task::Ranking(own) => own.repetitions.saturating_add(own.practice),
+        Task::Adjustment(own) => all(2, own.repetitions).saturating_add(own.practice),
     }
 }
 
@@ -80,6 +81,8 @@ pub(super) fn seconds(protocol: &Protocol, part: &Part, reference_s: f64) -> f64
             .map(|track| track.method.sequences()[0].len())
             .max()
             .unwrap_or(1),
+        // The first level, and those after each change.
+        Task::Adjustment(own) => 1 + own.usual_changes() + usize::from(own.standard.is_some()),
     } as f64;
     let free_s = match &part.task {
         Task::Rating(_) => pace::EXPLORE_S,
@@ -91,13 +94,16 @@ pub(super) fn seconds(protocol: &Protocol, part: &Part, reference_s: f64) -> f64
         | Task::Search(_)
         | Task::Similarity(_)
         | Task::Ranking(_) => pace::COMPARE_S,
+        Task::Adjustment(_) => pace::STEP_S,
     };
     let felt_s = part.exposure.max_s.map_or(free_s, |max| max.min(free_s));
     let load_s = match protocol.device.kind {
         DeviceKind::Manual => pace::MOUNT_S,
         DeviceKind::Simulated | DeviceKind::Serial | DeviceKind::Process => pace::LOAD_S,
     };
-    let asked: Vec<Question> = (part.asks.iter())
+    // A level that was set is not asked.
+    let set = usize::from(part.task.adjustment().is_some());
+    let asked: Vec<Question> = (part.asks.iter().skip(set))
         .filter_map(|id| protocol.questions.iter().find(|q| q.id == *id).cloned())
         .collect();
     let gaps_s = (intervals - 1.0) * part.gap_s;
@@ -128,6 +134,7 @@ pub(super) fn warnings(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Faul
         ];
         let doubts = doubts.into_iter().flatten();
         let doubts = doubts.chain(maps::doubts(protocol, part));
+        let doubts = doubts.chain(adjustments::doubts(part));
         faults.extend(doubts.map(|fault| fault.at(place.clone())));
     }
     for (i, track) in protocol.tracks.iter().enumerate() {
@@ -168,7 +175,7 @@ pub fn is_about_realizations(protocol: &Protocol) -> bool {
     let about = |part: &Part| match &part.task {
         Task::Discrimination { .. } | Task::Identification(_) | Task::Search(_) => false,
         // A map has what distinguishes the realizations as its axes, whatever that is.
-        Task::Similarity(_) => false,
+        Task::Similarity(_) | Task::Adjustment(_) => false,
         Task::Magnitude(own) => {
             let models = &own.presentations.models;
             models.iter().all(|m| protocol.level_of(m).is_none())

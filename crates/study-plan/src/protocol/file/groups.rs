@@ -197,7 +197,7 @@ pub(super) fn agree(
                     }
                     (task.models.clone(), own)
                 }
-                Task::Discrimination { .. } | Task::Search(_) => continue,
+                Task::Discrimination { .. } | Task::Search(_) | Task::Adjustment(_) => continue,
             };
             if left == 0 {
                 let what = format!(

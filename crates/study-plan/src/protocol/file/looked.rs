@@ -1,5 +1,6 @@
 //! What the ids in parts and tracks stand for; every unknown one is reported.
 
+use super::adjustment::RawAdjustment;
 use super::agree::{Sections, at, unknown};
 use super::pairs::RawPairs;
 use super::parts::RawLabel;
@@ -10,7 +11,7 @@ use crate::protocol::pairs::{every, neighbors};
 use crate::protocol::ranking::MOST_RANKED;
 use crate::protocol::similarity::unconnected;
 use crate::protocol::{
-    Criterion, DeviceKind, FamilyRules, Label, Presentations, Ranking, Role, Similarity,
+    Adjustment, Criterion, DeviceKind, FamilyRules, Label, Presentations, Ranking, Role, Similarity,
 };
 use study_base::diagnostic::Fault;
 use study_base::diagnostic::table::Document;
@@ -350,6 +351,82 @@ impl Looked<'_> {
             repetitions: raw.repetitions,
             ties: raw.ties,
             practice: raw.practice,
+        })
+    }
+
+    /// What a part of adjustment sets. Starts that are not on both sides, and steps above the just noticeable difference, are
+    /// reported.
+    pub(super) fn adjustment(
+        &self,
+        raw: &RawAdjustment,
+        families: &[FamilyRules],
+        path: &str,
+    ) -> Option<Adjustment> {
+        let family = self.family(&raw.family, families, path)?;
+        let standard = match (&raw.reference, raw.standard) {
+            (Some(model), _) => {
+                self.model(model, &format!("{path}.reference"));
+                Some(model.clone())
+            }
+            (None, Some(level)) => Some(self.level(family, level, (path, "standard"))?),
+            (None, None) => None,
+        };
+        let models: Vec<ModelId> = family.realizations().map(|(id, _)| id).collect();
+        let quarter = (models.len() / 4).max(1);
+        let starts = |levels: &Option<Vec<f64>>, key: &str, own: &[ModelId]| match levels {
+            Some(levels) => {
+                let level = |level: &f64| self.level(family, *level, (path, key));
+                levels.iter().map(level).collect::<Option<Vec<ModelId>>>()
+            }
+            None => Some(own.to_vec()),
+        };
+        let below = starts(&raw.below, "start_below", &models[..quarter])?;
+        let above = starts(&raw.above, "start_above", &models[models.len() - quarter..])?;
+        let level = |id: &ModelId| family.level_of(id);
+        let highest = below
+            .iter()
+            .filter_map(level)
+            .fold(f64::NEG_INFINITY, f64::max);
+        let lowest = above.iter().filter_map(level).fold(f64::INFINITY, f64::min);
+        let between = match raw.standard {
+            Some(standard) => highest < standard && standard < lowest,
+            None => highest < lowest,
+        };
+        if !between {
+            let what = match raw.standard {
+                Some(standard) => format!(
+                    "the standard {standard} is not between the starts: those below reach {highest}, and those above begin at {lowest}"
+                ),
+                None => format!(
+                    "the starts below reach {highest}, and those above begin at {lowest}: nothing lies between them"
+                ),
+            };
+            let hint = "such as start_below = [0.5] and start_above = [2.0], or take a family with more levels";
+            self.fault(path, "start_below", Fault::error(what).hint(hint));
+        }
+        if let Some(jnd) = raw.jnd {
+            let steps = family.ladder.levels().windows(2).map(|two| two[1] - two[0]);
+            let widest = steps.fold(0.0, f64::max);
+            if widest > jnd * (1.0 + 1e-9) {
+                let what = format!(
+                    "a step of the ladder of `{}` is {}, more than the just noticeable difference {jnd}",
+                    family.id,
+                    (1e6 * widest).round() / 1e6
+                );
+                let hint = "give the family more levels: each change has to be one that can hardly be felt";
+                self.fault(path, "jnd", Fault::error(what).hint(hint));
+            }
+        }
+        Some(Adjustment {
+            family: family.id.clone(),
+            models,
+            standard,
+            below,
+            above,
+            repetitions: raw.repetitions,
+            practice: raw.practice,
+            jnd: raw.jnd,
+            words: raw.words.clone(),
         })
     }
 

@@ -1,5 +1,6 @@
 //! `[[parts]]`: trials of one kind each.
 
+use super::adjustment::{ADJUSTMENT, RawAdjustment};
 use super::pairs::{RawPairs, which};
 use super::ranking::{RANKING, RawRanking};
 use super::similarity::{RawSimilarity, SIMILARITY};
@@ -97,7 +98,7 @@ const SEARCH: &[Key] = keys! {
 };
 
 /// The kinds of trial. A new one is declared here and in [`crate::protocol::Task`].
-pub(super) const KINDS: [Variant<RawTask>; 9] = [
+pub(super) const KINDS: [Variant<RawTask>; 10] = [
     Variant::new(
         "rating",
         "One realization is felt and rated.",
@@ -238,6 +239,12 @@ pub(super) const KINDS: [Variant<RawTask>; 9] = [
         RANKING,
         ranking,
     ),
+    Variant::new(
+        "adjustment",
+        "A level of a family is set, one step of its ladder at a time, until it feels equal to a standard or as it should. Needs the format `study-protocol/3`.",
+        ADJUSTMENT,
+        adjustment,
+    ),
 ];
 
 /// A part as it was read; its ids are not looked up yet.
@@ -322,6 +329,7 @@ pub(super) enum RawTask {
     },
     Similarity(RawSimilarity),
     Ranking(RawRanking),
+    Adjustment(RawAdjustment),
 }
 
 /// A label, and of what it is the right answer.
@@ -569,4 +577,8 @@ fn similarity(section: &mut Section<'_, '_>) -> Option<RawTask> {
 
 fn ranking(section: &mut Section<'_, '_>) -> Option<RawTask> {
     super::ranking::ranking(section).map(RawTask::Ranking)
+}
+
+fn adjustment(section: &mut Section<'_, '_>) -> Option<RawTask> {
+    super::adjustment::adjustment(section).map(RawTask::Adjustment)
 }

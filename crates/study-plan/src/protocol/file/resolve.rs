@@ -120,6 +120,16 @@ impl Raw {
                 }
                 // It has several.
                 RawTask::Ranking(_) => None,
+                // The level that was set.
+                RawTask::Adjustment(own) => {
+                    let number = QuestionKind::Number(kinds::Number {
+                        unit: None,
+                        min: None,
+                        max: None,
+                        above: None,
+                    });
+                    Some(PartialQuestion::made(&part.path, id, &own.prompt, number))
+                }
                 RawTask::Search { prompt, .. } => Some(PartialQuestion::made(
                     &part.path,
                     id,
@@ -288,6 +298,7 @@ impl Raw {
                     own.family.as_ref().is_some_and(|own| own.0 == *id)
                 }
                 Some(RawTask::Ranking(own)) => own.felt.is_of(id),
+                Some(RawTask::Adjustment(own)) => own.family == *id,
                 _ => false,
             };
             if !self.tracks.iter().any(of) && !self.parts.iter().any(felt) {
@@ -469,6 +480,13 @@ impl Raw {
                 let ranking = looked.ranking(own, families, path)?;
                 asks.extend((1..=ranking.models.len()).map(|interval| question(&id, interval)));
                 (Task::Ranking(ranking), own.gap_s)
+            }
+            RawTask::Adjustment(own) => {
+                asks.push(QuestionId::new(id.as_str()).ok()?);
+                (
+                    Task::Adjustment(looked.adjustment(own, families?, path)?),
+                    own.gap_s,
+                )
             }
         };
         if !matches!(task, Task::Rating(_)) {

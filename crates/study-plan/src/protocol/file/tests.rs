@@ -569,6 +569,7 @@ fn any_text_is_read_without_a_panic() {
     assert!(parse("p", &bom).protocol.is_some());
 }
 
+mod adjustment;
 mod factors;
 mod fits;
 mod identification;

@@ -38,7 +38,8 @@ fn row(
         | Stimuli::Rated { .. }
         | Stimuli::Pair { .. }
         | Stimuli::Search { .. }
-        | Stimuli::Set { .. } => None,
+        | Stimuli::Set { .. }
+        | Stimuli::Adjusted { .. } => None,
     };
     let playback = presentation.ended.map(|(_, ended)| ended.playback);
     IntervalRow {
@@ -56,7 +57,11 @@ fn row(
         track_trial: trial.track().map(|_| trial.repetition),
         target: intervals
             .and_then(|i| i.get(at))
-            .map(|i| *i == Interval::Comparison),
+            .map(|i| *i == Interval::Comparison)
+            .or_else(|| {
+                let level = !attempt.is_standard(presentation.interval);
+                attempt.is_adjusted().then_some(level)
+            }),
         catch: track.and_then(|t| Some(t.method.is_catch(intervals?))),
         gap_s: presentation.gap_s,
         replays: presentation.replays,

@@ -67,6 +67,8 @@ impl History {
         };
         let primary = given.iter().find(|g| g.question == *primary);
         let model = trial.model().or(match shown.map(|a| &a.models[..]) {
+            // What was set is a level, and no realization that was presented.
+            _ if shown.is_some_and(Attempt::is_adjusted) => None,
             Some([only]) => Some(only),
             _ => None,
         });
@@ -135,7 +137,8 @@ impl History {
             level: (track.and_then(TrackRules::family))
                 .and_then(|_| shown?.level)
                 .map(|level| level.presented)
-                .or_else(|| protocol.level_of(shown.and(model)?)),
+                .or_else(|| protocol.level_of(shown.and(model)?))
+                .or_else(|| protocol.level_of(shown?.set_to()?)),
             correct: correct(trial, track, part, &given, before_feedback.as_ref()),
             replays: shown.map(|a| a.replays),
             fidelity: worst.cloned(),
@@ -207,7 +210,8 @@ fn correct(
         Stimuli::Rated { .. }
         | Stimuli::Pair { .. }
         | Stimuli::Search { .. }
-        | Stimuli::Set { .. } => None,
+        | Stimuli::Set { .. }
+        | Stimuli::Adjusted { .. } => None,
     }
 }
 

@@ -64,6 +64,8 @@ pub struct Attempt {
     pub models: Vec<ModelId>,
     /// What its track presents.
     pub level: Option<TrackLevel>,
+    /// Of a trial of adjustment: the intervals with the standard.
+    pub(super) standards: Option<Vec<u32>>,
     /// Its presentations so far, in order. Each begins with its confirmed start.
     pub presentations: Vec<Presentation>,
     /// How often its intervals were felt again.
@@ -257,6 +259,7 @@ impl Attempt {
             start,
             models: Vec::new(),
             level: None,
+            standards: None,
             presentations: Vec::new(),
             replays: 0,
             ended: None,

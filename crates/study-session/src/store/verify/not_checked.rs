@@ -18,7 +18,7 @@ impl StudyFolder {
     pub fn not_checked(&self, sessions: &[SessionData], has_protocol: bool) -> Vec<String> {
         let mut parts = Vec::new();
         if !has_protocol {
-            let what = "the derived tables, tracks, searches and ends of practice, because the frozen protocol cannot be read";
+            let what = "the derived tables, tracks, searches, ends of practice and steps of adjustments, because the frozen protocol cannot be read";
             parts.push(what.to_owned());
         }
         let files: usize = sessions.iter().map(|s| self.without_checksum(s)).sum();

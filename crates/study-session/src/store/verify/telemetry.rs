@@ -58,7 +58,7 @@ impl StudyFolder {
         let mut counted: BTreeMap<Presented, u64> = BTreeMap::new();
         for (trial, attempt) in session.history.all_attempts() {
             for presentation in &attempt.presentations {
-                let several = (attempt.intervals() > 1).then_some(presentation.interval);
+                let several = attempt.is_numbered().then_some(presentation.interval);
                 let presented = (trial, attempt.number, several);
                 let samples = presentation.ended.map_or(0, |(_, e)| e.playback.samples);
                 if samples > 0 && !known.contains(&presented) {

@@ -1,0 +1,147 @@
+//! A whole session of adjustment in a pseudo-terminal, by keys alone, as in `parts_by_keys`.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use crate::parts_by_keys::{PROMPT, events, of, start_with, written};
+use crate::support::player::{play, quit};
+use crate::support::{PATIENCE, Terminal, study};
+use serde_json::Value as Json;
+use std::fs;
+use std::path::Path;
+use std::time::{Duration, Instant};
+use study::tui::pace::TYPED;
+
+/// The step of the ladder that is the standard, 2.0.
+const STANDARD: usize = 11;
+
+/// A key that had no effect for so long was not read; it is pressed again.
+const NOT_READ: Duration = Duration::from_secs(5);
+
+fn count(folder: &Path, event: &str) -> usize {
+    events(folder).iter().filter(|e| of(e, event)).count()
+}
+
+/// The step that is felt, or comes next.
+fn step(folder: &Path) -> usize {
+    let events = events(folder);
+    let begun = events.iter().rposition(|e| of(e, "attempt_started"));
+    let attempt = &events[begun.unwrap()..];
+    let level = |e: &&Json| of(e, "adjusted") && e["standard"] != true;
+    let model = match attempt.iter().rfind(level) {
+        Some(adjusted) => &adjusted["to"],
+        None => &attempt[0]["intervals"][1],
+    };
+    let (_, step) = model.as_str().unwrap().rsplit_once('.').unwrap();
+    step.parse().unwrap()
+}
+
+/// Whether the standard was felt again.
+fn compared(folder: &Path) -> bool {
+    let events = events(folder);
+    events.iter().any(|e| e["standard"] == true)
+}
+
+fn level_is_felt(page: &str) -> bool {
+    page.contains("→  stronger") && page.contains("Enter: equal now")
+}
+
+/// Presses a key until an event follows, but no longer than a key takes to be read.
+fn press(terminal: &mut Terminal, folder: &Path, key: &str, event: &str) {
+    let before = count(folder, event);
+    std::thread::sleep(2 * TYPED);
+    terminal.keys(key);
+    let pressed = Instant::now();
+    while count(folder, event) == before && pressed.elapsed() < NOT_READ {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+/// Goes towards the standard, feels it again once, and confirms its level, until a page is there.
+fn set_until(terminal: &mut Terminal, folder: &Path, there: impl Fn(&str) -> bool) {
+    let begun = Instant::now();
+    while terminal.runs() {
+        let page = terminal.shown();
+        if there(&page.text) {
+            return;
+        }
+        assert!(
+            begun.elapsed() < 3 * PATIENCE,
+            "it does not end:\n{}",
+            page.text
+        );
+        if !level_is_felt(&page.text) {
+            play(terminal, "P01", &page);
+            std::thread::sleep(Duration::from_millis(3));
+            continue;
+        }
+        let (key, event) = match step(folder) {
+            STANDARD if !compared(folder) => ("r", "playback_started"),
+            STANDARD => ("\r", "trial_done"),
+            low if low < STANDARD => ("\u{1b}[C", "playback_started"),
+            _ => ("-", "playback_started"),
+        };
+        press(terminal, folder, key, event);
+    }
+    panic!("the session ended before");
+}
+
+/// From below and from above, with a session that is left while a level is felt.
+#[test]
+fn adjustment_by_keys() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let part = format!(
+        r#"[[families]]
+id = "f"
+from = "models/static.toml"
+vary = "b"
+range = [1.0, 3.0]
+steps = 21
+[[parts]]
+id = "answer"
+kind = "adjustment"
+prompt = "{PROMPT}"
+lower = "weaker"
+higher = "stronger"
+confirm = "equal now"
+family = "f"
+standard = 2.0
+start_below = [1.7]
+start_above = [2.3]
+repetitions = 1
+gap_s = 0.2
+"#
+    );
+    written(folder, &part);
+    let file = folder.join("p/protocol.toml");
+    let text = fs::read_to_string(&file).unwrap();
+    fs::write(&file, text.replace("study-protocol/2", "study-protocol/3")).unwrap();
+
+    let mut terminal = start_with(folder, &[]);
+    set_until(&mut terminal, folder, |page| {
+        level_is_felt(page) && count(folder, "adjusted") >= 1
+    });
+    quit(&mut terminal);
+    assert_eq!(count(folder, "trial_done"), 0);
+    // The trial begins again, at its start.
+    let mut terminal = start_with(folder, &[]);
+    set_until(&mut terminal, folder, |page| page.contains("Enter: close"));
+    terminal.keys("\r");
+    assert_eq!(terminal.exit_code(), 0);
+    let (code, out, err) = study(&["verify", "results"], folder);
+    assert_eq!(code, 0, "{out}{err}");
+    assert_eq!(count(folder, "trial_done"), 2);
+    assert!(compared(folder));
+
+    let arguments = ["analyze", "results", "--include", "pilot", "--json"];
+    let (_, out, _) = study(&arguments, folder);
+    let document: Json = serde_json::from_str(&out).unwrap();
+    let values = &document["parts"][0]["values"];
+    let value = |id: &str| values[format!("adjustment/{id}")].as_f64().unwrap();
+    assert_eq!(value("n"), 2.0);
+    // Three steps from each side.
+    assert!(value("changes") >= 3.0, "{}", value("changes"));
+    for (id, expected) in [("pse", 2.0), ("error/mean", 0.0), ("start/difference", 0.0)] {
+        assert!((value(id) - expected).abs() < 1e-9, "{id}: {}", value(id));
+    }
+}
