@@ -15,6 +15,7 @@ mod pauses;
 mod random;
 mod refused;
 mod resume;
+mod retraced;
 mod rig;
 mod saving;
 mod search;

@@ -33,6 +33,7 @@ mod opening;
 mod own_answers;
 mod phase;
 mod project_view;
+pub mod retrace;
 pub mod roster;
 mod saving;
 mod search;

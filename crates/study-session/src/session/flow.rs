@@ -210,7 +210,8 @@ impl Session {
         }
     }
 
-    fn advance(&mut self, at: Moment) {
+    /// Enter on the phase alone.
+    pub(super) fn advance(&mut self, at: Moment) {
         match &self.phase {
             Phase::Message(kind) => {
                 match Step::of(*kind) {

@@ -213,7 +213,7 @@ impl Session {
     }
 
     /// Whether the answer to a trial is correct, if its participant is told.
-    fn told(&self, trial: u32) -> Option<Told> {
+    pub(super) fn told(&self, trial: u32) -> Option<Told> {
         let planned = self.history.planned(trial)?;
         let part = self.part_of(planned)?;
         let (attempt, _) = self.history.completion(trial)?;
@@ -322,7 +322,8 @@ pub(super) fn check_free_text(text: &str) -> Result<(), InputRefused> {
     }
 }
 
-fn step_of(form: FormId) -> Option<Step> {
+/// The step of a form that appears once.
+pub(super) fn step_of(form: FormId) -> Option<Step> {
     match form {
         FormId::Setup => Some(Step::Setup),
         FormId::Intake => Some(Step::Intake),

@@ -438,7 +438,7 @@ fn banner(seat: Seat) -> Option<Banner> {
 }
 
 /// Whether Enter does anything on a screen.
-fn can_advance(screen: &Screen) -> bool {
+pub(super) fn can_advance(screen: &Screen) -> bool {
     match screen {
         Screen::Message { .. } | Screen::SaveTrouble { .. } | Screen::Paused { .. } => true,
         Screen::End { .. } | Screen::Mount { .. } => true,

@@ -6,6 +6,9 @@ use crate::outcome::fold::{Ended, Presentation};
 use crate::outcome::{Event, Failure, Fidelity, Moment, Playback, Verdict};
 use study_plan::protocol::{DeviceKind, Exposure, Trial};
 
+/// Why an attempt failed that was stopped and is played again.
+pub(super) const PLAYED_AGAIN: &str = "played again";
+
 impl Session {
     /// Requests the next trial from the device. The event comes first, so that
     /// nothing is felt that is not in the journal.
@@ -37,7 +40,7 @@ impl Session {
 
     /// Requests the next interval of the attempt under way from the device: each anew,
     /// also one that is equal to the last, so that a swap tells nothing.
-    fn load_interval(&mut self, at: Moment) {
+    pub(super) fn load_interval(&mut self, at: Moment) {
         let (Some(open), Some(model)) = (self.history.open(), self.playing_model()) else {
             return self.proceed(at);
         };
@@ -330,7 +333,7 @@ impl Session {
         if !matches!(self.phase, Phase::Stopped { .. }) {
             return;
         }
-        self.fail(Failure::Stopped, "played again", at);
+        self.fail(Failure::Stopped, PLAYED_AGAIN, at);
         if self.device_lost {
             self.proceed(at);
             self.show_device_lost();
