@@ -16,6 +16,7 @@ mod memory;
 mod mirrors;
 mod process;
 mod processes;
+mod replayed;
 mod saver;
 #[path = "../support/mod.rs"]
 mod support;

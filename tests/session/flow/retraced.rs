@@ -174,6 +174,28 @@ fn a_page_before_a_trial_belongs_to_the_attempt_that_follows() {
 }
 
 #[test]
+fn after_an_amendment_the_pages_have_its_words() {
+    let protocol = rich();
+    let mut amended = rich();
+    "How real was it?".clone_into(&mut amended.questions[0].prompt);
+    let mut rig = recording(&protocol);
+    rig.until_reference(2).until("Form");
+    rig.wait(0.5).send(Input::Quit);
+    let mut rig = back(rig, &amended, 20.0);
+    rig.finish();
+    let [before, after] = [protocol, amended].map(Arc::new);
+    let in_force = |entry: &Entry| match entry.event {
+        Event::Reopened { .. } => after.clone(),
+        _ => before.clone(),
+    };
+    let mut again = Vec::new();
+    for page in retrace::pages(&in_force, &rig.journal) {
+        record(&mut again, &page.view);
+    }
+    assert_eq!(rig.pages, Some(again));
+}
+
+#[test]
 fn a_journal_without_its_start_has_no_pages() {
     let protocol = plain();
     let mut rig = recording(&protocol);
