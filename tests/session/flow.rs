@@ -16,6 +16,7 @@ mod random;
 mod refused;
 mod resume;
 mod retraced;
+mod retraced_whole;
 mod rig;
 mod saving;
 mod search;

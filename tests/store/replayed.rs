@@ -78,7 +78,7 @@ fn a_trial_of_a_simulated_participant_is_shown_with_its_force_beside_the_table()
         "turn-signal · SIM001 · session 1 · done",
         "rial 3 of 15",
         "Operate the real switch.",
-        "attempt 1, 2.0 s after the prompt: lambda-0.9991",
+        "attempt 1, after a prompt of 2.0 s: lambda-0.9991",
         "it ends after 7.7 s, 8 full strokes",
         "realism = 7",
         "answered in 3.5 s",

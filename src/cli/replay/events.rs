@@ -127,8 +127,8 @@ pub(super) fn words(event: &Event, revealed: bool) -> String {
             ..
         } => {
             let what = match accepted {
-                true => "agrees to",
-                false => "does not agree to",
+                true => "the participant agrees to",
+                false => "the participant does not agree to",
             };
             format!("{what} {}, version {}", or_none(document), or_none(version))
         }
@@ -171,7 +171,7 @@ pub(super) fn words(event: &Event, revealed: bool) -> String {
                 true => format!(": {}{level}", models.join(", ")),
                 false => String::new(),
             };
-            format!("attempt {attempt}, {reference_s:.1} s after the prompt{what}")
+            format!("attempt {attempt}, after a prompt of {reference_s:.1} s{what}")
         }
         Event::PlaybackStarted { interval, .. } => format!("{} plays", of_interval(*interval)),
         Event::PlaybackEnded {

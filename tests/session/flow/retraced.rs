@@ -53,13 +53,17 @@ fn retraced(rig: &Rig, protocol: &Protocol) -> Vec<Shown> {
 }
 
 fn assert_same(rig: &Rig, protocol: &Protocol) {
-    let shown = rig.pages.as_ref().unwrap();
     let mut again = Vec::new();
     for page in retraced(rig, protocol) {
         record(&mut again, &page.view);
     }
+    assert_equal(rig.pages.as_ref().unwrap(), &again);
+}
+
+/// Names the first page that differs.
+pub(super) fn assert_equal(shown: &[String], again: &[String]) {
     let differ = |(a, b): (&String, &String)| a != b;
-    let apart = shown.iter().zip(&again).position(differ);
+    let apart = shown.iter().zip(again).position(differ);
     let apart = apart.unwrap_or(shown.len().min(again.len()));
     assert_eq!(
         shown.get(apart),

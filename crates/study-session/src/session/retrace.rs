@@ -7,7 +7,8 @@
 //!
 //! A journal has what was done and not what was looked at. A page that was left without a
 //! trace is not shown again: one to which somebody went back and changed nothing, the pages
-//! between two texts at which the program ended, a fault of device or disk between trials.
+//! between two texts at which the program ended, the rating after a stop until it is answered, the
+//! request to mount a sample, a fault of device or disk between trials.
 
 use super::forms::step_of;
 use super::phase::Phase;
