@@ -4,6 +4,7 @@
 
 mod agreement;
 mod blinding;
+mod consent;
 mod device;
 mod exposure;
 mod forms;

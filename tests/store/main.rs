@@ -2,6 +2,7 @@
 
 mod chains;
 mod commands;
+mod consented;
 mod corrected;
 mod crash;
 #[path = "../support/designs.rs"]

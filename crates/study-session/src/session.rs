@@ -25,6 +25,7 @@
 //! [`Input::DeviceLoaded`] for it may follow.
 
 mod away;
+mod consenting;
 mod failures;
 mod flow;
 mod forms;

@@ -265,6 +265,7 @@ fn of_form(form: FormId) -> &'static str {
         FormId::Setup => "set-up: ",
         FormId::Intake => "intake: ",
         FormId::Outro => "closing questions: ",
+        FormId::Consent => "consent: ",
         FormId::Trial { .. } => "",
     }
 }

@@ -56,7 +56,7 @@ fn trial_of(event: &Event) -> Option<u32> {
     match event {
         Event::Answered { form, .. } | Event::Corrected { form, .. } => match form {
             FormId::Trial { trial, .. } => Some(*trial),
-            FormId::Setup | FormId::Intake | FormId::Outro => None,
+            FormId::Setup | FormId::Intake | FormId::Outro | FormId::Consent => None,
         },
         Event::AttemptStarted { trial, .. }
         | Event::PlaybackStarted { trial, .. }

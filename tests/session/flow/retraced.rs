@@ -1,5 +1,6 @@
 //! The pages that follow from a journal are those that were shown, byte by byte.
 
+use super::consent::signed;
 use super::part_rig::{
     QUEST, STAIRCASE, answering, beside_a_reference, finish, identification, magnitudes, pairs,
     reference, second, similarity, track, until,
@@ -77,7 +78,7 @@ pub(super) fn assert_equal(shown: &[String], again: &[String]) {
 
 #[test]
 fn ratings_show_the_same_pages_again() {
-    for protocol in [plain(), rich()] {
+    for protocol in [plain(), rich(), signed()] {
         let mut rig = recording(&protocol);
         rig.finish();
         assert_same(&rig, &protocol);

@@ -223,6 +223,7 @@ impl Rig {
                     self.loads = 0;
                     self.loaded = false;
                 }
+                Effect::KeepConsent(_) => assert!(!recorded, "the copy comes before its event"),
                 Effect::RetrySave => recorded = true,
                 Effect::End(ending) => self.ending = Some(ending.clone()),
             }

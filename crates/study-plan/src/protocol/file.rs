@@ -130,8 +130,10 @@ const FORMATS: &[Word] = &[
 const OF_FORMAT_2: [&str; 5] = ["parts", "families", "tracks", "groups", "sessions"];
 
 /// Keys that need [`FORMAT_3`], without the places in lists.
-pub const OF_FORMAT_3: [&str; 14] = [
+pub const OF_FORMAT_3: [&str; 16] = [
     "confirms",
+    "consent.text",
+    "consent.initials",
     "design.order_version",
     "factors",
     "outcomes",
@@ -181,6 +183,8 @@ pub enum Content {
     Model,
     /// Orders.
     Orders,
+    /// The text of the consent document.
+    Text,
     /// A bundle with a realization; with the SHA-256 that it has to have, if the protocol says it.
     Bundle(Option<String>),
 }
@@ -379,6 +383,12 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
     };
     named.extend(sections.files());
     named.extend(raw.files());
+    let document_text = consent.as_ref().and_then(|consent| consent.file.clone());
+    named.extend(document_text.map(|file| Named {
+        place: "consent.text".to_owned(),
+        file,
+        content: Content::Text,
+    }));
     if !broken {
         sections.agree(document);
         questionnaires::agree(&questionnaires, &raw.parts, document);

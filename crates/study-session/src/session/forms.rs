@@ -50,6 +50,7 @@ impl Session {
             FormId::Setup => &self.protocol.setup,
             FormId::Intake => &self.protocol.intake,
             FormId::Outro => &self.protocol.outro,
+            FormId::Consent => &[],
             FormId::Trial { trial, .. } => {
                 let part = (self.history.planned(trial)).and_then(|t| self.part_of(t));
                 if let Some(part) = part {
@@ -133,6 +134,9 @@ impl Session {
             Err(why) => self.notify(why.words(&self.words)),
             Ok(answers) => {
                 let form = open.id;
+                if form == FormId::Consent {
+                    return self.sign(&answers, at);
+                }
                 for (question, answer) in answers {
                     self.enter(form, question, answer, at);
                 }
@@ -328,7 +332,7 @@ pub(super) fn step_of(form: FormId) -> Option<Step> {
         FormId::Setup => Some(Step::Setup),
         FormId::Intake => Some(Step::Intake),
         FormId::Outro => Some(Step::Outro),
-        FormId::Trial { .. } => None,
+        FormId::Trial { .. } | FormId::Consent => None,
     }
 }
 

@@ -83,10 +83,7 @@ impl Session {
                 restart: self.can_restart(),
             },
             Phase::Consent => match &self.protocol.consent {
-                Some(consent) => Screen::Consent {
-                    document: consent.document.clone(),
-                    version: consent.version.clone(),
-                },
+                Some(consent) => self.consent_screen(consent),
                 None => Screen::Saving,
             },
             Phase::Message(kind) => Screen::Message {
@@ -334,6 +331,7 @@ impl Session {
             FormId::Setup => Phrase::FormSetup,
             FormId::Intake => Phrase::FormIntake,
             FormId::Outro => Phrase::FormOutro,
+            FormId::Consent => Phrase::AgreeQuestion,
             FormId::Trial { trial, .. } => {
                 let (practice, number) = self.shown_number(trial);
                 let phrase = match practice {
@@ -360,6 +358,7 @@ impl Session {
             FormId::Setup => "set-up".to_owned(),
             FormId::Intake => "intake".to_owned(),
             FormId::Outro => "closing questions".to_owned(),
+            FormId::Consent => "consent".to_owned(),
             FormId::Trial { trial, .. } => {
                 let (practice, number) = self.shown_number(trial);
                 title(practice, number)

@@ -147,8 +147,16 @@ impl Retrace<'_> {
                 self.take();
                 (self.runs, self.session.paused) = (false, None);
             }
-            Event::Consented { .. }
-            | Event::InstructionsRead
+            Event::Consented { accepted, .. } => {
+                self.lead(true, at);
+                let consent = self.session.protocol.consent.as_ref();
+                if *accepted && consent.is_some_and(|consent| consent.initials) {
+                    self.session.ask_initials(at);
+                    self.show(at);
+                }
+                self.take_and_go_on();
+            }
+            Event::InstructionsRead
             | Event::BreakStarted { .. }
             | Event::TrackEnded { .. }
             | Event::PracticeEnded { .. }

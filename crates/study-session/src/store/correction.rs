@@ -196,6 +196,7 @@ fn asked<'a>(protocol: &'a Protocol, form: FormId, id: &QuestionId) -> Option<&'
         FormId::Intake => &protocol.intake,
         FormId::Outro => &protocol.outro,
         FormId::Trial { .. } => &protocol.questions,
+        FormId::Consent => return None,
     };
     all.iter().find(|q| q.id == *id)
 }

@@ -158,7 +158,7 @@ fn resume_text(gap_s: f64, choice: Option<Choice>) -> String {
 fn trial_of(form: FormId) -> (Option<u32>, Option<u32>) {
     match form {
         FormId::Trial { trial, attempt } => (Some(trial), Some(attempt)),
-        FormId::Setup | FormId::Intake | FormId::Outro => (None, None),
+        FormId::Setup | FormId::Intake | FormId::Outro | FormId::Consent => (None, None),
     }
 }
 
