@@ -26,7 +26,7 @@ fn inputs(view: &View) -> Vec<Input> {
 }
 
 fn failing(mut options: Options) -> Box<dyn Device> {
-    options.faults = FaultPlan::random(3, 0.15);
+    options.faults = FaultPlan::random(3, 0.3);
     Box::new(VirtualDevice::new(options))
 }
 
