@@ -140,13 +140,16 @@ impl Protocols {
     fn of(study: &StudyFolder, session: &SessionData) -> Result<Self, Failure> {
         let who = &session.participant;
         let Some(start) = session.history.start() else {
-            let what = match session.entries.is_empty() {
-                true => format!("{who} has no session that began"),
-                false => format!("{who}: the start of the session is missing from its journal"),
-            };
             let path = study.path().display();
-            return Err(Failure::results(what)
-                .hint(format!("`study status {path}` says who has taken part, `study verify {path}` what is damaged")));
+            let only_state = |entry: &Entry| matches!(entry.event, Event::StateSet { .. });
+            return Err(match session.entries.iter().all(only_state) {
+                true => Failure::input(format!("{who} has no session that began"))
+                    .hint(format!("`study status {path}` says who has taken part")),
+                false => Failure::results(format!(
+                    "{who}: the start of the session is missing from its journal"
+                ))
+                .hint(format!("`study verify {path}` lists all findings")),
+            });
         };
         let first = load::frozen_version(study, start.protocol_version)?;
         let mut later = Vec::new();

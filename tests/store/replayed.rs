@@ -181,6 +181,31 @@ fn typed_text_cannot_control_the_terminal() {
 }
 
 #[test]
+fn who_did_not_come_has_no_session_and_who_withdrew_is_not_shown() {
+    let home = tempfile::tempdir().unwrap();
+    with_p01(home.path(), None, 1.0);
+    for (id, state, what) in [
+        ("P09", "no-show", "P09 has no session that began"),
+        ("P01", "withdrawn", "P01 withdrew: nothing of them is shown"),
+    ] {
+        let set = [
+            "participant",
+            ".",
+            id,
+            "--state",
+            state,
+            "--reason",
+            "told us",
+        ];
+        let (code, _, err) = study(&set, home.path());
+        assert_eq!(code, 0, "{err}");
+        let (code, out, err) = study(&["replay", ".", id], home.path());
+        assert_eq!((code, out.as_str()), (1, ""), "{err}");
+        assert!(err.contains(what), "{err}");
+    }
+}
+
+#[test]
 fn what_is_not_there_is_named() {
     let home = tempfile::tempdir().unwrap();
     let example = repository(EXAMPLE);
