@@ -26,6 +26,7 @@ mod preregister;
 mod progress;
 mod record;
 mod rehearse;
+mod replay;
 mod run;
 mod schedule;
 mod schema;
@@ -72,6 +73,8 @@ enum Command {
     Schedule(schedule::Args),
     /// Show the state of each participant and the next row
     Status(status::Args),
+    /// Show a session or a trial again: what was on the screen, answered and felt
+    Replay(replay::Args),
     /// Change the state of a participant
     Participant(participant::Args),
     /// Correct an answer or a mistyped id after a session; both values are kept
@@ -128,6 +131,7 @@ pub fn run(cli: Cli, console: &mut Console) -> Result<(), Failure> {
         Command::Preregister(args) => preregister::run(&args, console),
         Command::Schedule(args) => schedule::run(&args, console),
         Command::Status(args) => status::run(&args, console),
+        Command::Replay(args) => replay::run(&args, console),
         Command::Participant(args) => participant::run(&args, console),
         Command::Correct(args) => correct::run(&args, console),
         Command::Amend(args) => amend::run(&args, console),

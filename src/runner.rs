@@ -273,6 +273,10 @@ impl Runner {
                 self.send(Job::TelemetryEnd);
                 None
             }
+            Effect::KeepConsent(copy) => {
+                self.send(Job::KeepConsent(copy));
+                None
+            }
             Effect::RetrySave => {
                 self.send(Job::Retry);
                 None

@@ -76,7 +76,7 @@ tui: runner page session outcome protocol
 plain: runner page session outcome protocol tui
 screen: runner page session protocol
 front: runner page session protocol
-cli: analyze archive check device doctor export front identify import load model outcome plain plant power procedure protocol rater recording rehearsal rendering report runner schedule screen session stats store study swing trajectory tui wire
+cli: analyze archive check device doctor export front identify import load model outcome page plain plant power procedure protocol rater recording rehearsal rendering report runner schedule screen session stats store study swing trajectory tui wire
 main: cli
 certificate: predict
 predict: real

@@ -290,7 +290,12 @@ impl Dialogue {
                     self.asking = Some(Asking::Why(item, None));
                     say(view.words.get(Phrase::PlainWhy))
                 }
-                (_, Screen::Form { questions, .. }) => {
+                (
+                    _,
+                    Screen::Form {
+                        form, questions, ..
+                    },
+                ) if form.can_be_declined() => {
                     let reason = text()?;
                     let answer = Answer::Declined { reason };
                     let Some(question) = questions.get(self.at) else {

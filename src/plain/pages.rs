@@ -124,7 +124,7 @@ impl Page {
 
     fn prose(&mut self, view: &View, content: &page::Page) {
         let text = match content.kind {
-            Kind::Message | Kind::Break | Kind::End => &wrap::flow(&content.text),
+            Kind::Message | Kind::Break | Kind::End | Kind::Consent => &wrap::flow(&content.text),
             _ => &content.text,
         };
         let title = match &content.advice {

@@ -12,6 +12,7 @@ use chrono::{DateTime, FixedOffset};
 use std::time::Duration;
 use study_base::text::{ModelId, QuestionId};
 use study_plan::protocol::{Answer, Protocol, Question, Stimuli, Trial, Turn};
+use study_session::outcome::FormId;
 use study_session::session::view::Adjusting;
 use study_session::session::{Config, Ending, Input, Screen, View};
 
@@ -227,6 +228,15 @@ impl Plan {
                 } else {
                     Vec::new()
                 }
+            }
+            Screen::Form {
+                form: FormId::Consent,
+                questions,
+                ..
+            } => {
+                pass(GLANCE_S);
+                let initials = |q: &Question| (q.id.clone(), Answer::Text("SIM".to_owned()));
+                vec![Input::Answer(questions.iter().map(initials).collect())]
             }
             Screen::Form { questions, .. } => {
                 pass(rater.response_s());

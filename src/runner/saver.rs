@@ -37,6 +37,8 @@ pub enum Job {
     Telemetry(Vec<Sample>),
     /// Finish the telemetry file.
     TelemetryEnd,
+    /// Write the participant's copy of the consent document, before the next event.
+    KeepConsent(String),
     /// Write all unsaved events into a new segment.
     Retry,
 }
@@ -79,6 +81,8 @@ struct Worker {
     telemetry: Option<Telemetry>,
     /// What became of the last telemetry file, until its playback is recorded.
     ended: Option<Ended>,
+    /// The copy of the consent document that is not on disk.
+    consent: Option<String>,
     unsaved: VecDeque<Unsaved>,
     broken: bool,
 }
@@ -114,6 +118,7 @@ impl Saver {
             journal,
             telemetry: None,
             ended: None,
+            consent: None,
             unsaved: VecDeque::new(),
             broken: false,
         });
@@ -266,6 +271,10 @@ impl Worker {
                 }
             }
             Job::TelemetryEnd => self.end_telemetry(),
+            Job::KeepConsent(copy) => {
+                self.consent = Some(copy);
+                Vec::new()
+            }
         }
     }
 
@@ -306,6 +315,13 @@ impl Worker {
     fn save(&mut self) -> Vec<SaveEvent> {
         if self.broken || self.unsaved.is_empty() {
             return Vec::new();
+        }
+        if let Some(copy) = &self.consent {
+            if let Err(error) = self.folder.keep_consent(copy) {
+                self.broken = true;
+                return vec![SaveEvent::Failed(error.to_string())];
+            }
+            self.consent = None;
         }
         let events: Vec<(Moment, &Event)> = self.unsaved.iter().map(|u| (u.at, &u.event)).collect();
         match self.journal.append_all(&events) {

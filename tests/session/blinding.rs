@@ -27,11 +27,12 @@ use study_session::session::{Config, Input, Screen, View};
 use study_session::store::{Frozen, SeatKind, StudyFolder};
 
 /// Time between two looks at the screen.
-const LOOK: Duration = Duration::from_millis(20);
+pub(crate) const LOOK: Duration = Duration::from_millis(20);
 /// How long the hand explores, s.
 const EXPLORES_S: f64 = 3.0;
 
-fn inputs(view: &View) -> Vec<Input> {
+/// What the participant does at a page.
+pub(crate) fn inputs(view: &View) -> Vec<Input> {
     match &view.screen {
         Screen::Consent { .. } => vec![Input::Consent(true)],
         Screen::Message { .. } => vec![Input::Advance],
@@ -63,7 +64,7 @@ fn device(options: Options) -> Box<dyn Device> {
 }
 
 /// A session of P01 on a simulated device and a virtual clock.
-fn session(
+pub(crate) fn session(
     loaded: Loaded,
     orders: Option<FileOrders>,
     fault: Option<InjectedFault>,

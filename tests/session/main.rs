@@ -11,6 +11,7 @@ mod by_keys;
 mod channels;
 mod checked;
 mod commission;
+mod consent_page;
 #[path = "../support/designs.rs"]
 mod designs;
 mod devices;

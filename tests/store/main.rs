@@ -2,6 +2,7 @@
 
 mod chains;
 mod commands;
+mod consented;
 mod corrected;
 mod crash;
 #[path = "../support/designs.rs"]
@@ -16,6 +17,7 @@ mod memory;
 mod mirrors;
 mod process;
 mod processes;
+mod replayed;
 mod saver;
 #[path = "../support/mod.rs"]
 mod support;

@@ -40,10 +40,10 @@ pub use errors::ComponentErrors;
 pub use frozen::{FrozenError, changes, damage, frozen, frozen_version, frozen_versions};
 pub use recordings::{Deliveries, RecordingError, deliveries};
 
-/// Largest model file and orders file that are read, bytes.
+/// Largest model file, orders file and text of a consent document that are read, bytes.
 const MAX_MODEL_BYTES: usize = 16 * 1024 * 1024;
 const MAX_ORDERS_BYTES: usize = 64 * 1024 * 1024;
-
+const MAX_TEXT_BYTES: usize = 256 * 1024;
 /// Hint for a table that fails its certificate.
 const PERMIT: &str = "identify it with m, b >= 0, or permit it in [device]: uncertified = { play = true, force_n = ..., reason = \"...\" }";
 
@@ -291,6 +291,9 @@ fn open(path: &Path, purpose: Purpose<'_>) -> (Option<Loaded>, Vec<Findings>) {
         findings.sort();
         return (None, others.findings(findings));
     };
+    if let Some(consent) = &mut protocol.consent {
+        consent.text = others.consent.take();
+    }
     others.assign(&protocol);
     others.turn(protocol.device.lever_mm);
     join::vaf(&mut protocol, &others, &spans, &mut findings);
@@ -350,6 +353,8 @@ struct OtherFiles<'f> {
     /// In the order of the protocol.
     opened: Vec<Opened>,
     orders: Option<FileOrders>,
+    /// The text of the consent document.
+    consent: Option<String>,
     /// Realization → index in `opened`.
     models: BTreeMap<ModelId, usize>,
     /// The same for the ends of families and for spaces.
@@ -372,6 +377,7 @@ impl<'f> OtherFiles<'f> {
             folder,
             opened: Vec::new(),
             orders: None,
+            consent: None,
             models: BTreeMap::new(),
             ends: BTreeMap::new(),
         }
@@ -386,6 +392,7 @@ impl<'f> OtherFiles<'f> {
         let (most, what) = match name.content {
             Content::Orders => (MAX_ORDERS_BYTES, "orders"),
             Content::Model => (MAX_MODEL_BYTES, "model"),
+            Content::Text => (MAX_TEXT_BYTES, "consent"),
             Content::Bundle(_) => (archive::MAX_BYTES, "bundle"),
         };
         let path = self.folder.join(&name.file);
@@ -395,7 +402,7 @@ impl<'f> OtherFiles<'f> {
         })?;
         let model = match &name.content {
             Content::Bundle(address) => Some(model_of(&bytes, address.as_deref())?),
-            Content::Model | Content::Orders => None,
+            Content::Model | Content::Orders | Content::Text => None,
         };
         let shown = path.display().to_string();
         let mut realization = None;
@@ -406,6 +413,18 @@ impl<'f> OtherFiles<'f> {
                 if !findings.has_errors() {
                     self.orders = Some(orders);
                 }
+                findings
+            }
+            Ok(text) if name.content == Content::Text => {
+                let text = text.trim_start_matches('\u{feff}').trim_end();
+                self.consent = Some(text.replace("\r\n", "\n"));
+                let empty = text.trim().is_empty();
+                let fault = || {
+                    Fault::error("the text of the consent document is empty")
+                        .hint("write what participants agree to, or leave out `text`")
+                };
+                let mut findings = Findings::new(shown, text);
+                findings.faults.extend(empty.then(fault));
                 findings
             }
             Ok(text) => {

@@ -25,6 +25,7 @@ mod traces;
 
 pub use error::{Difference, PoolError, StudyError};
 pub use factors::{check_factors, factor};
+pub use motion::samples;
 pub use pool::Pool;
 pub use source::{Site, SiteDevice, Source};
 pub use traces::Trace;

@@ -76,6 +76,7 @@ pub use spaces::{Axis, SearchTask, SpaceRules};
 use keys::words;
 use serde::Serialize;
 use std::collections::BTreeMap;
+use study_base::hex::sha256;
 use study_base::limits::{Limit, Limits};
 use study_base::text::{ModelId, QuestionId};
 
@@ -225,6 +226,19 @@ pub struct Consent {
     pub document: String,
     /// Version of the document.
     pub version: String,
+    /// The file with its text, relative to the protocol.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
+    /// The text, once the file was read. Fingerprints have its SHA-256.
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "hashed")]
+    pub text: Option<String>,
+    /// Whether the participant types initials in place of a signature.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub initials: bool,
+}
+
+fn hashed<S: serde::Serializer>(text: &Option<String>, to: S) -> Result<S::Ok, S::Error> {
+    to.serialize_str(&sha256(text.as_deref().unwrap_or_default()))
 }
 
 /// `[session]`

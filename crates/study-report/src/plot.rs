@@ -1,6 +1,7 @@
 //! Small text charts: histograms in a table cell, dots with error bars, curves of braille characters.
 
 pub mod braille;
+pub mod strip;
 
 /// Blocks of 0 to 8 eighths.
 const BARS: [char; 9] = [' ', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];

@@ -299,10 +299,16 @@ impl Page {
 
     /// The page without what changes while it is shown.
     pub fn still(&self) -> Self {
-        let mut page = self.clone();
-        (page.wait, page.clock) = (None, None);
+        let mut page = self.timeless();
         // The text of a reference prompt appears when the wait is over.
         page.text.clear();
+        page
+    }
+
+    /// The page without the times on it, as [`retrace`](crate::session::retrace) shows it.
+    pub fn timeless(&self) -> Self {
+        let mut page = self.clone();
+        (page.wait, page.clock) = (None, None);
         for button in &mut page.buttons {
             button.enabled = true;
         }

@@ -12,6 +12,7 @@
 mod band;
 mod comparable;
 mod defects;
+mod expected;
 mod lasting;
 mod measured;
 mod moments;
@@ -22,6 +23,8 @@ mod search;
 mod shares;
 mod stated;
 mod vibration;
+
+pub use expected::{Expected, expected};
 
 use crate::outcome::{Defect, Fidelity, Sample, Verdict};
 use band::{bands, judged_share};

@@ -28,6 +28,7 @@
 mod adjusting;
 mod away;
 mod between;
+mod consenting;
 mod failures;
 mod flow;
 mod forms;
@@ -36,6 +37,7 @@ mod opening;
 mod own_answers;
 mod phase;
 mod project_view;
+pub mod retrace;
 pub mod roster;
 mod saving;
 mod search;

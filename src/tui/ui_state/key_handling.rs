@@ -110,7 +110,7 @@ impl UiState {
                 None => Err("There is no trial to mark as bad.".to_owned()),
             },
             Key::Decline => match &view.screen {
-                Screen::Form { .. } => Ok(Dialog::Decline {
+                Screen::Form { form, .. } if form.can_be_declined() => Ok(Dialog::Decline {
                     reason: Editor::new(""),
                 }),
                 _ => Err(view.words.get(Phrase::PlainNoQuestion).to_owned()),
@@ -172,8 +172,11 @@ impl UiState {
             Screen::Consent { .. } => match key {
                 key if keys::is_yes(key, &view.words) => vec![Input::Consent(true)],
                 Key::Char('n' | 'N') => self.confirm(Confirm::Refuse),
-                Key::Enter => self.notify(view.words.get(Phrase::ChooseYesOrNo)),
-                _ => Vec::new(),
+                Key::Enter if self.reading.scrolled >= self.reading.most => {
+                    self.notify(view.words.get(Phrase::ChooseYesOrNo))
+                }
+                // The text may be long.
+                key => self.press_reading(key, view),
             },
             // Elsewhere it is explained.
             Screen::Form { .. } | Screen::Stopped { .. } if key == Key::Replay => {

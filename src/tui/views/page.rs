@@ -247,6 +247,9 @@ impl<'a> Page<'a> {
                     hint("Enter", Phrase::Begin),
                 ];
             }
+            Kind::Consent if reading.scrolled < reading.most => {
+                return vec![hint("Enter", Phrase::ReadOn), hint("↑ ↓", Phrase::Scroll)];
+            }
             // Chosen by a letter.
             Kind::Resume | Kind::Consent | Kind::Stopped => return Vec::new(),
             _ if reading.scrolled < reading.most => {

@@ -36,22 +36,35 @@ pub struct Prose {
 
 /// The text of a page; `None` for pages that show more than text.
 pub fn prose(page: &Page) -> Option<Prose> {
-    let long = matches!(page.kind, Kind::Message | Kind::Break | Kind::End);
+    let signs = page.kind == Kind::Consent && page.text.contains('\n');
+    let long = signs || matches!(page.kind, Kind::Message | Kind::Break | Kind::End);
     let body = match page.kind {
         Kind::Who | Kind::Questions | Kind::Playing | Kind::DeviceTrouble | Kind::SaveTrouble => {
             return None;
         }
         Kind::Loading if page.interval.is_some() => return None,
-        Kind::Message | Kind::Break | Kind::End => wrap::flow(&page.text),
+        _ if long => wrap::flow(&page.text),
         Kind::Reference => page.wait.as_ref().unwrap_or(&page.text).clone(),
         Kind::Paused => page.clock.clone().unwrap_or_default(),
         _ => page.text.clone(),
     };
     let instruction = page.instruction.unwrap_or_default().to_owned();
     let (above, title) = match (long, page.kind) {
+        (true, Kind::Consent) => (instruction, Some(page.title.clone())),
         (true, _) if instruction.is_empty() => (page.title.clone(), page.wait.clone()),
         (_, Kind::Stopped) => (instruction, Some(format!("■  {}", page.title))),
         (_, _) => (instruction, Some(page.title.clone())),
+    };
+    let choices = choices(page);
+    let below = match signs {
+        // The choices in one line.
+        true => {
+            let each = choices
+                .iter()
+                .map(|(key, what, _)| format!("{key}  {what}"));
+            Some(each.collect::<Vec<String>>().join("  ·  "))
+        }
+        false => page.done.as_ref().map(|done| done.words.clone()),
     };
     Some(Prose {
         above,
@@ -59,12 +72,8 @@ pub fn prose(page: &Page) -> Option<Prose> {
         body,
         long,
         big: page.wait_clock.clone().filter(|_| long).unwrap_or_default(),
-        below: page
-            .done
-            .as_ref()
-            .map(|d| d.words.clone())
-            .unwrap_or_default(),
-        choices: choices(page),
+        below: below.unwrap_or_default(),
+        choices,
     })
 }
 

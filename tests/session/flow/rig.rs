@@ -52,6 +52,8 @@ pub(crate) struct Rig {
     /// Whether every view is checked, which takes most of the time.
     pub(crate) watched: bool,
     pub(crate) screens: Vec<&'static str>,
+    /// The participant's pages, if they are wanted.
+    pub(crate) pages: Option<Vec<String>>,
     protocol: Arc<Protocol>,
     loads: u32,
     loaded: bool,
@@ -110,6 +112,7 @@ impl Rig {
             lenient: false,
             watched: true,
             screens: Vec::new(),
+            pages: None,
             protocol,
             loads: 0,
             loaded: false,
@@ -221,6 +224,7 @@ impl Rig {
                     self.loads = 0;
                     self.loaded = false;
                 }
+                Effect::KeepConsent(_) => assert!(!recorded, "the copy comes before its event"),
                 Effect::RetrySave => recorded = true,
                 Effect::End(ending) => self.ending = Some(ending.clone()),
             }
@@ -273,6 +277,9 @@ impl Rig {
     }
 
     fn check_view(&mut self) {
+        if let Some(pages) = &mut self.pages {
+            super::retraced::record(pages, &self.session.view(self.now));
+        }
         if !self.watched {
             return;
         }

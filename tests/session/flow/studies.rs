@@ -73,6 +73,9 @@ pub(crate) fn rich() -> Protocol {
     protocol.consent = Some(Consent {
         document: "Information sheet".to_owned(),
         version: "3".to_owned(),
+        file: None,
+        text: None,
+        initials: false,
     });
     protocol.design.practice = vec![ModelId::new(PRACTICE).expect("an identifier")];
     protocol.design.breaks = Some(Breaks {

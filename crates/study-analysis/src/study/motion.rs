@@ -83,7 +83,7 @@ fn files(study: &Study) -> BTreeMap<Attempt<'_>, Vec<PathBuf>> {
 }
 
 /// The samples of a telemetry file; `None` if it is none, or too long.
-fn samples(path: &Path) -> Option<Vec<Sample>> {
+pub fn samples(path: &Path) -> Option<Vec<Sample>> {
     let mut reader = csv::Reader::from_reader(disk::reader(path).ok()?);
     let head = reader.headers().ok()?.clone();
     let place = |column: SampleColumn| head.iter().position(|h| h == column.name());

@@ -134,8 +134,10 @@ const FORMATS: &[Word] = &[
 const OF_FORMAT_2: [&str; 5] = ["parts", "families", "tracks", "groups", "sessions"];
 
 /// Keys that need [`FORMAT_3`], without the places in lists.
-pub const OF_FORMAT_3: [&str; 18] = [
+pub const OF_FORMAT_3: [&str; 20] = [
     "confirms",
+    "consent.text",
+    "consent.initials",
     "design.order_version",
     "factors",
     "outcomes",
@@ -189,6 +191,8 @@ pub enum Content {
     Model,
     /// Orders.
     Orders,
+    /// The text of the consent document.
+    Text,
     /// A bundle with a realization; with the SHA-256 that it has to have, if the protocol says it.
     Bundle(Option<String>),
 }
@@ -402,6 +406,12 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
     if outcomes::primary_of_part(&sections).is_none() {
         outcomes.extend(questionnaires.iter().filter_map(|q| q.outcome()));
     }
+    let document_text = consent.as_ref().and_then(|consent| consent.file.clone());
+    named.extend(document_text.map(|file| Named {
+        place: "consent.text".to_owned(),
+        file,
+        content: Content::Text,
+    }));
     if !broken {
         sections.agree(document);
         questionnaires::agree(&questionnaires, &raw.parts, document);

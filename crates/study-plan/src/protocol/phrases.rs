@@ -67,6 +67,7 @@ phrases! {
     Version "version" "{document}, version {version}";
     RefuseSure "refuse-sure" "You do not agree to take part? The session then ends, and nothing more is asked.";
     RefuseConfirm "refuse-confirm" "I do not agree";
+    Initials "initials" "Please type your initials in place of a signature.";
     ChooseYesOrNo "choose-yes-or-no" "Choose y or n.";
     AtLeisure "at-leisure" "Take as long as you like.";
     WaitSecond "wait-second" "You can continue in 1 second.";

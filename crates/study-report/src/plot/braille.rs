@@ -54,6 +54,16 @@ impl Canvas {
 
     /// The field under a heading, with the values of its lines on the left and an axis of `range` below.
     pub fn framed(&self, heading: &str, unit: &str, range: [f64; 2]) -> String {
+        framed(heading, unit, range, self.columns, self.values, self.rows())
+    }
+
+    /// The same without values on the left.
+    pub fn unscaled(&self, heading: &str, unit: &str, range: [f64; 2]) -> String {
+        let rows = self.rows().into_iter().map(|row| (String::new(), row));
+        labeled(heading, unit, range, self.columns, rows)
+    }
+
+    fn rows(&self) -> Vec<String> {
         let row = |(row, cells): (usize, &Vec<u32>)| {
             let braille = (cells.iter()).map(|bits| char::from_u32(0x2800 + bits).unwrap_or(' '));
             let mut characters: Vec<char> = braille.collect();
@@ -62,8 +72,7 @@ impl Canvas {
             }
             characters.into_iter().collect()
         };
-        let rows = self.cells.iter().enumerate().map(row).collect();
-        framed(heading, unit, range, self.columns, self.values, rows)
+        self.cells.iter().enumerate().map(row).collect()
     }
 }
 

@@ -90,6 +90,15 @@ pub enum FormId {
     },
     /// Questions to the participant at the end.
     Outro,
+    /// The initials of the participant, in a running session only: no journal has them.
+    Consent,
+}
+
+impl FormId {
+    /// Whether its questions can be declined: initials are no answer.
+    pub fn can_be_declined(self) -> bool {
+        self != Self::Consent
+    }
 }
 
 named! {

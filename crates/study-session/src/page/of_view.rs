@@ -280,7 +280,8 @@ impl Page {
         if view.can_go_back {
             self.button(Does::Back, Phrase::Back, true, words);
         }
-        self.decline = Some(Dialog {
+        // Initials are no answer.
+        self.decline = form.can_be_declined().then(|| Dialog {
             open: words.get(Phrase::DeclineTitle).to_owned(),
             title: words.get(Phrase::DeclineWhy).to_owned(),
             confirm: words.get(Phrase::Decline).to_owned(),

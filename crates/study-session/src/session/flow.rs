@@ -51,23 +51,6 @@ impl Session {
         self.protocol.consent.is_some() && self.history.consent.is_none()
     }
 
-    pub(super) fn consent(&mut self, accepted: bool, at: Moment) {
-        let (Phase::Consent, Some(consent)) = (&self.phase, &self.protocol.consent) else {
-            return;
-        };
-        let consented = Event::Consented {
-            document: consent.document.clone(),
-            version: consent.version.clone(),
-            accepted,
-            by: self.entered_by(),
-        };
-        self.record(consented, at);
-        if !accepted {
-            self.drop_out("no consent", at);
-        }
-        self.phase = Phase::Saving;
-    }
-
     /// Who enters the participant's answers.
     pub(super) fn entered_by(&self) -> Author {
         match self.protocol.session.entry {
@@ -214,7 +197,8 @@ impl Session {
         }
     }
 
-    fn advance(&mut self, at: Moment) {
+    /// Enter on the phase alone.
+    pub(super) fn advance(&mut self, at: Moment) {
         match &self.phase {
             Phase::Message(kind) => {
                 match Step::of(*kind) {

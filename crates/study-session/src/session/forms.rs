@@ -51,6 +51,7 @@ impl Session {
             FormId::Intake => &self.protocol.intake,
             FormId::Outro => &self.protocol.outro,
             FormId::After { trial, .. } => return self.asked_after(trial),
+            FormId::Consent => &[],
             FormId::Trial { trial, .. } => {
                 let part = (self.history.planned(trial)).and_then(|t| self.part_of(t));
                 if let Some(part) = part {
@@ -139,6 +140,9 @@ impl Session {
             Err(why) => self.notify(why.words(&self.words)),
             Ok(answers) => {
                 let form = open.id;
+                if form == FormId::Consent {
+                    return self.sign(&answers, at);
+                }
                 for (question, answer) in answers {
                     self.enter(form, question, answer, at);
                 }
@@ -245,7 +249,7 @@ impl Session {
     }
 
     /// Whether the answer to a trial is correct, if its participant is told.
-    fn told(&self, trial: u32) -> Option<Told> {
+    pub(super) fn told(&self, trial: u32) -> Option<Told> {
         let planned = self.history.planned(trial)?;
         let part = self.part_of(planned)?;
         let (attempt, _) = self.history.completion(trial)?;
@@ -362,12 +366,13 @@ pub(super) fn check_free_text(text: &str) -> Result<(), InputRefused> {
     }
 }
 
-fn step_of(form: FormId) -> Option<Step> {
+/// The step of a form that appears once.
+pub(super) fn step_of(form: FormId) -> Option<Step> {
     match form {
         FormId::Setup => Some(Step::Setup),
         FormId::Intake => Some(Step::Intake),
         FormId::Outro => Some(Step::Outro),
-        FormId::Trial { .. } | FormId::After { .. } => None,
+        FormId::Trial { .. } | FormId::After { .. } | FormId::Consent => None,
     }
 }
 

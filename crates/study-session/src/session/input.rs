@@ -192,6 +192,9 @@ pub enum Effect {
     /// Make the device limp at once. Also cancels a load: no [`Input::DeviceLoaded`]
     /// for it may follow.
     Limp,
+    /// Keep the participant's copy of the consent document, with what they typed as a
+    /// signature, in a file of its own, before the event that follows.
+    KeepConsent(String),
     /// Write the unacknowledged events to a new journal segment.
     RetrySave,
     /// End the program.

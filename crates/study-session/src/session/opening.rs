@@ -129,7 +129,7 @@ impl Session {
     }
 
     /// From now on, the protocol is that of this group and planned session.
-    fn take_part(&mut self, assigned: &Assigned) {
+    pub(super) fn take_part(&mut self, assigned: &Assigned) {
         if *assigned != Assigned::default() {
             self.protocol = Arc::new(self.protocol.of(assigned));
         }

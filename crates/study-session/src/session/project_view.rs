@@ -85,10 +85,7 @@ impl Session {
                 restart: self.can_restart(),
             },
             Phase::Consent => match &self.protocol.consent {
-                Some(consent) => Screen::Consent {
-                    document: consent.document.clone(),
-                    version: consent.version.clone(),
-                },
+                Some(consent) => self.consent_screen(consent),
                 None => Screen::Saving,
             },
             Phase::Message(kind) => Screen::Message {
@@ -357,6 +354,7 @@ impl Session {
             FormId::Setup => Phrase::FormSetup,
             FormId::Intake => Phrase::FormIntake,
             FormId::Outro => Phrase::FormOutro,
+            FormId::Consent => Phrase::AgreeQuestion,
             FormId::Trial { trial, .. } | FormId::After { trial, .. } => {
                 let (practice, number) = self.shown_number(trial);
                 let phrase = match practice {
@@ -383,6 +381,7 @@ impl Session {
             FormId::Setup => "set-up".to_owned(),
             FormId::Intake => "intake".to_owned(),
             FormId::Outro => "closing questions".to_owned(),
+            FormId::Consent => "consent".to_owned(),
             FormId::Trial { trial, .. } | FormId::After { trial, .. } => {
                 let (practice, number) = self.shown_number(trial);
                 title(practice, number)
@@ -461,7 +460,7 @@ fn banner(seat: Seat) -> Option<Banner> {
 }
 
 /// Whether Enter does anything on a screen.
-fn can_advance(screen: &Screen) -> bool {
+pub(super) fn can_advance(screen: &Screen) -> bool {
     match screen {
         Screen::Message { .. } | Screen::SaveTrouble { .. } | Screen::Paused { .. } => true,
         Screen::End { .. } | Screen::Mount { .. } => true,

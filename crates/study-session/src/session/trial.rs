@@ -6,6 +6,9 @@ use crate::outcome::fold::{Ended, Presentation};
 use crate::outcome::{Event, Failure, Fidelity, Moment, Playback, Verdict};
 use study_plan::protocol::{DeviceKind, Exposure, Trial};
 
+/// Why an attempt failed that was stopped and is played again.
+pub(super) const PLAYED_AGAIN: &str = "played again";
+
 impl Session {
     /// Requests the next trial from the device. The event comes first, so that
     /// nothing is felt that is not in the journal.
@@ -349,7 +352,7 @@ impl Session {
         if !matches!(self.phase, Phase::Stopped { .. }) || self.feel_level_again(at) {
             return;
         }
-        self.fail(Failure::Stopped, "played again", at);
+        self.fail(Failure::Stopped, PLAYED_AGAIN, at);
         if self.device_lost {
             self.proceed(at);
             self.show_device_lost();

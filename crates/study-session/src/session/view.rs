@@ -220,9 +220,9 @@ pub enum Screen {
     },
     /// The consent document.
     Consent {
-        /// Title.
+        /// Title; or title, version and the whole text.
         document: String,
-        /// Version.
+        /// Version; empty if it is in the document.
         version: String,
     },
     /// A text to read; Enter continues.

@@ -157,8 +157,11 @@ impl StudyFolder {
         Ok(notices)
     }
 
-    /// The sessions of somebody whose data are there.
-    fn kept_sessions(&self, id: &ParticipantId) -> Result<Vec<SessionData>, StoreError> {
+    /// The sessions of somebody whose data are there; at least one.
+    ///
+    /// # Errors
+    /// [`StoreError`]: no such participant, one whose data were erased, or the disk's.
+    pub fn kept_sessions(&self, id: &ParticipantId) -> Result<Vec<SessionData>, StoreError> {
         let own = self.sessions_of(id)?;
         match own.last() {
             None => Err(StoreError::Unknown {
@@ -210,6 +213,7 @@ fn asked<'a>(protocol: &'a Protocol, form: FormId, id: &QuestionId) -> Option<&'
         FormId::Outro => &protocol.outro,
         FormId::Trial { .. } => &protocol.questions,
         FormId::After { .. } => return protocol.between().find(|q| q.id == *id),
+        FormId::Consent => return None,
     };
     all.iter().find(|q| q.id == *id)
 }

@@ -17,6 +17,8 @@ pub const TOMBSTONE: &str = "tombstone.json";
 pub const HEAD: &str = "head.json";
 /// Written when a session is left: its last record.
 pub const RECEIPT: &str = "receipt.json";
+/// The participant's copy of the consent document, with initials if they typed some.
+pub const CONSENT: &str = "consent.txt";
 /// Folder of a session's telemetry, one file for each attempt.
 pub const TELEMETRY: &str = "telemetry";
 /// File that reserves disk space for the last records of a session.
@@ -40,7 +42,15 @@ pub const DOCTOR: &str = "doctor";
 pub const TRIAL: &str = ".study-doctor.tmp";
 
 /// What a session's folder contains beside the segments of its journal.
-pub const OF_SESSION: [&str; 5] = [HEAD, ".head.json.tmp", RECEIPT, TELEMETRY, RESERVE];
+pub const OF_SESSION: [&str; 7] = [
+    HEAD,
+    ".head.json.tmp",
+    RECEIPT,
+    TELEMETRY,
+    RESERVE,
+    CONSENT,
+    ".consent.txt.tmp",
+];
 
 /// The derived tables.
 pub const TABLES: [&str; 4] = [RATINGS, ATTEMPTS, PARTICIPANTS, INTERVALS];

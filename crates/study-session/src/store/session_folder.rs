@@ -1,9 +1,10 @@
-//! The folder of a claimed session: its journal and telemetry.
+//! The folder of a claimed session: its journal, telemetry and copy of the consent.
 
 use super::error::StoreError;
 use super::journal::Journal;
 use super::session_lock::SessionLock;
 use super::telemetry::TelemetryWriter;
+use super::{atomic, layout};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -37,6 +38,16 @@ impl SessionFolder {
         self.journal.take().ok_or_else(|| StoreError::JournalTaken {
             path: self.lock.path.clone(),
         })
+    }
+
+    /// Writes the participant's copy of the consent document; a copy from before a crash is
+    /// replaced.
+    ///
+    /// # Errors
+    /// [`StoreError`] if it cannot be written.
+    pub fn keep_consent(&self, copy: &str) -> Result<(), StoreError> {
+        let path = self.lock.path.join(layout::CONSENT);
+        atomic::replace(self.lock.disk.as_ref(), &path, copy.as_bytes())
     }
 
     /// Creates a file for the telemetry of an attempt; an existing one is never

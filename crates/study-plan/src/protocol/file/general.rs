@@ -59,6 +59,12 @@ pub(super) const CONSENT: &[Key] = keys! {
     "document": Kind::Text, r#""Consent to take part""#, required;
     /// The version of the document. It is recorded with the time of the consent.
     "version": Kind::Text, r#""2""#, required;
+    /// The file with the text of the document, plain text in UTF-8. It is shown in full, and whoever agrees gets a
+    /// copy: `consent.txt` in the folder of the session. Needs the format `study-protocol/3`.
+    "text": Kind::Path, r#""consent.txt""#;
+    /// Whether the participant types initials in place of a signature. Only the copy has them: no journal, table or
+    /// export. Needs the format `study-protocol/3`.
+    "initials": Kind::Flag, "true", default("false");
 };
 
 pub(super) const SESSION: &[Key] = keys! {
@@ -157,9 +163,13 @@ fn words(section: &mut Section<'_, '_>) -> BTreeMap<String, String> {
 
 pub(super) fn consent(mut section: Section<'_, '_>) -> Option<Consent> {
     let (document, version) = (section.text("document"), section.text("version"));
+    let (file, initials) = (section.path_of("text"), section.flag("initials"));
     Some(Consent {
         document: document?,
         version: version?,
+        file,
+        text: None,
+        initials: initials?,
     })
 }
 

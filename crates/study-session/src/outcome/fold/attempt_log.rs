@@ -160,7 +160,7 @@ fn trial_of(form: FormId) -> (Option<u32>, Option<u32>) {
         FormId::Trial { trial, attempt } | FormId::After { trial, attempt } => {
             (Some(trial), Some(attempt))
         }
-        FormId::Setup | FormId::Intake | FormId::Outro => (None, None),
+        FormId::Setup | FormId::Intake | FormId::Outro | FormId::Consent => (None, None),
     }
 }
 

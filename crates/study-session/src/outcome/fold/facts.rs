@@ -208,6 +208,7 @@ impl History {
     pub fn is_current(&self, form: FormId) -> bool {
         match form {
             FormId::Setup | FormId::Intake | FormId::Outro => true,
+            FormId::Consent => false,
             FormId::Trial { trial, attempt } => {
                 let open = self.open().is_some_and(|o| o.form() == form);
                 open || self

@@ -327,3 +327,38 @@ fn errors_are_told_in_just_noticeable_differences() {
     near(found.rendered_error_n, 0.8, 0.05);
     assert!(verdict_of(&right()).error_jnd.unwrap() < 0.2);
 }
+
+#[test]
+fn a_constant_force_that_is_added_is_the_rms_difference_from_the_table() {
+    let (table, model) = (table(), ModelId::new("right").unwrap());
+    let of = |samples: &[Sample]| {
+        expected(&Played {
+            model: &model,
+            what: table.what(),
+            servo: servo(),
+            servo_told: true,
+            samples,
+            numbered: true,
+            lost: 0,
+            time_ratio: None,
+            host_late_s: None,
+            others: &[],
+        })
+    };
+    let right = right();
+    let found = of(&right);
+    assert_eq!(found.samples, right);
+    assert_eq!(found.force_n.len(), right.len());
+    assert!(
+        found.rms_difference_n.unwrap() < 0.05,
+        "{:?}",
+        found.rms_difference_n
+    );
+    let added = of(&forced(&right, |s| s.force_command_n + 0.5));
+    let rms_n = added.rms_difference_n.unwrap();
+    assert!((rms_n - 0.5).abs() < 0.05, "{rms_n}");
+    // Between few samples nobody knows the motion; without any there is nothing to tell.
+    let few: Vec<Sample> = right.iter().step_by(10).copied().collect();
+    assert_eq!(of(&few).rms_difference_n, None);
+    assert!(of(&[]).force_n.is_empty());
+}

@@ -1,0 +1,112 @@
+//! Consent with its text, and initials in place of a signature.
+
+use super::rig::Rig;
+use super::studies::rich;
+use study_plan::protocol::{Answer, Protocol};
+use study_session::outcome::{Event, FormId};
+use study_session::page::participant;
+use study_session::session::{Effect, Input, Screen};
+
+const TEXT: &str = "You turn a knob.\n\nIt takes an hour.";
+
+/// A study whose participants read the text and type initials.
+pub(super) fn signed() -> Protocol {
+    let mut protocol = rich();
+    if let Some(consent) = &mut protocol.consent {
+        consent.text = Some(TEXT.to_owned());
+        consent.initials = true;
+    }
+    protocol
+}
+
+/// Gives an answer on the page of the initials.
+fn types(rig: &mut Rig, answer: Answer) {
+    let Screen::Form {
+        form, questions, ..
+    } = rig.view().screen
+    else {
+        panic!("{:?}", rig.view().screen)
+    };
+    assert_eq!(form, FormId::Consent);
+    rig.wait(1.0)
+        .send(Input::Answer(vec![(questions[0].id.clone(), answer)]));
+}
+
+fn copies(rig: &Rig) -> Vec<String> {
+    let copy = |effect: &Effect| match effect {
+        Effect::KeepConsent(copy) => Some(copy.clone()),
+        _ => None,
+    };
+    rig.effects.iter().filter_map(copy).collect()
+}
+
+fn decided(rig: &Rig) -> usize {
+    rig.count(|e| matches!(e, Event::Consented { .. }))
+}
+
+#[test]
+fn initials_are_in_the_copy_and_in_nothing_else() {
+    let mut rig = Rig::new(signed());
+    rig.until("Consent");
+    let Screen::Consent { document, .. } = rig.view().screen else {
+        panic!()
+    };
+    let whole = format!("Information sheet, version 3\n\n{TEXT}");
+    assert_eq!(document, whole);
+    assert_eq!(participant(&rig.view()).unwrap().text, whole);
+    rig.wait(1.0).send(Input::Consent(true));
+    let page = participant(&rig.view()).unwrap();
+    assert!(page.decline.is_none(), "initials are no answer");
+    let declined = Answer::Declined {
+        reason: "private".to_owned(),
+    };
+    for nothing in [Answer::Text("  ".to_owned()), declined] {
+        types(&mut rig, nothing);
+        assert_eq!(decided(&rig), 0);
+        assert!(rig.view().notice.is_some());
+    }
+    types(&mut rig, Answer::Text(" QXJ ".to_owned()));
+    assert_eq!(decided(&rig), 1);
+    let copies = copies(&rig);
+    assert_eq!(copies.len(), 1);
+    assert!(copies[0].starts_with(&whole), "{}", copies[0]);
+    assert!(copies[0].ends_with("\nQXJ\n"), "{}", copies[0]);
+    rig.finish();
+    rig.assert_whole();
+    assert!(!format!("{:?}", rig.journal).contains("QXJ"));
+    assert!(!format!("{:?}", rig.view()).contains("QXJ"));
+}
+
+#[test]
+fn who_does_not_agree_types_nothing_and_has_no_copy() {
+    let mut rig = Rig::new(signed());
+    rig.until("Consent").wait(1.0).send(Input::Consent(false));
+    assert_eq!(decided(&rig), 1);
+    assert!(matches!(rig.view().screen, Screen::End { .. }));
+    assert!(copies(&rig).is_empty());
+}
+
+#[test]
+fn a_program_that_ends_before_the_initials_asks_again() {
+    let mut rig = Rig::new(signed());
+    rig.until("Consent").wait(1.0).send(Input::Consent(true));
+    assert_eq!(decided(&rig), 0);
+    let mut rig = Rig::back(signed(), rig.journal.clone(), 20.0);
+    rig.until("Consent").finish();
+    rig.assert_whole();
+    assert_eq!((decided(&rig), copies(&rig).len()), (1, 1));
+}
+
+#[test]
+fn a_text_without_initials_leaves_a_copy_and_no_text_leaves_none() {
+    let mut protocol = signed();
+    if let Some(consent) = &mut protocol.consent {
+        consent.initials = false;
+    }
+    let mut rig = Rig::new(protocol);
+    rig.finish();
+    assert_eq!(copies(&rig).len(), 1);
+    let mut rig = Rig::new(rich());
+    rig.finish();
+    assert!(copies(&rig).is_empty());
+}
