@@ -81,6 +81,10 @@ pub(super) fn json(entry: &Entry, revealed: bool) -> Map<String, Value> {
     let Ok(Value::Object(mut fields)) = serde_json::to_value(&entry.event) else {
         return Map::new();
     };
+    if matches!(entry.event, Event::Adjusted { .. }) && !revealed {
+        // what is felt next; `to` of other events is an id
+        fields.remove("to");
+    }
     if let Some(Value::Object(playback)) = fields.remove("playback") {
         let kept = playback.into_iter();
         let kept = kept.filter(|(key, _)| revealed || OF_PLAYBACK.contains(&key.as_str()));
@@ -345,6 +349,12 @@ mod tests {
                 queue: vec![7, 9],
                 constraint_broken: false,
                 paused_s: None,
+            },
+            Event::Adjusted {
+                trial,
+                attempt,
+                to: model.clone(),
+                standard: false,
             },
             Event::PointLeftOut {
                 part: study_base::text::PartId::new("best").unwrap(),
