@@ -38,10 +38,10 @@ sha256 <- function(file) {
 }
 for (key in grep("^sha256 ", settings$key, value = TRUE)) {
   file <- sub("^sha256 ", "", key)
-  sum <- sha256(file)
-  if (is.na(sum)) {
+  digest <- sha256(file)
+  if (is.na(digest)) {
     cat(file, ": its SHA-256 was not compared, no program computes it here\n", sep = "")
-  } else if (sum != setting(key)) {
+  } else if (digest != setting(key)) {
     stop(file, " was changed after the export")
   }
 }
