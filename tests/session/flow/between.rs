@@ -9,7 +9,7 @@ use study_plan::protocol::{Answer, Inventory, Occasion, Protocol, Questionnaire}
 use study_session::outcome::{Author, Event, FormId, RatingRow};
 use study_session::session::Input;
 
-fn asked(mut protocol: Protocol, after: Occasion) -> Protocol {
+pub(super) fn asked(mut protocol: Protocol, after: Occasion) -> Protocol {
     protocol.questionnaires.push(Questionnaire {
         id: PartId::new("load").unwrap(),
         kind: Inventory::NasaTlx,
