@@ -86,6 +86,20 @@ fn who_does_not_agree_types_nothing_and_has_no_copy() {
     assert!(copies(&rig).is_empty());
 }
 
+/// Who thinks again at the page of the initials can read the document again, and refuse.
+#[test]
+fn before_the_initials_one_can_go_back_and_refuse() {
+    let mut rig = Rig::new(signed());
+    rig.until("Consent").wait(1.0).send(Input::Consent(true));
+    assert!(rig.view().can_go_back);
+    rig.wait(1.0).send(Input::Back);
+    assert!(matches!(rig.view().screen, Screen::Consent { .. }));
+    rig.wait(1.0).send(Input::Consent(false));
+    assert_eq!(decided(&rig), 1);
+    assert!(matches!(rig.view().screen, Screen::End { .. }));
+    assert!(copies(&rig).is_empty());
+}
+
 #[test]
 fn a_program_that_ends_before_the_initials_asks_again() {
     let mut rig = Rig::new(signed());
