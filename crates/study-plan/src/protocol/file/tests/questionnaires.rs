@@ -238,6 +238,14 @@ titles = ["a", "b", "c", "d", "e", "f"]
     };
     assert_eq!((*from, *to), (1, 2));
     assert_eq!((labels[&1].as_str(), labels[&2].as_str()), ("c", "a"));
+    // Those of Hart & Staveland (1988), unless the study has its own.
+    let english = weighted.replace("titles = [\"a\", \"b\", \"c\", \"d\", \"e\", \"f\"]\n", "");
+    let protocol = parse("p", &with(&english)).protocol.unwrap();
+    let labels = protocol.outro[8].kind.scale().labels();
+    assert_eq!(
+        (labels["1"].as_str(), labels["2"].as_str()),
+        ("temporal demand", "mental demand")
+    );
     let few = weighted.replace(", \"f\"", "");
     let shown = parse("p", &with(&few)).findings.render(false);
     assert!(
