@@ -77,6 +77,14 @@ fn initials_are_in_the_copy_and_in_nothing_else() {
     assert!(!format!("{:?}", rig.view()).contains("QXJ"));
 }
 
+/// Nothing that is written or read names the form of the initials.
+#[test]
+fn no_journal_can_have_initials() {
+    assert!(serde_json::to_string(&FormId::Consent).is_err());
+    assert!(serde_json::from_str::<FormId>("\"consent\"").is_err());
+    assert!(serde_json::from_str::<FormId>("\"outro\"").is_ok());
+}
+
 #[test]
 fn who_does_not_agree_types_nothing_and_has_no_copy() {
     let mut rig = Rig::new(signed());
