@@ -20,18 +20,16 @@ impl Step<'_> {
     /// one would have been.
     pub(super) fn tells(&self) -> bool {
         match self {
-            Self::Page(shown) => is_feedback(&shown.view.screen),
+            Self::Page(shown) => matches!(
+                shown.view.screen,
+                Screen::Message {
+                    kind: MessageKind::Feedback,
+                    ..
+                }
+            ),
             Self::Event(_) => false,
         }
     }
-}
-
-fn is_feedback(screen: &Screen) -> bool {
-    let kind = match screen {
-        Screen::Message { kind, .. } => Some(*kind),
-        _ => None,
-    };
-    kind == Some(MessageKind::Feedback)
 }
 
 /// The steps of a session, or those of a trial: its pages and events, and what happened
