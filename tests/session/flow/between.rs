@@ -136,6 +136,27 @@ fn a_condition_whose_trial_is_felt_again_is_judged_again() {
     assert!(rows[0].answers.contains_key(&qid("load_mental")));
 }
 
+/// A block ends with the trial that was completed last, which need not be the last one of the plan.
+#[test]
+fn a_block_whose_last_trial_is_felt_again_is_judged_again() {
+    let protocol = asked(plain(), Occasion::Block);
+    let mut rig = Rig::new(protocol.clone());
+    let bad = || Input::MarkBad {
+        reason: "noise".to_owned(),
+    };
+    // The first trial comes again at the end of its block, and then once more.
+    rig.until_reference(1).send(bad());
+    rig.until_reference(3).send(bad());
+    rig.finish();
+    rig.assert_whole();
+    let form = |trial, attempt| FormId::After { trial, attempt };
+    assert_eq!(forms(&rig), [form(1, 2), form(1, 3), form(6, 1)]);
+    let rows = rig.session.history().rating_rows(&protocol);
+    let judged = |row: &&RatingRow| row.answers.contains_key(&qid("load_mental"));
+    let judged: Vec<u32> = rows.iter().filter(judged).map(|row| row.trial).collect();
+    assert_eq!(judged, [1, 6]);
+}
+
 #[test]
 fn an_answer_between_the_trials_can_be_corrected() {
     let protocol = asked(plain(), Occasion::Condition);
