@@ -168,8 +168,7 @@ fn while_a_study_is_not_complete_neither_levels_nor_right_answers_are_told() {
             out
         };
         run(&["new", "--kind", kind, "--seed", "20261128", "s"]);
-        let rehearse = ["rehearse", "s", "--participants", "1", "--out", "r"];
-        run(&[&rehearse[..], &["--telemetry", "20"]].concat());
+        run(&["rehearse", "s", "--participants", "1", "--out", "r"]);
         let open = run(&["replay", "r", "SIM001"]);
         assert!(told.iter().any(|text| open.contains(text)), "{open}");
         let names = ["s", "my-study"].map(|name| home.path().join("r").join(name));
