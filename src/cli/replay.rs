@@ -64,7 +64,10 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         }
     };
     let shown = retrace::pages(&|entry: &Entry| protocols.of_entry(entry), &session.entries);
-    let steps = steps(&session.entries, &shown, args.trial);
+    let mut steps = steps(&session.entries, &shown, args.trial);
+    if !revealed {
+        steps.retain(|step| !step.tells());
+    }
     let tables = protocols.first.tables();
     let reader = Reader {
         session,
@@ -178,7 +181,8 @@ impl Protocols {
 }
 
 /// Why realizations and forces are hidden, if they are: as long as a study is not complete,
-/// an experimenter who knows them could influence a session.
+/// an experimenter who knows them could influence a session. Hidden is also what tells them: the
+/// shape of a force, whether an answer was right, and the level that was set.
 fn hidden(
     study: &StudyFolder,
     sessions: &[SessionData],
@@ -250,7 +254,10 @@ fn text(steps: &[Step<'_>], reader: &Reader<'_>, charts: Option<usize>) -> Strin
             }
             Step::Event(entry) => {
                 let time = entry.at.wall.format("%H:%M:%S");
-                let said = events::words(&entry.event, reader.revealed);
+                let said = match !reader.revealed && reader.names_level(&entry.event) {
+                    true => "the level is confirmed".to_owned(),
+                    false => events::words(&entry.event, reader.revealed),
+                };
                 writeln!(out, "{time}  {said}")
             }
         };
@@ -279,6 +286,9 @@ fn document(
         }),
         Step::Event(entry) => {
             let mut fields = events::json(entry, reader.revealed);
+            if !reader.revealed && reader.names_level(&entry.event) {
+                fields.retain(|key, _| !["answer", "from", "to"].contains(&key.as_str()));
+            }
             if let Some(felt) = reader.read(&entry.event) {
                 felt.json(&mut fields);
             }

@@ -12,7 +12,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 use study_session::outcome::{Event, Moment, Sample, TelemetryFile};
-use study_session::store::{Journal, Receipt, SessionFolder, TelemetryWriter};
+use study_session::store::{Journal, Receipt, SessionFolder, StoreError, TelemetryWriter};
 
 /// How long the end of a session waits for the disk. A disk may never answer.
 const LAST_WAIT: Duration = Duration::from_secs(5);
@@ -316,12 +316,9 @@ impl Worker {
         if self.broken || self.unsaved.is_empty() {
             return Vec::new();
         }
-        if let Some(copy) = &self.consent {
-            if let Err(error) = self.folder.keep_consent(copy) {
-                self.broken = true;
-                return vec![SaveEvent::Failed(error.to_string())];
-            }
-            self.consent = None;
+        if let Err(error) = self.settle_consent() {
+            self.broken = true;
+            return vec![SaveEvent::Failed(error.to_string())];
         }
         let events: Vec<(Moment, &Event)> = self.unsaved.iter().map(|u| (u.at, &u.event)).collect();
         match self.journal.append_all(&events) {
@@ -333,6 +330,28 @@ impl Worker {
                 self.broken = true;
                 vec![SaveEvent::Failed(error.to_string())]
             }
+        }
+    }
+
+    /// Writes the copy of the consent document, or removes one from before a crash whose participant
+    /// refuses now.
+    fn settle_consent(&mut self) -> Result<(), StoreError> {
+        if let Some(copy) = &self.consent {
+            self.folder.keep_consent(copy)?;
+            self.consent = None;
+        }
+        let refuses = |u: &Unsaved| {
+            matches!(
+                u.event,
+                Event::Consented {
+                    accepted: false,
+                    ..
+                }
+            )
+        };
+        match self.unsaved.iter().any(refuses) {
+            true => self.folder.drop_consent(),
+            false => Ok(()),
         }
     }
 

@@ -35,6 +35,9 @@ fn by_keys_it_is_scrolled_and_answered_by_a_letter() {
             let event = Event::Key(KeyEvent::new(code, KeyModifiers::NONE));
             surface.event(&event, &view)
         };
+        // Its end has not been on the screen: this reads on.
+        assert_eq!(press(&mut surface, KeyCode::Char('y')), []);
+        seen.push_str(&picture(&drawn(&mut surface, &view, width, height)));
         for _ in 0..150 {
             assert_eq!(press(&mut surface, KeyCode::Down), []);
             seen.push_str(&picture(&drawn(&mut surface, &view, width, height)));

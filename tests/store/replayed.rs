@@ -14,9 +14,14 @@ use study_session::store::{Frozen, StudyFolder};
 const EXAMPLE: &str = "results/turn-signal-example";
 
 /// A study in which the real participant P01 did what SIM001 of the example did, with
-/// another realization in each trial, if given, and so many times the force.
-fn with_p01(results: &Path, model: Option<&str>, factor: f64) {
-    let example = StudyFolder::open(repository(EXAMPLE).as_ref()).unwrap();
+/// another realization in each trial, if given, and another force.
+fn with_p01(results: &Path, model: Option<&str>, force: fn(f64) -> f64) {
+    as_p01(repository(EXAMPLE).as_ref(), results, model, force);
+}
+
+/// The same of another study.
+fn as_p01(study: &Path, results: &Path, model: Option<&str>, force: fn(f64) -> f64) {
+    let example = StudyFolder::open(study).unwrap();
     let loaded = load::frozen(&example).unwrap();
     let frozen = Frozen {
         protocol: &loaded.protocol,
@@ -60,7 +65,7 @@ fn with_p01(results: &Path, model: Option<&str>, factor: f64) {
         let mut scaled = format!("{}\r\n", lines.next().unwrap());
         for line in lines {
             let cells: Vec<&str> = line.split(',').collect();
-            let force = factor * cells[3].parse::<f64>().unwrap();
+            let force = force(cells[3].parse().unwrap());
             let [t, x, v] = [cells[0], cells[1], cells[2]];
             scaled.push_str(&format!("{t},{x},{v},{force},\r\n"));
         }
@@ -123,8 +128,8 @@ fn a_whole_session_is_a_document_with_every_event_and_page() {
 #[test]
 fn while_a_study_is_not_complete_all_realizations_look_the_same() {
     let homes = [(); 2].map(|()| tempfile::tempdir().unwrap());
-    with_p01(homes[0].path(), None, 1.0);
-    with_p01(homes[1].path(), Some("lambda-0.9999"), 2.0);
+    with_p01(homes[0].path(), None, |n| n);
+    with_p01(homes[1].path(), Some("lambda-0.9999"), |n| 3.0 - n * n);
     for arguments in [
         &["replay", ".", "P01", "3"][..],
         &["replay", ".", "P01", "3", "--json"],
@@ -141,13 +146,55 @@ fn while_a_study_is_not_complete_all_realizations_look_the_same() {
         out.contains("hidden: 1 of 10 participants have finished"),
         "{out}"
     );
-    assert!(out.contains("Force, without scale") && !out.contains("largest force"));
+    // Without a scale, too, the shape of a force tells a detent from a spring.
+    assert!(out.contains("Position, without scale") && !out.contains("Force"));
+}
+
+/// The level that was set, and whether an answer was right, tell a realization without its name.
+#[test]
+fn while_a_study_is_not_complete_neither_levels_nor_right_answers_are_told() {
+    for (kind, told, instead) in [
+        ("adjustment", &["equal = "][..], "the level is confirmed"),
+        (
+            "identification",
+            &["That was correct", "That was not correct"],
+            "which = ",
+        ),
+    ] {
+        let home = tempfile::tempdir().unwrap();
+        let run = |arguments: &[&str]| {
+            let (code, out, err) = study(arguments, home.path());
+            assert_eq!(code, 0, "{arguments:?}: {out}{err}");
+            out
+        };
+        run(&["new", "--kind", kind, "--seed", "20261128", "s"]);
+        run(&["rehearse", "s", "--participants", "1", "--out", "r"]);
+        let open = run(&["replay", "r", "SIM001"]);
+        assert!(told.iter().any(|text| open.contains(text)), "{open}");
+        let names = ["s", "my-study"].map(|name| home.path().join("r").join(name));
+        let rehearsed = names.iter().find(|path| path.is_dir()).unwrap();
+        let results = home.path().join("p");
+        fs::create_dir(&results).unwrap();
+        as_p01(rehearsed, &results, None, |n| n);
+        let hidden = run(&["replay", "p", "P01"]);
+        assert!(hidden.contains(instead), "{hidden}");
+        let document = run(&["replay", "p", "P01", "--json"]);
+        for text in told {
+            assert!(!hidden.contains(text), "{hidden}");
+            assert!(!document.contains(text), "{document}");
+        }
+        let document: serde_json::Value = serde_json::from_str(&document).unwrap();
+        for step in document["steps"].as_array().unwrap() {
+            let is_set = step["question"] == "equal";
+            assert!(!is_set || step["answer"].is_null(), "{step}");
+        }
+    }
 }
 
 #[test]
 fn who_reveals_a_participant_early_leaves_a_note() {
     let home = tempfile::tempdir().unwrap();
-    with_p01(home.path(), None, 1.0);
+    with_p01(home.path(), None, |n| n);
     let arguments = ["replay", ".", "P01", "3", "--reveal", "a strange force"];
     let (code, out, err) = study(&arguments, home.path());
     assert_eq!(code, 0, "{err}");
@@ -169,7 +216,7 @@ fn who_reveals_a_participant_early_leaves_a_note() {
 #[test]
 fn typed_text_cannot_control_the_terminal() {
     let home = tempfile::tempdir().unwrap();
-    with_p01(home.path(), None, 1.0);
+    with_p01(home.path(), None, |n| n);
     for arguments in [
         &["replay", ".", "P01", "3"][..],
         &["replay", ".", "P01", "3", "--json"],
@@ -183,7 +230,7 @@ fn typed_text_cannot_control_the_terminal() {
 #[test]
 fn who_did_not_come_has_no_session_and_who_withdrew_is_not_shown() {
     let home = tempfile::tempdir().unwrap();
-    with_p01(home.path(), None, 1.0);
+    with_p01(home.path(), None, |n| n);
     for (id, state, what) in [
         ("P09", "no-show", "P09 has no session that began"),
         ("P01", "withdrawn", "P01 withdrew: nothing of them is shown"),

@@ -7,7 +7,7 @@ use crate::process::open;
 use crate::world::{at, begun, ended, real, started};
 use std::path::Path;
 use study::runner::saver::{Job, SaveEvent, Saver};
-use study_session::outcome::{Event, Sample};
+use study_session::outcome::{Author, Event, Sample};
 use study_session::store::StudyFolder;
 use study_session::store::disk::Disk as _;
 
@@ -118,4 +118,31 @@ fn lost_telemetry_is_in_the_journal_and_no_problem_for_ever() {
         note.contains("001-a1.csv: not saved, or only in part"),
         "{note}"
     );
+}
+
+/// The program ended between the copy of the consent document and its event; then the participant says no, or yes.
+#[test]
+fn who_refuses_after_a_crash_leaves_no_copy_of_the_consent() {
+    for accepted in [false, true] {
+        let disk = MemoryDisk::new();
+        let study = open(&disk).unwrap();
+        let mut claimed = study.claim(&real("P01")).unwrap();
+        let start = started("P01", 1, claimed.seat);
+        let journal = claimed.folder.journal().unwrap();
+        claimed.folder.keep_consent("signed: QXJ").unwrap();
+        let mut saver = Saver::new(claimed.folder, journal, false);
+        saver.send(Job::Append(at(0), start));
+        let consented = Event::Consented {
+            document: "Information".to_owned(),
+            version: "2".to_owned(),
+            accepted,
+            by: Author::Participant,
+        };
+        saver.send(Job::Append(at(1), consented));
+        let events = saver.finish();
+        let saved = events.iter().filter(|e| **e == SaveEvent::Saved).count();
+        assert_eq!(saved, 2, "{events:?}");
+        let copy = disk.read(Path::new("results/small/sessions/P01/1/consent.txt"));
+        assert_eq!(copy.is_ok(), accepted);
+    }
 }

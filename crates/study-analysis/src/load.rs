@@ -27,6 +27,7 @@ use study_plan::protocol::{DeviceKind, FileOrders, ModelEntry, Order, Protocol, 
 use study_session::store::disk::read_capped;
 use study_session::store::layout;
 
+mod consent;
 mod errors;
 mod families;
 mod frozen;
@@ -416,15 +417,8 @@ impl<'f> OtherFiles<'f> {
                 findings
             }
             Ok(text) if name.content == Content::Text => {
-                let text = text.trim_start_matches('\u{feff}').trim_end();
-                self.consent = Some(text.replace("\r\n", "\n"));
-                let empty = text.trim().is_empty();
-                let fault = || {
-                    Fault::error("the text of the consent document is empty")
-                        .hint("write what participants agree to, or leave out `text`")
-                };
-                let mut findings = Findings::new(shown, text);
-                findings.faults.extend(empty.then(fault));
+                let (text, findings) = consent::read(shown, text);
+                self.consent = Some(text);
                 findings
             }
             Ok(text) => {

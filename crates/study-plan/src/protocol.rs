@@ -226,8 +226,8 @@ pub struct Consent {
     pub document: String,
     /// Version of the document.
     pub version: String,
-    /// The file with its text, relative to the protocol.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    /// The file with its text, relative to the protocol. No fingerprint has the path of a file.
+    #[serde(skip)]
     pub file: Option<String>,
     /// The text, once the file was read. Fingerprints have its SHA-256.
     #[serde(skip_serializing_if = "Option::is_none", serialize_with = "hashed")]

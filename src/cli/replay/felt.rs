@@ -9,7 +9,7 @@ use study_device::rendering_of;
 use study_haptics::model::Realization;
 use study_plan::protocol::{DeviceKind, Protocol};
 use study_report::plot::strip::{extent, strip};
-use study_session::outcome::{Event, Playback, Sample};
+use study_session::outcome::{Event, FormId, Playback, Sample};
 use study_session::rendering::{Expected, Played, expected};
 use study_session::store::{SessionData, layout};
 use study_wire::servo::ServoSettings;
@@ -23,7 +23,7 @@ pub(super) struct Reader<'a> {
     pub(super) protocol: &'a Protocol,
     /// Of each realization.
     pub(super) tables: &'a BTreeMap<ModelId, Realization>,
-    /// Whether forces are shown with their scale and beside the table.
+    /// Whether forces are shown, and beside the table.
     pub(super) revealed: bool,
 }
 
@@ -71,6 +71,23 @@ impl Reader<'_> {
         })
     }
 
+    /// Whether an event is the answer of a trial of adjustment, which names the level that was felt.
+    pub(super) fn names_level(&self, event: &Event) -> bool {
+        let (Event::Answered { form, question, .. } | Event::Corrected { form, question, .. }) =
+            event
+        else {
+            return false;
+        };
+        let FormId::Trial { trial, .. } = form else {
+            return false;
+        };
+        let planned = self.session.history.planned(*trial);
+        let part = planned.and_then(|trial| self.protocol.part(trial.part.as_ref()?));
+        part.is_some_and(|part| {
+            part.task.adjustment().is_some() && part.asks.first() == Some(question)
+        })
+    }
+
     fn expected(
         &self,
         (trial, attempt, interval): (u32, u32, Option<u32>),
@@ -111,11 +128,11 @@ impl Felt {
         };
         let values = |points: &[(f64, f64)]| extent(points.iter().map(|(_, y)| *y));
         let position = points(|s| s.x_mm);
-        let force = points(|s| s.force_command_n);
         if !self.revealed {
-            return strip("Position, without scale", &position, None, columns, ROWS)
-                + &strip("Force, without scale", &force, None, columns, ROWS);
+            // The shape of a force tells its realization also without a scale.
+            return strip("Position, without scale", &position, None, columns, ROWS);
         }
+        let force = points(|s| s.force_command_n);
         let table = self.table();
         let [a, b] = [values(&force), values(&table)];
         let of_force = match table.is_empty() {

@@ -3,6 +3,7 @@
 use crate::plain::pages;
 use study_session::outcome::{Entry, Event, FormId};
 use study_session::session::retrace::Shown;
+use study_session::session::view::MessageKind;
 use study_session::session::{Screen, View};
 
 /// What came next.
@@ -12,6 +13,23 @@ pub(super) enum Step<'a> {
     Page(&'a Shown),
     /// Something happened.
     Event(&'a Entry),
+}
+
+impl Step<'_> {
+    /// Whether it tells of a realization: a page that says whether the answer was right, and which
+    /// one would have been.
+    pub(super) fn tells(&self) -> bool {
+        match self {
+            Self::Page(shown) => matches!(
+                shown.view.screen,
+                Screen::Message {
+                    kind: MessageKind::Feedback,
+                    ..
+                }
+            ),
+            Self::Event(_) => false,
+        }
+    }
 }
 
 /// The steps of a session, or those of a trial: its pages and events, and what happened

@@ -157,6 +157,7 @@ impl UiState {
     }
 
     fn press_on_screen(&mut self, key: Key, view: &View) -> Vec<Input> {
+        let read = self.reading.scrolled >= self.reading.most;
         match &view.screen {
             Screen::Who {
                 claiming, roster, ..
@@ -170,11 +171,13 @@ impl UiState {
                 _ => Vec::new(),
             },
             Screen::Consent { .. } => match key {
-                key if keys::is_yes(key, &view.words) => vec![Input::Consent(true)],
+                // Nobody agrees to a text whose end was not on the screen.
+                key if keys::is_yes(key, &view.words) => match read {
+                    true => vec![Input::Consent(true)],
+                    false => self.press_reading(Key::Enter, view),
+                },
                 Key::Char('n' | 'N') => self.confirm(Confirm::Refuse),
-                Key::Enter if self.reading.scrolled >= self.reading.most => {
-                    self.notify(view.words.get(Phrase::ChooseYesOrNo))
-                }
+                Key::Enter if read => self.notify(view.words.get(Phrase::ChooseYesOrNo)),
                 // The text may be long.
                 key => self.press_reading(key, view),
             },

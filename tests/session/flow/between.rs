@@ -9,7 +9,7 @@ use study_plan::protocol::{Answer, Inventory, Occasion, Protocol, Questionnaire}
 use study_session::outcome::{Author, Event, FormId, RatingRow};
 use study_session::session::Input;
 
-fn asked(mut protocol: Protocol, after: Occasion) -> Protocol {
+pub(super) fn asked(mut protocol: Protocol, after: Occasion) -> Protocol {
     protocol.questionnaires.push(Questionnaire {
         id: PartId::new("load").unwrap(),
         kind: Inventory::NasaTlx,
@@ -134,6 +134,27 @@ fn a_condition_whose_trial_is_felt_again_is_judged_again() {
     assert_eq!(*first[1], FormId::After { trial, attempt });
     let rows = rig.session.history().rating_rows(&protocol);
     assert!(rows[0].answers.contains_key(&qid("load_mental")));
+}
+
+/// A block ends with the trial that was completed last, which need not be the last one of the plan.
+#[test]
+fn a_block_whose_last_trial_is_felt_again_is_judged_again() {
+    let protocol = asked(plain(), Occasion::Block);
+    let mut rig = Rig::new(protocol.clone());
+    let bad = || Input::MarkBad {
+        reason: "noise".to_owned(),
+    };
+    // The first trial comes again at the end of its block, and then once more.
+    rig.until_reference(1).send(bad());
+    rig.until_reference(3).send(bad());
+    rig.finish();
+    rig.assert_whole();
+    let form = |trial, attempt| FormId::After { trial, attempt };
+    assert_eq!(forms(&rig), [form(1, 2), form(1, 3), form(6, 1)]);
+    let rows = rig.session.history().rating_rows(&protocol);
+    let judged = |row: &&RatingRow| row.answers.contains_key(&qid("load_mental"));
+    let judged: Vec<u32> = rows.iter().filter(judged).map(|row| row.trial).collect();
+    assert_eq!(judged, [1, 6]);
 }
 
 #[test]

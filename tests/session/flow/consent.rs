@@ -77,10 +77,32 @@ fn initials_are_in_the_copy_and_in_nothing_else() {
     assert!(!format!("{:?}", rig.view()).contains("QXJ"));
 }
 
+/// Nothing that is written or read names the form of the initials.
+#[test]
+fn no_journal_can_have_initials() {
+    assert!(serde_json::to_string(&FormId::Consent).is_err());
+    assert!(serde_json::from_str::<FormId>("\"consent\"").is_err());
+    assert!(serde_json::from_str::<FormId>("\"outro\"").is_ok());
+}
+
 #[test]
 fn who_does_not_agree_types_nothing_and_has_no_copy() {
     let mut rig = Rig::new(signed());
     rig.until("Consent").wait(1.0).send(Input::Consent(false));
+    assert_eq!(decided(&rig), 1);
+    assert!(matches!(rig.view().screen, Screen::End { .. }));
+    assert!(copies(&rig).is_empty());
+}
+
+/// Who thinks again at the page of the initials can read the document again, and refuse.
+#[test]
+fn before_the_initials_one_can_go_back_and_refuse() {
+    let mut rig = Rig::new(signed());
+    rig.until("Consent").wait(1.0).send(Input::Consent(true));
+    assert!(rig.view().can_go_back);
+    rig.wait(1.0).send(Input::Back);
+    assert!(matches!(rig.view().screen, Screen::Consent { .. }));
+    rig.wait(1.0).send(Input::Consent(false));
     assert_eq!(decided(&rig), 1);
     assert!(matches!(rig.view().screen, Screen::End { .. }));
     assert!(copies(&rig).is_empty());

@@ -1,5 +1,6 @@
 //! The pages that follow from a journal are those that were shown, byte by byte.
 
+use super::between::asked;
 use super::consent::signed;
 use super::part_rig::{
     QUEST, STAIRCASE, answering, beside_a_reference, finish, identification, magnitudes, pairs,
@@ -10,7 +11,7 @@ use super::studies::{plain, rich};
 use proptest::prelude::*;
 use std::sync::Arc;
 use study_base::text::QuestionId;
-use study_plan::protocol::{Answer, Protocol};
+use study_plan::protocol::{Answer, Occasion, Protocol};
 use study_session::outcome::{Author, Entry, Event, FormId};
 use study_session::page::{Kind, participant};
 use study_session::session::retrace::{self, Shown};
@@ -82,6 +83,40 @@ fn ratings_show_the_same_pages_again() {
         let mut rig = recording(&protocol);
         rig.finish();
         assert_same(&rig, &protocol);
+    }
+}
+
+/// Questionnaires between the trials, too: their pages belong to the trial in whose row they are.
+#[test]
+fn questionnaires_between_the_trials_show_the_same_pages_again() {
+    for after in [Occasion::Condition, Occasion::Block] {
+        let protocol = asked(rich(), after);
+        let mut rig = recording(&protocol);
+        rig.finish();
+        assert_same(&rig, &protocol);
+        let mut seen = 0;
+        for page in retraced(&rig, &protocol) {
+            if let Screen::Form {
+                form: FormId::After { trial, attempt },
+                ..
+            } = page.view.screen
+            {
+                assert_eq!(page.of, Some((trial, attempt)));
+                seen += 1;
+            }
+        }
+        // Each of both questions of each form has a page.
+        let given = |e: &Event| {
+            matches!(
+                e,
+                Event::Answered {
+                    form: FormId::After { .. },
+                    ..
+                }
+            )
+        };
+        assert!(seen > 0);
+        assert_eq!(seen, rig.count(given), "{after:?}");
     }
 }
 

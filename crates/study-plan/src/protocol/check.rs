@@ -9,6 +9,7 @@ mod exposure;
 mod ladders;
 mod maps;
 mod parts;
+mod questionnaires;
 
 pub use ladders::coarse;
 pub use parts::is_about_realizations;
@@ -40,6 +41,7 @@ pub fn warnings(protocol: &Protocol, spans: &Spans, unread: &[&ModelId]) -> Vec<
     let mut faults = Vec::new();
     language(protocol, spans, &mut faults);
     untranslated(protocol, spans, &mut faults);
+    questionnaires::warnings(protocol, spans, &mut faults);
     birth_dates(protocol, spans, &mut faults);
     if is_about_realizations(protocol) {
         realizations(protocol, spans, &mut faults);

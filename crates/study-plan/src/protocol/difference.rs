@@ -191,7 +191,7 @@ fn shortened(text: &str) -> String {
 mod tests {
     use super::*;
     use crate::protocol::fingerprint::parts;
-    use crate::protocol::{Order, Protocol, example};
+    use crate::protocol::{Consent, Order, Protocol, example};
     use std::collections::BTreeMap;
 
     fn changed(change: impl FnOnce(&mut Protocol)) -> Vec<String> {
@@ -267,5 +267,29 @@ mod tests {
             Some(3..9)
         );
         assert_eq!(change.span(|_| None), None);
+    }
+
+    /// Moving the file changes nothing.
+    #[test]
+    fn of_a_consent_document_the_text_counts_and_not_its_place() {
+        let document = |file: &str, text: &str| {
+            let mut protocol = example::protocol(3, 2);
+            protocol.consent = Some(Consent {
+                document: "Information".to_owned(),
+                version: "2".to_owned(),
+                file: Some(file.to_owned()),
+                text: Some(text.to_owned()),
+                initials: false,
+            });
+            parts(&protocol, &BTreeMap::new(), None)
+        };
+        let here = document("consent.txt", "You turn a knob.");
+        let moved = document("texts/consent.txt", "You turn a knob.");
+        assert!(changes(&here, &moved).is_empty());
+        let other = document("consent.txt", "You turn a wheel.");
+        let found = changes(&here, &other);
+        assert_eq!(found.len(), 1);
+        assert!(!found[0].fixed);
+        assert_eq!(found[0].key, "consent.text");
     }
 }

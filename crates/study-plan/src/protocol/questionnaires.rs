@@ -166,11 +166,11 @@ const NASA_TLX: [Item; 6] = [
     ),
 ];
 
-/// The titles of these subscales.
+/// The titles of these subscales, those of the source.
 const TITLES: [&str; 6] = [
     "mental demand",
     "physical demand",
-    "time pressure",
+    "temporal demand",
     "performance",
     "effort",
     "frustration",
@@ -444,7 +444,7 @@ mod tests {
         let choices: Vec<usize> = pairs.map(|pair| usize::from(pair[1] == 0)).collect();
         let mut given: Vec<Option<f64>> = ratings.map(Some).to_vec();
         given.extend(choices.iter().map(|at| Some((at + 1) as f64)));
-        // Mental demand 5 times, as often as they come first physical demand 2, time pressure 2, performance 2,
+        // Mental demand 5 times, as often as they come first physical demand 2, temporal demand 2, performance 2,
         // effort 2, frustration 2.
         let expected = (5.0 * 70.0 + 2.0 * (20.0 + 55.0 + 30.0 + 65.0 + 15.0)) / 15.0;
         let found = own.score(&given).unwrap();

@@ -90,7 +90,8 @@ pub enum FormId {
     },
     /// Questions to the participant at the end.
     Outro,
-    /// The initials of the participant, in a running session only: no journal has them.
+    /// The initials of the participant, in a running session only: no journal has them, or could.
+    #[serde(skip)]
     Consent,
 }
 

@@ -39,8 +39,8 @@ impl Session {
         Some(FormId::After { trial, attempt })
     }
 
-    /// Of each condition, block or part of which no trial is to come, the last trial that was completed,
-    /// in the order of the plan.
+    /// Of each condition, block or part of which no trial is to come, the trial that was completed last:
+    /// the only one that can still be marked as bad.
     fn ended_with(&self, own: &Questionnaire) -> BTreeSet<u32> {
         let to_come: BTreeSet<u32> = self.history.queue.iter().copied().collect();
         let planned = self.history.schedule().iter();
@@ -51,12 +51,15 @@ impl Session {
             .filter(|(_, trial)| to_come.contains(trial))
             .map(|(stretch, _)| *stretch)
             .collect();
-        let mut last: BTreeMap<Stretch<'_>, u32> = BTreeMap::new();
+        // By the numbers that the trials had on the screen, which follow the order of their completion.
+        let mut last: BTreeMap<Stretch<'_>, (u32, u32)> = BTreeMap::new();
         for (stretch, trial) in all {
-            if !goes_on.contains(&stretch) && self.history.completion(trial).is_some() {
-                last.insert(stretch, trial);
+            let completion = self.history.completion(trial);
+            if let Some((_, done)) = completion.filter(|_| !goes_on.contains(&stretch)) {
+                let latest = last.entry(stretch).or_default();
+                *latest = (*latest).max((done.number, trial));
             }
         }
-        last.into_values().collect()
+        last.into_values().map(|(_, trial)| trial).collect()
     }
 }

@@ -205,16 +205,21 @@ impl Session {
         self.record(event, at);
     }
 
-    /// Shows the page before the one on the screen, with its answers.
+    /// Shows the page before the one on the screen, with its answers; before that of the initials,
+    /// the document.
     pub(super) fn back(&mut self) {
         if let Phase::Form(open) = &mut self.phase {
-            open.at = open.at.saturating_sub(1);
+            if open.id == FormId::Consent {
+                self.phase = Phase::Consent;
+            } else {
+                open.at = open.at.saturating_sub(1);
+            }
         }
     }
 
     /// Whether a page comes before the one on the screen.
     pub(super) fn can_go_back(&self) -> bool {
-        matches!(&self.phase, Phase::Form(open) if open.at > 0)
+        matches!(&self.phase, Phase::Form(open) if open.at > 0 || open.id == FormId::Consent)
     }
 
     fn turn_page(&mut self, at: Moment) {

@@ -496,7 +496,7 @@ impl Retrace<'_> {
         };
         match screen {
             Screen::Form {
-                form: FormId::Trial { trial, attempt },
+                form: FormId::Trial { trial, attempt } | FormId::After { trial, attempt },
                 ..
             } => Some((*trial, *attempt)),
             Screen::Reference { .. } => next(),

@@ -1,10 +1,11 @@
 //! The folder of a claimed session: its journal, telemetry and copy of the consent.
 
-use super::error::StoreError;
+use super::error::{At as _, StoreError};
 use super::journal::Journal;
 use super::session_lock::SessionLock;
 use super::telemetry::TelemetryWriter;
 use super::{atomic, layout};
+use std::io::ErrorKind;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -48,6 +49,19 @@ impl SessionFolder {
     pub fn keep_consent(&self, copy: &str) -> Result<(), StoreError> {
         let path = self.lock.path.join(layout::CONSENT);
         atomic::replace(self.lock.disk.as_ref(), &path, copy.as_bytes())
+    }
+
+    /// Removes a copy of the consent document from before a crash: the participant does not agree.
+    ///
+    /// # Errors
+    /// [`StoreError`] if there is one and it cannot be removed.
+    pub fn drop_consent(&self) -> Result<(), StoreError> {
+        let path = self.lock.path.join(layout::CONSENT);
+        match self.lock.disk.remove_file(&path) {
+            Err(e) if e.kind() == ErrorKind::NotFound => Ok(()),
+            Err(e) => Err(e).at(&path),
+            Ok(()) => self.lock.disk.sync_folder(&self.lock.path).at(&path),
+        }
     }
 
     /// Creates a file for the telemetry of an attempt; an existing one is never

@@ -25,7 +25,7 @@ pub(super) static QUESTIONNAIRES: Variants = Variants {
         "id": Kind::Id(Id::Part), r#""sus""#, required;
         /// After what it is asked. What is not `session` needs the format `study-protocol/3`.
         "after": Kind::Word(Occasion::WORDS), r#""condition""#, default(r#""session""#);
-        /// The texts at both ends of every scale; of kind `own` also two for each item.
+        /// The texts at both ends of every scale; of the Task Load Index and of kind `own` also two for each item.
         "labels": Kind::Texts(2), r#"["stimme gar nicht zu", "stimme voll zu"]"#, derived("those of the source, in English; none of kind `own`");
     },
     shapes: &SHAPES,
@@ -158,18 +158,7 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Vec<PartialQuestionnaire> {
 
 /// The items of a questionnaire of the study's own.
 fn own_items(section: &mut Section<'_, '_>, own: &RawOwn) -> Vec<Asked> {
-    let labels = section.texts("labels");
-    let labels: Vec<String> = labels.into_iter().map(|(_, text)| text).collect();
-    let n = own.items.len();
-    if ![0, 2, 2 * n].contains(&labels.len()) {
-        let what = format!(
-            "`{}.labels` has {}, not 2 or, two for each item, {}",
-            section.path(),
-            counted(labels.len(), "text", "texts"),
-            2 * n
-        );
-        section.fault_at("labels", Fault::error(what));
-    }
+    let labels = labels(section, own.items.len());
     let (from, to) = (own.scoring.from, own.scoring.to);
     let item = |(i, text): (usize, &String)| {
         let at = if labels.len() == 2 { 0 } else { 2 * i };
@@ -181,6 +170,22 @@ fn own_items(section: &mut Section<'_, '_>, own: &RawOwn) -> Vec<Asked> {
         ((i + 1).to_string(), text.clone(), kind)
     };
     own.items.iter().enumerate().map(item).collect()
+}
+
+/// The texts at the ends of the scales: two, or two for each of `n` items.
+fn labels(section: &mut Section<'_, '_>, n: usize) -> Vec<String> {
+    let labels = section.texts("labels");
+    let labels: Vec<String> = labels.into_iter().map(|(_, text)| text).collect();
+    if ![0, 2, 2 * n].contains(&labels.len()) {
+        let what = format!(
+            "`{}.labels` has {}, not 2 or, two for each item, {}",
+            section.path(),
+            counted(labels.len(), "text", "texts"),
+            2 * n
+        );
+        section.fault_at("labels", Fault::error(what));
+    }
+    labels
 }
 
 /// The items of a standard questionnaire, as they are asked.
@@ -201,7 +206,11 @@ fn items(section: &mut Section<'_, '_>, read: &Read) -> Vec<Asked> {
     let known = kind.items();
     let rated = known.iter().filter(|item| item.pair.is_none()).count();
     let own = texts(section, "items", rated);
-    let labels = texts(section, "labels", 2);
+    let labels = match kind {
+        // Success is rated from perfect to failure, and the rest from low to high.
+        Inventory::NasaTlx | Inventory::NasaTlxWeighted => labels(section, rated),
+        Inventory::Sus | Inventory::Own => texts(section, "labels", 2),
+    };
     let titles = &read.titles;
     if !titles.is_empty() && titles.len() != rated {
         let what = format!(
@@ -213,8 +222,9 @@ fn items(section: &mut Section<'_, '_>, read: &Read) -> Vec<Asked> {
     }
     let system = read.system.as_deref().unwrap_or("system");
     let item = |(i, item): (usize, &crate::protocol::questionnaires::Item)| {
+        let at = if labels.len() == 2 { 0 } else { 2 * i };
         let (prompt, ends) = match item.pair {
-            None => (own.get(i), [labels.first(), labels.get(1)]),
+            None => (own.get(i), [labels.get(at), labels.get(at + 1)]),
             Some(pair) => (read.compare.as_ref(), pair.map(|at| titles.get(at))),
         };
         let prompt = prompt.map_or(item.prompt, String::as_str);

@@ -4,6 +4,7 @@ use crate::protocol::file::parse;
 use crate::protocol::{
     Answer, BetterEnd, Inventory, Measure, Occasion, QuestionKind, Scored, kinds,
 };
+use study_base::diagnostic::Fault;
 
 const STUDY: &str = r#"
 format = "study-protocol/1"
@@ -116,6 +117,38 @@ fn a_questionnaire_in_another_language_than_the_study_is_a_warning() {
     assert_eq!(
         warned(&german.replace("id = \"sus\"", &items)),
         expected[1..]
+    );
+}
+
+/// The highest answer to the fourth item of the Task Load Index says failure, and the others say load.
+#[test]
+fn the_labels_of_a_task_load_index_can_differ_by_item() {
+    let warned = |text: &str| -> bool {
+        let parsed = parse("p", text);
+        let shown = parsed.findings.render(false);
+        let protocol = parsed.protocol.unwrap_or_else(|| panic!("{shown}"));
+        let faults = crate::protocol::check::warnings(&protocol, &parsed.spans, &[]);
+        let about = |f: &Fault| f.message.contains("`load_performance` has the labels");
+        faults.iter().any(about)
+    };
+    for kind in ["nasa-tlx", "nasa-tlx-weighted"] {
+        let same = with(BOTH).replace("\"nasa-tlx\"", &format!("\"{kind}\""));
+        assert!(warned(&same), "{kind}");
+        let each = r#"["l", "h", "l", "h", "l", "h", "perfekt", "misslungen", "l", "h", "l", "h"]"#;
+        let each = same.replace("[\"gering\", \"hoch\"]", each);
+        assert!(!warned(&each), "{kind}");
+        let outro = parse("p", &each).protocol.unwrap().outro;
+        let labels = outro[14].kind.scale().labels();
+        assert_eq!(labels["100"], "misslungen", "{kind}");
+        assert!(!warned(
+            &same.replace("labels = [\"gering\", \"hoch\"]", "")
+        ));
+    }
+    let three = with(BOTH).replace("\"hoch\"]", "\"hoch\", \"x\"]");
+    let shown = parse("p", &three).findings.render(false);
+    assert!(
+        shown.contains("has 3 texts, not 2 or, two for each item, 12"),
+        "{shown}"
     );
 }
 
@@ -238,6 +271,14 @@ titles = ["a", "b", "c", "d", "e", "f"]
     };
     assert_eq!((*from, *to), (1, 2));
     assert_eq!((labels[&1].as_str(), labels[&2].as_str()), ("c", "a"));
+    // Those of Hart & Staveland (1988), unless the study has its own.
+    let english = weighted.replace("titles = [\"a\", \"b\", \"c\", \"d\", \"e\", \"f\"]\n", "");
+    let protocol = parse("p", &with(&english)).protocol.unwrap();
+    let labels = protocol.outro[8].kind.scale().labels();
+    assert_eq!(
+        (labels["1"].as_str(), labels["2"].as_str()),
+        ("temporal demand", "mental demand")
+    );
     let few = weighted.replace(", \"f\"", "");
     let shown = parse("p", &with(&few)).findings.render(false);
     assert!(
