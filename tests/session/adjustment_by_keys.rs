@@ -75,7 +75,7 @@ fn set_until(terminal: &mut Terminal, folder: &Path, there: impl Fn(&str) -> boo
             continue;
         }
         let (key, event) = match step(folder) {
-            STANDARD if !compared(folder) => ("r", "playback_started"),
+            STANDARD if !compared(folder) => ("s", "playback_started"),
             STANDARD => ("\r", "trial_done"),
             low if low < STANDARD => ("\u{1b}[C", "playback_started"),
             _ => ("-", "playback_started"),
