@@ -186,6 +186,30 @@ fn a_stopped_level_goes_on() {
     assert!((set - (1.0 + 0.05 * first as f64)).abs() < 1e-9, "{set}");
 }
 
+/// After the longest exposure of the standard the level comes, the first time and when it is felt again: nobody has to be
+/// quicker than that. Nothing is confirmed.
+#[test]
+fn after_the_standard_comes_the_level() {
+    let mut rig = Rig::new(adjustment("standard = 2.0\nexposure = { max_s = 5 }"));
+    rig.until("Playing");
+    for turn in [Turn::Higher, Turn::Lower] {
+        assert_eq!(step(&rig), STANDARD);
+        rig.wait(5.0).wait(1.0);
+        let level = step(&rig);
+        assert_ne!(level, STANDARD);
+        assert!(!rig.view().adjusting.unwrap().at_standard);
+        does(&mut rig, Input::Adjust(turn));
+        let turned = step(&rig);
+        assert_eq!(turned.abs_diff(level), 1);
+        does(&mut rig, Input::Adjust(Turn::Standard));
+    }
+    assert_eq!(step(&rig), STANDARD);
+    assert_eq!(rig.count(|e| matches!(e, Event::Answered { .. })), 0);
+    // A stop is a stop.
+    rig.wait(0.5).send(Input::Stop);
+    assert_eq!(rig.view().screen, Screen::Stopped { can_rate: false });
+}
+
 /// A level is not compared with what was felt before a long pause: the trial then begins again.
 #[test]
 fn a_level_that_was_stopped_for_long_begins_again() {

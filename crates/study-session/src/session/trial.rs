@@ -406,7 +406,11 @@ impl Session {
             && let Some(max_s) = self.exposure().max_s
             && at.seconds_since(since) >= max_s
         {
-            self.request_stop(false, false, at);
+            match self.feels_standard() {
+                // The level follows, as after Enter.
+                true => self.leave_level(at),
+                false => self.request_stop(false, false, at),
+            }
         }
     }
 
