@@ -225,6 +225,29 @@ fn without_telemetry_there_are_no_strokes_and_no_number_is_never_a_number() {
     assert_eq!((rows[1].strokes, rows[1].least_energy_j), (Some(3), None));
 }
 
+/// Two intervals without any exploration leave what follows a number.
+#[test]
+fn intervals_without_exploration_have_no_part_in_a_rate() {
+    let interval = |exploration_s, switches_per_s| Ended {
+        playback: Playback {
+            exploration_s,
+            switches_per_s,
+            samples: 9,
+            ..Playback::default()
+        },
+        stopped: false,
+    };
+    let mut attempt = Attempt::new(1, &Sitting::default(), None);
+    let models = ["A", "B", "C", "A"].map(|id| ModelId::new(id).unwrap());
+    attempt.models = models.to_vec();
+    for (n, (s, rate)) in (1..).zip([(0.0, 0.0), (0.0, 0.0), (3.0, 2.0), (1.0, 6.0)]) {
+        attempt.started(n, at(u64::from(n)));
+        attempt.interval_ended(n, interval(s, rate), None, at(u64::from(n)));
+    }
+    let sum = attempt.ended.unwrap().playback;
+    assert_eq!((sum.exploration_s, sum.switches_per_s), (4.0, 3.0));
+}
+
 #[test]
 fn the_last_event_that_sets_a_state_determines_it() {
     let state = |events| History::of(&journal(events)).standing.state;
