@@ -250,7 +250,7 @@ fn text(steps: &[Step<'_>], reader: &Reader<'_>, charts: Option<usize>) -> Strin
             }
             Step::Event(entry) => {
                 let time = entry.at.wall.format("%H:%M:%S");
-                let said = events::words(&entry.event, reader.revealed);
+                let said = events::words(&reader.told(entry).event, reader.revealed);
                 writeln!(out, "{time}  {said}")
             }
         };
@@ -278,7 +278,7 @@ fn document(
             "attempt": shown.of.map(|(_, attempt)| attempt),
         }),
         Step::Event(entry) => {
-            let mut fields = events::json(entry, reader.revealed);
+            let mut fields = events::json(&reader.told(entry), reader.revealed);
             if let Some(felt) = reader.read(&entry.event) {
                 felt.json(&mut fields);
             }

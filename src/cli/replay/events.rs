@@ -100,6 +100,18 @@ pub(super) fn json(entry: &Entry, revealed: bool) -> Map<String, Value> {
     all
 }
 
+/// An entry without the answer that was given, or corrected, in it.
+pub(super) fn without_answer(entry: &Entry) -> Entry {
+    let hidden = || Answer::Text("…".to_owned());
+    let mut entry = entry.clone();
+    match &mut entry.event {
+        Event::Answered { answer, .. } => *answer = hidden(),
+        Event::Corrected { from, .. } => *from = from.as_ref().map(|_| hidden()),
+        _ => {}
+    }
+    entry
+}
+
 /// An event in a few words.
 pub(super) fn words(event: &Event, revealed: bool) -> String {
     match event {

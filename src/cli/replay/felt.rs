@@ -1,5 +1,6 @@
 //! What the device did in a playback, beside what its table gives for the same motion.
 
+use super::events::without_answer;
 use crate::runner::playback_limits;
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
@@ -9,7 +10,7 @@ use study_device::rendering_of;
 use study_haptics::model::Realization;
 use study_plan::protocol::{DeviceKind, Protocol};
 use study_report::plot::strip::{extent, strip};
-use study_session::outcome::{Event, Playback, Sample};
+use study_session::outcome::{Entry, Event, FormId, Playback, Sample};
 use study_session::rendering::{Expected, Played, expected};
 use study_session::store::{SessionData, layout};
 use study_wire::servo::ServoSettings;
@@ -68,6 +69,31 @@ impl Reader<'_> {
             samples,
             expected,
             revealed: self.revealed,
+        })
+    }
+
+    /// An entry as it may be told: a level that was set in a trial of adjustment is a realization, which its answer
+    /// names.
+    pub(super) fn told(&self, entry: &Entry) -> Entry {
+        match self.revealed || !self.is_level(&entry.event) {
+            true => entry.clone(),
+            false => without_answer(entry),
+        }
+    }
+
+    fn is_level(&self, event: &Event) -> bool {
+        let (Event::Answered { form, question, .. } | Event::Corrected { form, question, .. }) =
+            event
+        else {
+            return false;
+        };
+        let FormId::Trial { trial, .. } = form else {
+            return false;
+        };
+        let planned = self.session.history.planned(*trial);
+        let part = planned.and_then(|trial| self.protocol.part(trial.part.as_ref()?));
+        part.is_some_and(|part| {
+            part.task.adjustment().is_some() && part.asks.first() == Some(question)
         })
     }
 
