@@ -1,11 +1,11 @@
 //! Sessions of adjustment: each change is one step and an event, and what was felt last is the answer.
 
 use super::part_rig::adjustment;
-use super::rig::Rig;
+use super::rig::{DeviceMood, Rig};
 use study_base::text::QuestionId;
 use study_plan::protocol::{Answer, Protocol, Stimuli, Turn};
 use study_session::outcome::{Event, Failure, FormId, fold};
-use study_session::session::{Ending, Input, Screen};
+use study_session::session::{Effect, Ending, Input, Screen};
 
 /// The standard is step 21 of the ladder, 2.0.
 const STANDARD: usize = 21;
@@ -228,6 +228,25 @@ fn a_level_that_was_stopped_for_long_begins_again() {
         let expected = if again { STANDARD } else { first + 1 };
         assert_eq!(step(&rig), expected, "{seconds} s");
     }
+}
+
+/// A pause that is asked for during a change, and a table that is loaded at the very end of the gap: nothing plays before
+/// the pause is over.
+#[test]
+fn nothing_plays_in_a_pause_that_began_during_a_change() {
+    let mut rig = Rig::new(adjustment(""));
+    rig.until("Playing");
+    rig.device = DeviceMood::Silent;
+    rig.wait(0.5).send(Input::Adjust(Turn::Higher));
+    let playback = rig.playback;
+    rig.send(Input::Pause).send(Input::DeviceStopped(playback));
+    let starts = |rig: &Rig| rig.effects.iter().filter(|e| **e == Effect::Start).count();
+    let before = starts(&rig);
+    rig.wait(1.0).send(Input::DeviceLoaded).wait(5.0);
+    assert!(matches!(rig.view().screen, Screen::Paused { .. }));
+    assert_eq!(starts(&rig), before);
+    rig.send(Input::Advance).wait(0.1);
+    assert_eq!(starts(&rig), before + 1);
 }
 
 /// Towards the standard, one step at a time, and a fault and a stop on the way.

@@ -111,8 +111,12 @@ impl Session {
         (gap_s > 0.0).then_some((ended, gap_s * late))
     }
 
-    /// Starts the next interval at the end of the gap, unless that took too long.
+    /// Starts the next interval at the end of the gap, unless that took too long. Nothing starts in a pause, or while the
+    /// journal cannot be written.
     pub(super) fn end_gap(&mut self, at: Moment) {
+        if self.saves.trouble.is_some() || self.paused.is_some() {
+            return;
+        }
         if let Phase::Gap {
             ended,
             start_after_s,
