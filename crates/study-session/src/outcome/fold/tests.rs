@@ -248,6 +248,26 @@ fn intervals_without_exploration_have_no_part_in_a_rate() {
     assert_eq!((sum.exploration_s, sum.switches_per_s), (4.0, 3.0));
 }
 
+/// A level that is felt again after the program was left is answered after that.
+#[test]
+fn the_time_before_a_level_is_felt_again_is_no_time_of_its_answer() {
+    let mut events = play(1, 1, 9).to_vec();
+    events.push(reopened(None, &[1, 2, 3]));
+    let open = |events: &[Event]| {
+        let history = History::of(&journal(events.to_vec()));
+        let attempt = history.open().unwrap().attempt;
+        attempt.rated_earlier_s
+    };
+    assert_eq!(open(&events), 1.0);
+    events.push(Event::Adjusted {
+        trial: 1,
+        attempt: 1,
+        to: ModelId::new("A").unwrap(),
+        standard: false,
+    });
+    assert_eq!(open(&events), 0.0);
+}
+
 #[test]
 fn the_last_event_that_sets_a_state_determines_it() {
     let state = |events| History::of(&journal(events)).standing.state;
