@@ -171,6 +171,10 @@ fn hands_with_a_known_point_of_equality_find_it() {
     );
     let report = fs::read_to_string(analysis.join("report.html")).unwrap();
     assert!(report.contains("The point of subjective equality was"));
+    // Nothing of intervals, each of which is felt once and for a time.
+    let felt = "Levels were 0.5 s apart. Each could be changed at once, and confirmed after 1 s. The standard could be felt again \
+                at any time.";
+    assert!(report.contains(felt) && !report.contains("Nothing could be felt again"));
     let (code, out, err) = study(&["verify", "out"], folder.path());
     assert_eq!(code, 0, "{out}{err}");
 }
