@@ -248,6 +248,36 @@ fn intervals_without_exploration_have_no_part_in_a_rate() {
     assert_eq!((sum.exploration_s, sum.switches_per_s), (4.0, 3.0));
 }
 
+/// Without the line of its start a trial of adjustment begins as planned: each level that comes later is that of its own
+/// interval.
+#[test]
+fn an_adjustment_without_its_start_begins_as_planned() {
+    let id = |id: &str| ModelId::new(id).unwrap();
+    let start = |interval| Event::PlaybackStarted {
+        trial: 1,
+        attempt: 1,
+        interval: Some(interval),
+    };
+    let adjusted = Event::Adjusted {
+        trial: 1,
+        attempt: 1,
+        to: id("C"),
+        standard: false,
+    };
+    let mut entries = journal(vec![start(1), start(2), adjusted]);
+    if let Event::SessionStarted(start) = &mut entries[0].event {
+        start.schedule[0].stimuli = Stimuli::Adjusted {
+            start: id("B"),
+            standard: Some(id("A")),
+        };
+    }
+    let history = History::of(&entries);
+    let attempt = history.open().unwrap().attempt;
+    assert_eq!(attempt.models, [id("A"), id("B"), id("C")]);
+    assert!(attempt.is_standard(1) && !attempt.is_standard(2));
+    assert_eq!(attempt.set_to(), Some(&id("C")));
+}
+
 /// A level that is felt again after the program was left is answered after that.
 #[test]
 fn the_time_before_a_level_is_felt_again_is_no_time_of_its_answer() {
