@@ -287,7 +287,8 @@ impl Exchange {
     /// Settles the reply that the session has, once everything is on disk.
     fn settle_pending(&mut self, view: &View) {
         let done = view.line.all_saved && view.unsaved.is_empty();
-        let stops = matches!(view.screen, Screen::Stopping);
+        // Nothing follows what is saved when the program is left.
+        let stops = matches!(view.screen, Screen::Stopping | Screen::Saving);
         let settled = |pending: &mut Pending| done && !(pending.confirms && stops);
         let Some(pending) = self.pending.take_if(settled) else {
             return;

@@ -365,6 +365,9 @@ fn a_confirmed_level_is_saved_only_after_the_stop() {
         // Nothing is recorded yet, and so everything is on disk.
         exchange.show(&stopping);
         assert_eq!(exchange.outcome("1"), None);
+        // Nor is it if the program is left meanwhile.
+        exchange.show(&view(Screen::Saving));
+        assert_eq!(exchange.outcome("1"), None);
         let mut unsaved = then.clone();
         unsaved.line.all_saved = false;
         exchange.show(&unsaved);
