@@ -60,7 +60,7 @@ pub struct Attempt {
     pub sitting: Sitting,
     /// Its start; `None` if that line of the journal is damaged.
     pub start: Option<AttemptStart>,
-    /// The realization of each interval; empty if the line of its start is damaged.
+    /// The realization of each interval; empty if the line of its start is damaged, but for an adjustment, which begins as planned.
     pub models: Vec<ModelId>,
     /// What its track presents.
     pub level: Option<TrackLevel>,
