@@ -32,6 +32,9 @@ pub struct Plain {
     said: Instant,
     /// How long after that an Enter is not yet meant for it.
     unread: Duration,
+    /// Whether the begin of a line was forgotten with the page before: the Enter that ends the
+    /// line means nothing.
+    cut: bool,
     suspend_since: Option<Instant>,
 }
 
@@ -48,6 +51,7 @@ impl Plain {
             input,
             said: Instant::now(),
             unread: UNREAD / hurry.max(1),
+            cut: false,
             suspend_since: None,
         })
     }
@@ -68,8 +72,9 @@ impl Plain {
             Typed::Line(line) => line,
         };
         let unread = self.input.has_keys() && self.said.elapsed() < self.unread;
-        if unread && !line.starts_with('/') {
-            if !line.trim().is_empty() {
+        let cut = std::mem::take(&mut self.cut) && line.trim().is_empty();
+        if cut || (unread && !line.starts_with('/')) {
+            if cut || !line.trim().is_empty() {
                 self.dialogue.repeat();
             }
             return Ok(Vec::new());
@@ -114,7 +119,7 @@ impl Operator for Plain {
         let said = self.dialogue.follow(view);
         if said.new_page {
             // What was typed before a page was printed is not meant for it.
-            self.input.forget();
+            self.cut |= self.input.forget();
             self.said = Instant::now();
         }
         self.say(&said.lines)?;

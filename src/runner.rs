@@ -29,7 +29,7 @@ use study_device::{Report, Stimulus, manual};
 use study_haptics::model::Realization;
 use study_haptics::safe_play;
 use study_plan::protocol::{DeviceKind, ModelEntry, Protocol, Trial};
-use study_session::outcome::{Channel, Event, Sample};
+use study_session::outcome::{Channel, Moment, Sample};
 use study_session::session::{Effect, Ending, Input, Screen, Session, Unsaved, View, input::Claim};
 use study_session::store::{ClaimRequest, Copies, Plan, Receipt, StudyFolder};
 
@@ -152,7 +152,7 @@ impl Runner {
             only_flags,
         };
         runner.device_limp();
-        runner.perform(effects);
+        runner.perform(effects, at);
         runner
     }
 
@@ -224,32 +224,38 @@ impl Runner {
         if self.ended.is_some() {
             return;
         }
-        let effects = self.session.handle(input, self.setup.clock.now());
-        self.perform(effects);
+        let at = self.setup.clock.now();
+        let effects = self.session.handle(input, at);
+        self.perform(effects, at);
     }
 
-    fn perform(&mut self, effects: Vec<Effect>) {
-        let mut queue: VecDeque<Effect> = effects.into();
-        while let Some(effect) = queue.pop_front() {
-            let response = self.perform_one(effect);
+    /// Performs the effects of an input that was handled at a moment. It is that of all of
+    /// its events: the journal has the times that the session has, and tells which events
+    /// belong to one step.
+    fn perform(&mut self, effects: Vec<Effect>, at: Moment) {
+        let timed = |at: Moment| move |effect: Effect| (effect, at);
+        let mut queue: VecDeque<(Effect, Moment)> = effects.into_iter().map(timed(at)).collect();
+        while let Some((effect, at)) = queue.pop_front() {
+            let response = self.perform_one(effect, at);
             // Effects of the response are performed after the remaining effects; the
             // session does not depend on their order.
             if let Some(input) = response {
-                let more = self.session.handle(input, self.setup.clock.now());
-                queue.extend(more);
+                let at = self.setup.clock.now();
+                let more = self.session.handle(input, at);
+                queue.extend(more.into_iter().map(timed(at)));
             }
         }
     }
 
     /// Performs one effect; returns the input that reports an immediate result.
-    fn perform_one(&mut self, effect: Effect) -> Option<Input> {
+    fn perform_one(&mut self, effect: Effect, handled: Moment) -> Option<Input> {
         match effect {
             Effect::Claim {
                 participant,
                 operator: _,
             } => Some(self.claim(participant)),
             Effect::Record(event) => {
-                self.record(event);
+                self.send(Job::Append(handled, event));
                 None
             }
             Effect::Load {
@@ -327,11 +333,6 @@ impl Runner {
                 }))
             }
         }
-    }
-
-    fn record(&mut self, event: Event) {
-        let at = self.setup.clock.now();
-        self.send(Job::Append(at, event));
     }
 
     fn load(

@@ -548,7 +548,7 @@ fn turn(line: &str, view: &View) -> Option<Turn> {
     match line {
         "-" | "−" if own.can_lower => Some(Turn::Lower),
         "+" if own.can_higher => Some(Turn::Higher),
-        "r" if own.has_standard => Some(Turn::Standard),
+        "s" if own.has_standard => Some(Turn::Standard),
         _ => None,
     }
 }

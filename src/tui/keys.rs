@@ -77,7 +77,9 @@ pub fn of(does: Does) -> &'static str {
         Does::Advance | Does::Answer | Does::PlayAgain | Does::RetrySave => "Enter",
         Does::Agree => "y",
         Does::Refuse => "n",
-        Does::RateStopped | Does::Compare => "r",
+        Does::RateStopped => "r",
+        // Not the key that confirms a level once it has stopped.
+        Does::Compare => "s",
         Does::Lower => "←",
         Does::Higher => "→",
         Does::RestartBlock => "b",

@@ -171,6 +171,51 @@ fn hands_with_a_known_point_of_equality_find_it() {
     );
     let report = fs::read_to_string(analysis.join("report.html")).unwrap();
     assert!(report.contains("The point of subjective equality was"));
+    // Nothing of intervals, each of which is felt once and for a time.
+    let felt = "Levels were 0.5 s apart. Each could be changed at once, and confirmed after 1 s. The standard could be felt again \
+                at any time.";
+    assert!(report.contains(felt) && !report.contains("Nothing could be felt again"));
     let (code, out, err) = study(&["verify", "out"], folder.path());
     assert_eq!(code, 0, "{out}{err}");
+}
+
+/// A setting goes by the strokes of the level that was confirmed: those on the way are passed.
+#[test]
+fn settings_are_excluded_by_the_level_that_was_confirmed() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        let (code, _, err) = study(arguments, folder.path());
+        assert_eq!(code, 0, "{err}");
+    };
+    run(&["new", "--seed", "20261128", "set", "--kind", "adjustment"]);
+    let rehearse = ["rehearse", "set", "--participants", "4", "--out"];
+    run(&[&rehearse[..], &["first"]].concat());
+    let results = folder.path().join("first/set");
+    let columns = ["participant", "trial", "attempt", "strokes"];
+    let felt = cells(&results.join("intervals.csv"), &columns);
+    let columns = ["participant", "trial", "attempt", "practice"];
+    let mut settings = cells(&results.join("ratings.csv"), &columns);
+    settings.retain(|row| row[3] == "false");
+    let strokes = |row: &Vec<String>| -> Vec<u32> {
+        let own = felt.iter().filter(|f| f[..3] == row[..3]);
+        own.map(|f| f[3].parse().unwrap_or(0)).collect()
+    };
+    let all: Vec<Vec<u32>> = settings.iter().map(strokes).collect();
+    let last = |own: &Vec<u32>| *own.last().unwrap();
+    let mut sorted: Vec<u32> = all.iter().map(last).collect();
+    sorted.sort_unstable();
+    let least = sorted[sorted.len() / 2];
+    let excluded = all.iter().filter(|own| last(own) < least).count();
+    let passed = all.iter().filter(|own| own.iter().any(|n| *n < least));
+    assert!(passed.count() > excluded, "{all:?}");
+
+    // The same hands, and the rule.
+    let file = folder.path().join("set/protocol.toml");
+    let protocol = fs::read_to_string(&file).unwrap();
+    let rule = format!(r#"exclude = [{{ rule = "strokes-below", strokes = {least} }}]"#);
+    fs::write(&file, format!("{protocol}\n{rule}\n")).unwrap();
+    run(&[&rehearse[..], &["out"]].concat());
+    let part = analyzed(folder.path())["parts"][0].clone();
+    assert_eq!(part["exclusions"][0]["rows"], excluded);
+    assert_eq!(part["trials"], settings.len() - excluded);
 }

@@ -57,13 +57,20 @@ fn a_level_is_set_by_keys() {
         // At the end of the ladder.
         (KeyCode::Right, None),
         (KeyCode::Char('+'), None),
-        (KeyCode::Char('r'), Some(Turn::Standard)),
+        (KeyCode::Char('s'), Some(Turn::Standard)),
+        // It confirms a level that has stopped, which a late key must not.
+        (KeyCode::Char('r'), None),
     ] {
         let expected: Vec<Input> = turn.map(Input::Adjust).into_iter().collect();
         assert_eq!(press(&level, code), expected, "{code:?}");
         assert_eq!(press(&setting(true), code), [], "{code:?}");
     }
     assert_eq!(press(&level, KeyCode::Char(' ')), [Input::Stop]);
+    let stopped = View {
+        screen: Screen::Stopped { can_rate: true },
+        ..setting(false)
+    };
+    assert_eq!(press(&stopped, KeyCode::Char('s')), []);
     let mut surface = Surface::new(ColorDepth::Full);
     let shown = picture(&drawn(&mut surface, &level, 80, 24));
     for text in [
@@ -71,7 +78,7 @@ fn a_level_is_set_by_keys() {
         "←  weaker",
         "→  stronger",
         "they feel equal",
-        "r  reference",
+        "s  reference",
     ] {
         assert!(shown.contains(text), "{text} is not in\n{shown}");
     }
@@ -88,7 +95,8 @@ fn a_level_is_set_in_lines() {
     assert!(!said.contains("stronger"), "{said}");
     for (line, inputs) in [
         ("-", vec![Input::Adjust(Turn::Lower)]),
-        ("r", vec![Input::Adjust(Turn::Standard)]),
+        ("s", vec![Input::Adjust(Turn::Standard)]),
+        ("r", Vec::new()),
         ("", vec![Input::Advance]),
         ("/stop", vec![Input::Stop]),
         ("+", Vec::new()),

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::parts_by_keys::{PROMPT, events, of, start_with, written};
+use crate::plain::Lines;
 use crate::support::player::{play, quit};
 use crate::support::{PATIENCE, Terminal, study};
 use serde_json::Value as Json;
@@ -75,7 +76,7 @@ fn set_until(terminal: &mut Terminal, folder: &Path, there: impl Fn(&str) -> boo
             continue;
         }
         let (key, event) = match step(folder) {
-            STANDARD if !compared(folder) => ("r", "playback_started"),
+            STANDARD if !compared(folder) => ("s", "playback_started"),
             STANDARD => ("\r", "trial_done"),
             low if low < STANDARD => ("\u{1b}[C", "playback_started"),
             _ => ("-", "playback_started"),
@@ -85,11 +86,8 @@ fn set_until(terminal: &mut Terminal, folder: &Path, there: impl Fn(&str) -> boo
     panic!("the session ended before");
 }
 
-/// From below and from above, with a session that is left while a level is felt.
-#[test]
-fn adjustment_by_keys() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+/// A study of one part, with a setting from below and one from above.
+fn adjustment(folder: &Path) {
     let part = format!(
         r#"[[families]]
 id = "f"
@@ -116,7 +114,49 @@ gap_s = 0.2
     let file = folder.join("p/protocol.toml");
     let text = fs::read_to_string(&file).unwrap();
     fs::write(&file, text.replace("study-protocol/2", "study-protocol/3")).unwrap();
+}
 
+/// A step that is typed while the next level is loaded is forgotten with that page. The Enter after it is no confirmation.
+#[test]
+fn the_enter_of_a_forgotten_step_confirms_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    adjustment(folder);
+    let run = ["run", "p", "--operator", "lw", "--plain"];
+    let mut lines = Lines::start(folder, &run, None);
+    let asked = lines.play(Some("Enter alone: equal now"));
+    assert!(asked.contains("stronger"), "{}", lines.seen);
+    let until = |event: &str, n: usize| {
+        let since = Instant::now();
+        while count(folder, event) < n {
+            assert!(since.elapsed() < PATIENCE, "no {event}");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    };
+    let played = count(folder, "playback_started");
+    lines.types("+\n");
+    until("adjusted", 1);
+    // The stop is over, and half a second of loading is not.
+    std::thread::sleep(Duration::from_millis(150));
+    lines.types("+");
+    until("playback_started", played + 1);
+    // It is felt, and long enough for an Enter to be meant for it.
+    std::thread::sleep(Duration::from_millis(600));
+    lines.types("\n");
+    std::thread::sleep(Duration::from_millis(600));
+    assert_eq!(count(folder, "answered"), 0);
+    lines.types("\n");
+    until("trial_done", 1);
+    lines.child.kill().unwrap();
+    lines.child.wait().unwrap();
+}
+
+/// From below and from above, with a session that is left while a level is felt.
+#[test]
+fn adjustment_by_keys() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    adjustment(folder);
     let mut terminal = start_with(folder, &[]);
     set_until(&mut terminal, folder, |page| {
         level_is_felt(page) && count(folder, "adjusted") >= 1

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
-use study::runner::clock::VirtualClock;
+use study::runner::clock::{Clock, VirtualClock};
 use study::runner::rehearsal::first_day;
 use study::runner::{Runner, Setup};
 use study::tui::{ColorDepth, Surface};
@@ -70,6 +70,17 @@ pub(crate) fn session(
     fault: Option<InjectedFault>,
     device: fn(Options) -> Box<dyn Device>,
 ) -> (Runner, VirtualClock) {
+    session_by(|clock| Box::new(clock), loaded, orders, fault, device)
+}
+
+/// The same by a clock that reads the virtual one.
+pub(crate) fn session_by(
+    reads: fn(VirtualClock) -> Box<dyn Clock>,
+    loaded: Loaded,
+    orders: Option<FileOrders>,
+    fault: Option<InjectedFault>,
+    device: fn(Options) -> Box<dyn Device>,
+) -> (Runner, VirtualClock) {
     let clock = VirtualClock::starting_at(first_day());
     let frozen = Frozen {
         protocol: &loaded.protocol,
@@ -77,7 +88,7 @@ pub(crate) fn session(
         fingerprints: &loaded.fingerprints,
     };
     let disk = Arc::new(MemoryDisk::new());
-    let now = study::runner::clock::Clock::now(&clock);
+    let now = clock.now();
     let study = StudyFolder::open_or_create_on(disk, Path::new("results"), &frozen, now).unwrap();
     let mut options = Options::default();
     options.device.telemetry_hz = 50.0;
@@ -100,7 +111,7 @@ pub(crate) fn session(
         device_check: None,
         self_weighed: None,
         deliveries: Default::default(),
-        clock: Box::new(clock.clone()),
+        clock: reads(clock.clone()),
         threaded: false,
     };
     let config = Config {

@@ -268,3 +268,55 @@ fn what_is_not_there_is_named() {
         assert!(err.contains(what), "{err}");
     }
 }
+
+/// A level that was set is a realization, and the answer names it.
+#[test]
+fn a_level_that_was_set_is_hidden_until_it_is_revealed() {
+    let home = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        let (code, out, err) = study(arguments, home.path());
+        assert_eq!(code, 0, "{out}{err}");
+        out
+    };
+    run(&["new", "--seed", "20261123", "set", "--kind", "adjustment"]);
+    run(&["rehearse", "set", "--participants", "1", "--out", "out"]);
+    let rehearsed = StudyFolder::open(&home.path().join("out/set")).unwrap();
+    let loaded = load::frozen(&rehearsed).unwrap();
+    let frozen = Frozen {
+        protocol: &loaded.protocol,
+        files: &loaded.files,
+        fingerprints: &loaded.fingerprints,
+    };
+    let simulated = rehearsed.sessions().unwrap().remove(0);
+    let began = simulated.entries[0].at;
+    let real_one = StudyFolder::open_or_create(&home.path().join("real"), &frozen, began).unwrap();
+    let mut claimed = real_one.claim(&real("P01")).unwrap();
+    let mut journal = claimed.folder.journal().unwrap();
+    for entry in &simulated.entries {
+        let mut event = entry.event.clone();
+        if let Event::SessionStarted(start) = &mut event {
+            start.participant = participant("P01");
+            start.seat = claimed.seat;
+        }
+        journal.append(entry.at, &event).unwrap();
+    }
+    drop((journal, claimed));
+    let level = simulated.entries.iter().find_map(|e| match &e.event {
+        Event::Answered { answer, .. } => answer.number(),
+        _ => None,
+    });
+    let answer = format!("equal = {}", level.unwrap());
+    let hidden = "the level is confirmed";
+    let lines = run(&["replay", "real", "P01"]);
+    assert!(
+        lines.contains(hidden) && !lines.contains(&answer),
+        "{lines}"
+    );
+    let document = run(&["replay", "real", "P01", "--json"]);
+    assert!(!document.contains("\"number\":"), "{document}");
+    let lines = run(&["replay", "real", "P01", "--reveal", "a test"]);
+    assert!(
+        lines.contains(&answer) && !lines.contains(hidden),
+        "{lines}"
+    );
+}

@@ -172,10 +172,10 @@ fn practice_that_ended_before_or_after_its_criterion_is_a_problem() {
     }
 }
 
-/// The changes of a level are replayed: one to the other end of the ladder is a problem, and so is an answer that is not the
-/// level that was felt last.
+/// The changes of a level are replayed: one to the other end of the ladder is a problem, and so are one that comes before the
+/// level was felt, an answer that is not the level that was felt last, and whatever else no session records.
 #[test]
-fn a_change_of_many_steps_and_another_answer_are_problems() {
+fn changes_and_answers_of_no_session_are_problems() {
     let home = tempfile::tempdir().unwrap();
     let run = |arguments: &[&str]| {
         let (code, out, err) = crate::support::study(arguments, home.path());
@@ -196,47 +196,155 @@ fn a_change_of_many_steps_and_another_answer_are_problems() {
     let events: Vec<Event> = all[0].entries.iter().map(|e| e.event.clone()).collect();
 
     // The same session in a journal of its own, but for one event.
-    let planted = |change: fn(&mut Event) -> bool| {
+    let planted = |change: fn(Vec<Event>) -> Vec<Event>| {
         let results = tempfile::tempdir().unwrap();
         let study = open(results.path());
         let id = all[0].participant.as_str();
         let mut claimed = study.claim(&request(id, SeatKind::Simulated)).unwrap();
         let mut journal = claimed.folder.journal().unwrap();
-        let mut events = events.clone();
-        assert!(events.iter_mut().any(change));
+        let events = change(events.clone());
         let timed: Vec<(Moment, &Event)> = (0..).map(at).zip(&events).collect();
         journal.append_all(&timed).unwrap();
         let mut found = problems(&study.verify(Some(&protocol)).unwrap());
         found.retain(|problem| problem.contains("adjustment `equal`"));
         found
     };
-    assert_eq!(planted(|_| true), [""; 0]);
-    let jumped = planted(|event| match event {
-        Event::Adjusted {
-            to,
-            standard: false,
-            ..
-        } => {
-            let step: usize = to.as_str().rsplit('.').next().unwrap().parse().unwrap();
-            *to = model(if step > 10 { "detent.1" } else { "detent.21" });
-            true
-        }
-        _ => false,
+    assert_eq!(planted(|events| events), [""; 0]);
+    let forged: [(fn(Vec<Event>) -> Vec<Event>, &str); 9] = [
+        (jump, "which is not a step"),
+        (skip, "and what came before was not felt"),
+        (change_later, "and is not under way"),
+        (begin_elsewhere, "does not begin as planned"),
+        (answer_another, "and another level was felt last"),
+        (answer_nothing, "and another level was felt last"),
+        (answer_unfelt, "and its level was not felt"),
+        (answer_again, "and is not under way"),
+        (correct, "and it was felt"),
+    ];
+    for (change, expected) in forged {
+        let found = planted(change);
+        assert_eq!(found.len(), 1, "{expected}: {found:?}");
+        assert!(found[0].ends_with(expected), "{expected}: {found:?}");
+    }
+}
+
+/// The first change of a level by a step.
+fn changed(events: &[Event]) -> usize {
+    let changes = |event: &Event| {
+        matches!(
+            event,
+            Event::Adjusted {
+                standard: false,
+                ..
+            }
+        )
+    };
+    events.iter().position(changes).unwrap()
+}
+
+/// The first answer to a trial.
+fn answered(events: &[Event]) -> usize {
+    let answers = |event: &Event| {
+        matches!(
+            event,
+            Event::Answered {
+                form: FormId::Trial { .. },
+                ..
+            }
+        )
+    };
+    events.iter().position(answers).unwrap()
+}
+
+fn answer(events: &mut [Event]) -> &mut Answer {
+    let at = answered(events);
+    match &mut events[at] {
+        Event::Answered { answer, .. } => answer,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// To the other end of the ladder.
+fn jump(mut events: Vec<Event>) -> Vec<Event> {
+    let at = changed(&events);
+    let Event::Adjusted { to, .. } = &mut events[at] else {
+        panic!("a change");
+    };
+    let step: usize = to.as_str().rsplit('.').next().unwrap().parse().unwrap();
+    *to = model(if step > 10 { "detent.1" } else { "detent.21" });
+    events
+}
+
+/// A second change while the first one is under way.
+fn skip(mut events: Vec<Event>) -> Vec<Event> {
+    let at = changed(&events);
+    let again = events[at].clone();
+    events.insert(at, again);
+    events
+}
+
+/// A change after the level was confirmed.
+fn change_later(mut events: Vec<Event>) -> Vec<Event> {
+    let late = events[changed(&events)].clone();
+    let at = answered(&events);
+    events.insert(at + 1, late);
+    events
+}
+
+/// A trial that begins at the standard.
+fn begin_elsewhere(mut events: Vec<Event>) -> Vec<Event> {
+    let begun = events.iter_mut().find_map(|event| match event {
+        Event::AttemptStarted { intervals, .. } => intervals.last_mut(),
+        _ => None,
     });
-    assert_eq!(jumped.len(), 1, "{jumped:?}");
-    assert!(jumped[0].ends_with("which is not a step"), "{jumped:?}");
-    let answered = planted(|event| match event {
-        Event::Answered {
-            form: FormId::Trial { .. },
-            answer: Answer::Number(level),
-            ..
-        } => {
-            *level += 0.05;
-            true
-        }
-        _ => false,
-    });
-    assert_eq!(answered.len(), 1, "{answered:?}");
-    let another = "and another level was felt last";
-    assert!(answered[0].ends_with(another), "{answered:?}");
+    *begun.unwrap() = model("detent.11");
+    events
+}
+
+fn answer_another(mut events: Vec<Event>) -> Vec<Event> {
+    match answer(&mut events) {
+        Answer::Number(level) => *level += 0.05,
+        other => panic!("{other:?}"),
+    }
+    events
+}
+
+fn answer_nothing(mut events: Vec<Event>) -> Vec<Event> {
+    *answer(&mut events) = Answer::Declined {
+        reason: "tired".to_owned(),
+    };
+    events
+}
+
+/// The answer comes before the end of what was felt.
+fn answer_unfelt(mut events: Vec<Event>) -> Vec<Event> {
+    let at = answered(&events);
+    events.swap(at - 1, at);
+    events
+}
+
+fn answer_again(mut events: Vec<Event>) -> Vec<Event> {
+    let at = answered(&events);
+    let again = events[at].clone();
+    events.insert(at + 1, again);
+    events
+}
+
+/// The level is typed later.
+fn correct(mut events: Vec<Event>) -> Vec<Event> {
+    let at = answered(&events);
+    let Event::Answered { form, question, .. } = events[at].clone() else {
+        panic!("an answer");
+    };
+    let corrected = Event::Corrected {
+        form,
+        question,
+        from: None,
+        to: Answer::Number(1.0),
+        reason: "a slip".to_owned(),
+        by: study_session::outcome::Author::Experimenter,
+        channel: None,
+    };
+    events.insert(at + 1, corrected);
+    events
 }

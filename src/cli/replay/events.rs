@@ -194,8 +194,9 @@ pub(super) fn words(event: &Event, revealed: bool) -> String {
             format!("{} ends{felt}{by_hand}{verdict}", of_interval(*interval))
         }
         Event::Adjusted { standard: true, .. } => "the standard is asked for".to_owned(),
-        Event::Adjusted { to, .. } if revealed => format!("it is changed to {to}"),
-        Event::Adjusted { .. } => "it is changed by a step".to_owned(),
+        Event::Adjusted { to, .. } if revealed => format!("{to} comes next"),
+        // A step away, or after the standard the same.
+        Event::Adjusted { .. } => "the next level comes, or the same again".to_owned(),
         Event::Replayed { .. } => "it is felt again before the answer".to_owned(),
         Event::TelemetryLost { reason, .. } => {
             format!(

@@ -71,7 +71,7 @@ impl Reader<'_> {
         })
     }
 
-    /// Whether an event is the answer of a trial of adjustment, which names the level that was felt.
+    /// Whether an event is the answer of a trial of adjustment, which names the level that was felt: a realization.
     pub(super) fn names_level(&self, event: &Event) -> bool {
         let (Event::Answered { form, question, .. } | Event::Corrected { form, question, .. }) =
             event

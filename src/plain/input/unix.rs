@@ -61,14 +61,17 @@ impl Lines {
         Ok(kill_process(getpid(), Signal::STOP)?)
     }
 
-    /// Forgets what a person has typed and the program has not read. A pipe is not a
-    /// person: its lines are kept.
-    pub(in crate::plain) fn forget(&mut self) {
-        if self.before.is_some() {
-            self.bytes.clear();
-            // A terminal that cannot be flushed is noticed when it is read.
-            let _ = tcflush(rustix::stdio::stdin(), QueueSelector::IFlush);
+    /// Forgets what a person has typed and the program has not read; whether that was the
+    /// begin of a line. A pipe is not a person: its lines are kept.
+    pub(in crate::plain) fn forget(&mut self) -> bool {
+        if self.before.is_none() {
+            return false;
         }
+        let begun = self.bytes.last().is_some_and(|b| *b != b'\n');
+        self.bytes.clear();
+        // A terminal that cannot be flushed is noticed when it is read.
+        let _ = tcflush(rustix::stdio::stdin(), QueueSelector::IFlush);
+        begun
     }
 
     /// Switches between lines and single keys, on a terminal.

@@ -72,16 +72,19 @@ impl Lines {
         Ok(())
     }
 
-    /// Forgets what a person has typed and the program has not read. A pipe is not a
-    /// person: its lines are kept.
-    pub(in crate::plain) fn forget(&mut self) {
-        if let Source::Console { line, .. } = &mut self.source {
-            line.clear();
-            // A console that cannot be read is noticed when the next key is read.
-            while crossterm::event::poll(Duration::ZERO).unwrap_or(false)
-                && crossterm::event::read().is_ok()
-            {}
-        }
+    /// Forgets what a person has typed and the program has not read; whether that was the
+    /// begin of a line. A pipe is not a person: its lines are kept.
+    pub(in crate::plain) fn forget(&mut self) -> bool {
+        let Source::Console { line, .. } = &mut self.source else {
+            return false;
+        };
+        let begun = !line.is_empty();
+        line.clear();
+        // A console that cannot be read is noticed when the next key is read.
+        while crossterm::event::poll(Duration::ZERO).unwrap_or(false)
+            && crossterm::event::read().is_ok()
+        {}
+        begun
     }
 
     /// Switches between lines and single keys, on a console.

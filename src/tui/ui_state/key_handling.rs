@@ -363,7 +363,7 @@ fn turn(key: Key, view: &View) -> Option<Turn> {
     match key {
         Key::Left | Key::Char('-') if own.can_lower => Some(Turn::Lower),
         Key::Right | Key::Char('+') if own.can_higher => Some(Turn::Higher),
-        Key::Char('r' | 'R') if own.has_standard => Some(Turn::Standard),
+        Key::Char('s' | 'S') if own.has_standard => Some(Turn::Standard),
         _ => None,
     }
 }

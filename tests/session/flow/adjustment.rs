@@ -1,11 +1,11 @@
 //! Sessions of adjustment: each change is one step and an event, and what was felt last is the answer.
 
 use super::part_rig::adjustment;
-use super::rig::Rig;
+use super::rig::{DeviceMood, Rig};
 use study_base::text::QuestionId;
 use study_plan::protocol::{Answer, Protocol, Stimuli, Turn};
 use study_session::outcome::{Event, Failure, FormId, fold};
-use study_session::session::{Ending, Input, Screen};
+use study_session::session::{Effect, Ending, Input, Screen};
 
 /// The standard is step 21 of the ladder, 2.0.
 const STANDARD: usize = 21;
@@ -186,6 +186,30 @@ fn a_stopped_level_goes_on() {
     assert!((set - (1.0 + 0.05 * first as f64)).abs() < 1e-9, "{set}");
 }
 
+/// After the longest exposure of the standard the level comes, the first time and when it is felt again: nobody has to be
+/// quicker than that. Nothing is confirmed.
+#[test]
+fn after_the_standard_comes_the_level() {
+    let mut rig = Rig::new(adjustment("standard = 2.0\nexposure = { max_s = 5 }"));
+    rig.until("Playing");
+    for turn in [Turn::Higher, Turn::Lower] {
+        assert_eq!(step(&rig), STANDARD);
+        rig.wait(5.0).wait(1.0);
+        let level = step(&rig);
+        assert_ne!(level, STANDARD);
+        assert!(!rig.view().adjusting.unwrap().at_standard);
+        does(&mut rig, Input::Adjust(turn));
+        let turned = step(&rig);
+        assert_eq!(turned.abs_diff(level), 1);
+        does(&mut rig, Input::Adjust(Turn::Standard));
+    }
+    assert_eq!(step(&rig), STANDARD);
+    assert_eq!(rig.count(|e| matches!(e, Event::Answered { .. })), 0);
+    // A stop is a stop.
+    rig.wait(0.5).send(Input::Stop);
+    assert_eq!(rig.view().screen, Screen::Stopped { can_rate: false });
+}
+
 /// A level is not compared with what was felt before a long pause: the trial then begins again.
 #[test]
 fn a_level_that_was_stopped_for_long_begins_again() {
@@ -204,6 +228,25 @@ fn a_level_that_was_stopped_for_long_begins_again() {
         let expected = if again { STANDARD } else { first + 1 };
         assert_eq!(step(&rig), expected, "{seconds} s");
     }
+}
+
+/// A pause that is asked for during a change, and a table that is loaded at the very end of the gap: nothing plays before
+/// the pause is over.
+#[test]
+fn nothing_plays_in_a_pause_that_began_during_a_change() {
+    let mut rig = Rig::new(adjustment(""));
+    rig.until("Playing");
+    rig.device = DeviceMood::Silent;
+    rig.wait(0.5).send(Input::Adjust(Turn::Higher));
+    let playback = rig.playback;
+    rig.send(Input::Pause).send(Input::DeviceStopped(playback));
+    let starts = |rig: &Rig| rig.effects.iter().filter(|e| **e == Effect::Start).count();
+    let before = starts(&rig);
+    rig.wait(1.0).send(Input::DeviceLoaded).wait(5.0);
+    assert!(matches!(rig.view().screen, Screen::Paused { .. }));
+    assert_eq!(starts(&rig), before);
+    rig.send(Input::Advance).wait(0.1);
+    assert_eq!(starts(&rig), before + 1);
 }
 
 /// Towards the standard, one step at a time, and a fault and a stop on the way.

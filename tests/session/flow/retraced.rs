@@ -3,15 +3,15 @@
 use super::between::asked;
 use super::consent::signed;
 use super::part_rig::{
-    QUEST, STAIRCASE, answering, beside_a_reference, finish, identification, magnitudes, pairs,
-    reference, second, similarity, track, until,
+    QUEST, STAIRCASE, adjustment, answering, beside_a_reference, finish, identification,
+    magnitudes, pairs, reference, second, similarity, track, until,
 };
 use super::rig::Rig;
 use super::studies::{plain, rich};
 use proptest::prelude::*;
 use std::sync::Arc;
 use study_base::text::QuestionId;
-use study_plan::protocol::{Answer, Occasion, Protocol};
+use study_plan::protocol::{Answer, Occasion, Protocol, Turn};
 use study_session::outcome::{Author, Entry, Event, FormId};
 use study_session::page::{Kind, participant};
 use study_session::session::retrace::{self, Shown};
@@ -131,6 +131,7 @@ fn each_kind_of_part_shows_the_same_pages_again() {
         beside_a_reference(),
         magnitudes(),
         similarity(""),
+        adjustment("standard = 2.0\npractice = 1"),
     ] {
         let mut rig = recording(&protocol);
         finish(&mut rig);
@@ -170,6 +171,53 @@ fn what_is_felt_again_before_the_answer_shows_the_same_pages_again() {
     finish(&mut rig);
     assert_eq!(rig.count(|e| matches!(e, Event::Replayed { .. })), 1);
     assert_same(&rig, &protocol);
+}
+
+/// Changes, the standard again, a stop and the longest exposure.
+#[test]
+fn a_level_that_is_set_shows_the_same_pages_again() {
+    let protocol = adjustment("standard = 2.0\nexposure = { max_s = 5 }");
+    let mut rig = recording(&protocol);
+    rig.until("Playing");
+    for input in [
+        Input::Advance,
+        Input::Adjust(Turn::Higher),
+        Input::Stop,
+        Input::PlayAgain,
+        Input::Adjust(Turn::Standard),
+        Input::Advance,
+        Input::Adjust(Turn::Lower),
+    ] {
+        rig.wait(0.5).send(input).wait(1.0);
+    }
+    rig.wait(5.0);
+    assert_eq!(rig.view().screen, Screen::Stopped { can_rate: true });
+    rig.wait(0.5).send(Input::RateStopped);
+    finish(&mut rig);
+    assert_eq!(rig.count(|e| matches!(e, Event::AttemptFailed { .. })), 0);
+    assert_same(&rig, &protocol);
+}
+
+/// At each level the steps that were possible there, and not those of the level that came next.
+#[test]
+fn the_ends_of_a_ladder_are_shown_where_they_were() {
+    let protocol = adjustment("");
+    let mut rig = recording(&protocol);
+    rig.until("Playing");
+    let steps = |view: &View| {
+        let own = view.adjusting.as_ref().unwrap();
+        (own.can_lower, own.can_higher)
+    };
+    let mut seen = vec![steps(&rig.view())];
+    while seen.last() == Some(&(true, true)) {
+        rig.wait(0.5).send(Input::Adjust(Turn::Lower)).wait(1.0);
+        seen.push(steps(&rig.view()));
+    }
+    assert_eq!(seen.last(), Some(&(false, true)));
+    let pages = retraced(&rig, &protocol);
+    let playing = pages.iter().map(|page| &page.view);
+    let playing = playing.filter(|view| matches!(view.screen, Screen::Playing { .. }));
+    assert_eq!(playing.map(steps).collect::<Vec<_>>(), seen);
 }
 
 /// Also where the program was left: the last page is the one that was on the screen.

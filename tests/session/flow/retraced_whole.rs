@@ -6,11 +6,13 @@ use crate::blinding::{self, LOOK};
 use crate::support::repository;
 use std::path::Path;
 use std::sync::Arc;
+use std::time::Duration;
+use study::runner::clock::{Clock, VirtualClock};
 use study_analysis::load::load;
 use study_device::Device;
 use study_device::faults::FaultPlan;
 use study_device::virtual_device::{Options, VirtualDevice};
-use study_session::outcome::{Entry, Event};
+use study_session::outcome::{Entry, Event, Moment};
 use study_session::session::{Input, Screen, View, retrace};
 
 fn inputs(view: &View) -> Vec<Input> {
@@ -30,6 +32,20 @@ fn failing(mut options: Options) -> Box<dyn Device> {
     Box::new(VirtualDevice::new(options))
 }
 
+/// A clock of which no two readings are alike, as of that of a machine.
+struct Ticking(VirtualClock);
+
+impl Clock for Ticking {
+    fn now(&self) -> Moment {
+        self.0.advance(Duration::from_nanos(1));
+        self.0.now()
+    }
+}
+
+fn ticking(clock: VirtualClock) -> Box<dyn Clock> {
+    Box::new(Ticking(clock))
+}
+
 /// A load may be over between two looks.
 fn look(pages: &mut Vec<String>, view: &View) {
     if !matches!(view.screen, Screen::Loading { .. }) {
@@ -44,7 +60,7 @@ fn shipped_studies_on_a_failing_device_show_the_same_pages_again() {
         let mut loaded = load(Path::new(&path)).unwrap();
         let orders = loaded.orders.take();
         let protocol = Arc::new(loaded.protocol.clone());
-        let (mut runner, clock) = blinding::session(loaded, orders, None, failing);
+        let (mut runner, clock) = blinding::session_by(ticking, loaded, orders, None, failing);
         let (mut shown, mut looks) = (Vec::new(), 0);
         loop {
             let view = runner.view();

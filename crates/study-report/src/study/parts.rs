@@ -9,7 +9,7 @@ use study_plan::procedure::{Choose, Rule, SearchRule};
 use study_plan::protocol::identification::{Criterion, Drawn, Feedback};
 use study_plan::protocol::pairs::IntervalOrder;
 use study_plan::protocol::parts::{Compared, Part, Task, TrackRules};
-use study_plan::protocol::{Protocol, Relative};
+use study_plan::protocol::{Adjustment, Protocol, Relative};
 
 /// Figures and sentences on the trials of each part.
 pub(super) fn part_reports(protocol: &Protocol, parts: &[PartAnalysis]) -> Vec<PartReport> {
@@ -195,6 +195,10 @@ fn trials(protocol: &Protocol, part: &Part) -> String {
             search_rule(&own.rule)
         )),
     }
+    if let Task::Adjustment(own) = &part.task {
+        text.push(levels(part, own));
+        return text.join(" ");
+    }
     let exposure = &part.exposure;
     let mut felt = match part.gap_s > 0.0 {
         true => format!("Intervals were {} s apart.", part.gap_s),
@@ -218,6 +222,24 @@ fn trials(protocol: &Protocol, part: &Part) -> String {
     };
     text.push(felt.trim_start().to_owned());
     text.join(" ")
+}
+
+/// How the levels that are set follow one another.
+fn levels(part: &Part, own: &Adjustment) -> String {
+    let exposure = &part.exposure;
+    let mut text = format!("Levels were {} s apart. Each could be changed ", part.gap_s);
+    text += &match exposure.min_s > 0.0 {
+        true => format!("at once, and confirmed after {} s", exposure.min_s),
+        false => "or confirmed at once".to_owned(),
+    };
+    if let Some(most) = exposure.max_s {
+        text += &format!("; it was felt for at most {most} s at a time");
+    }
+    text += match own.standard {
+        Some(_) => ". The standard could be felt again at any time.",
+        None => ".",
+    };
+    text
 }
 
 /// How the pairs of a search are chosen.

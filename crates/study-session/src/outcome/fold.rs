@@ -411,7 +411,15 @@ impl History {
     fn attempt_mut(&mut self, trial: u32, attempt: u32) -> Option<&mut Attempt> {
         let last = self.attempts(trial);
         if attempt > last {
-            self.begin(trial, Attempt::new(attempt, &self.sitting, None));
+            let mut begun = Attempt::new(attempt, &self.sitting, None);
+            // Each change adds an interval to the first ones, which are planned.
+            if let Some(Stimuli::Adjusted { start, standard }) =
+                self.planned(trial).map(|t| &t.stimuli)
+            {
+                begun.models = standard.iter().chain([start]).cloned().collect();
+                begun.adjusts(standard.is_some());
+            }
+            self.begin(trial, begun);
         }
         let attempts = &mut self.trials.get_mut(&trial)?.attempts;
         attempts.iter_mut().rfind(|a| a.number == attempt)

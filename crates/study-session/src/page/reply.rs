@@ -147,6 +147,8 @@ struct Pending {
     key: String,
     /// The screen that must be gone once it is accepted.
     leaves: Option<Screen>,
+    /// Whether it confirms a level: an answer that is recorded once the device has stopped.
+    confirms: bool,
 }
 
 /// A reply that has arrived.
@@ -259,9 +261,11 @@ impl Exchange {
             Some(Err(why)) => Outcome::Refused(why),
             Some(Ok(input)) => {
                 let leaves = matches!(input, Input::Answer(_) | Input::Consent(_) | Input::Back);
+                let sets = view.adjusting.as_ref().is_some_and(|own| !own.at_standard);
                 self.pending = Some(Pending {
                     key: reply.key,
                     leaves: leaves.then(|| view.screen.clone()),
+                    confirms: sets && matches!(input, Input::Advance | Input::RateStopped),
                 });
                 return Some(input);
             }
@@ -283,11 +287,17 @@ impl Exchange {
     /// Settles the reply that the session has, once everything is on disk.
     fn settle_pending(&mut self, view: &View) {
         let done = view.line.all_saved && view.unsaved.is_empty();
-        let Some(pending) = self.pending.take_if(|_| done) else {
+        // Nothing follows what is saved when the program is left.
+        let stops = matches!(view.screen, Screen::Stopping | Screen::Saving);
+        let settled = |pending: &mut Pending| done && !(pending.confirms && stops);
+        let Some(pending) = self.pending.take_if(settled) else {
             return;
         };
         let stays = |screen| same_page(screen, &view.screen);
-        let outcome = match pending.leaves.as_ref().is_some_and(stays) {
+        // A level is still to be set, or was lost with the device.
+        let unset = view.adjusting.is_some() || matches!(view.screen, Screen::DeviceTrouble { .. });
+        let lost = pending.confirms && unset;
+        let outcome = match lost || pending.leaves.as_ref().is_some_and(stays) {
             true => Outcome::Refused(refusal(view)),
             false => Outcome::Saved,
         };

@@ -1,10 +1,12 @@
 use super::*;
 use crate::outcome::FormId;
 use crate::session::Input;
-use crate::session::view::{Correctable, DeviceState, MessageKind, StatusLine};
+use crate::session::view::{Adjusting, Correctable, DeviceState, MessageKind, StatusLine};
 use std::sync::Arc;
 use study_plan::protocol::kinds::{QuestionKind, Rating};
-use study_plan::protocol::{Answer, DeviceKind, Entry, Exposure, Given, Question, example};
+use study_plan::protocol::{
+    AdjustmentWords, Answer, DeviceKind, Entry, Exposure, Given, Question, example,
+};
 
 fn view(screen: Screen) -> View {
     View {
@@ -311,4 +313,66 @@ fn a_reply_counts_once_and_on_its_own_page() {
     };
     let reason = "too loud".to_owned();
     assert_eq!(answers[0].1, Answer::Declined { reason });
+}
+
+/// A level that is confirmed is an answer: its reply is settled once the device has stopped and the level is on disk, and
+/// is refused if it was not taken.
+#[test]
+fn a_confirmed_level_is_saved_only_after_the_stop() {
+    use reply::{Exchange, Outcome, Sent};
+    let setting = |screen: Screen| View {
+        adjusting: Some(Adjusting {
+            prompt: "Until both feel equal.".to_owned(),
+            words: AdjustmentWords {
+                lower: "weaker".to_owned(),
+                higher: "stronger".to_owned(),
+                confirm: "equal".to_owned(),
+            },
+            can_lower: true,
+            can_higher: true,
+            has_standard: false,
+            at_standard: false,
+        }),
+        ..view(screen)
+    };
+    let playing = setting(Screen::Playing {
+        since_s: 3.0,
+        keep_exploring: false,
+        exposure: Exposure::default(),
+        interval: None,
+    });
+    let stopping = setting(Screen::Stopping);
+    let reference = view(Screen::Reference {
+        prompt: "Feel the reference.".to_owned(),
+        wait_s: 0.0,
+    });
+    let stopped = setting(Screen::Stopped { can_rate: true });
+    let trouble = view(Screen::DeviceTrouble {
+        what: "no bus".to_owned(),
+        can_go_on: false,
+    });
+    let refused = Outcome::Refused(String::new());
+    for (then, outcome) in [
+        (&reference, &Outcome::Saved),
+        (&stopped, &refused),
+        (&trouble, &refused),
+    ] {
+        let mut exchange = Exchange::new("run".to_owned());
+        exchange.show(&playing);
+        let confirm = br#"{"page":"run.1","key":"1","shown_ms":3000,"does":"advance"}"#;
+        assert!(exchange.arrive(Sent::read(confirm).unwrap()));
+        assert_eq!(exchange.input(&playing), Some(Input::Advance));
+        // Nothing is recorded yet, and so everything is on disk.
+        exchange.show(&stopping);
+        assert_eq!(exchange.outcome("1"), None);
+        // Nor is it if the program is left meanwhile.
+        exchange.show(&view(Screen::Saving));
+        assert_eq!(exchange.outcome("1"), None);
+        let mut unsaved = then.clone();
+        unsaved.line.all_saved = false;
+        exchange.show(&unsaved);
+        assert_eq!(exchange.outcome("1"), None);
+        exchange.show(then);
+        assert_eq!(exchange.outcome("1"), Some(outcome), "{:?}", then.screen);
+    }
 }

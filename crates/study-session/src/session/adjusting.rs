@@ -65,7 +65,7 @@ impl Session {
         self.record(adjusted, at);
     }
 
-    /// Enter: after the standard comes the level, and a level is confirmed.
+    /// Enter: after the standard comes the level, as it does after the longest exposure, and a level is confirmed.
     pub(super) fn leave_level(&mut self, at: Moment) {
         let Some(attempt) = self.history.open().map(|open| open.attempt) else {
             return;
@@ -83,6 +83,12 @@ impl Session {
         {
             *confirmed = Some(by);
         }
+    }
+
+    /// Whether the standard is felt, or comes next, in an adjustment under way.
+    pub(super) fn feels_standard(&self) -> bool {
+        let open = self.history.open();
+        self.adjusting().is_some() && open.is_some_and(|open| open.attempt.is_at_standard())
     }
 
     /// A confirmation that is entered now.

@@ -122,8 +122,25 @@ impl Retrace<'_> {
             | Event::Remark { .. }
             | Event::Revealed { .. }
             | Event::TrialClosed { .. }
-            | Event::PointLeftOut { .. }
-            | Event::Adjusted { .. } => self.take(),
+            | Event::PointLeftOut { .. } => self.take(),
+            Event::Adjusted { .. } => {
+                // The steps on the page are those from the level before.
+                self.show(at);
+                self.take();
+                // Else it is stopped first.
+                if matches!(self.session.phase, Phase::Stopped { .. }) {
+                    self.automatic(|session| session.load_interval(at));
+                }
+            }
+            // A level is confirmed where it is felt, or on the page after a stop.
+            Event::Answered { form, question, .. }
+                if self.session.set_in(*form) == Some(question) =>
+            {
+                if !self.is_same_step(at) {
+                    self.show(at);
+                }
+                self.take_and_go_on();
+            }
             Event::Corrected { form, reason, .. }
                 if reason != STEP_BACK || !self.is_open(*form) =>
             {

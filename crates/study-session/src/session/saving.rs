@@ -189,9 +189,7 @@ impl Session {
             let ending = ending.clone();
             return self.end(ending);
         }
-        if self.saves.trouble.is_none() && self.paused.is_none() {
-            self.end_gap(at);
-        }
+        self.end_gap(at);
         self.end_exposure(at);
         self.device_deadlines(at);
         self.watch_clock(at);

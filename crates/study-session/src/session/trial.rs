@@ -111,8 +111,12 @@ impl Session {
         (gap_s > 0.0).then_some((ended, gap_s * late))
     }
 
-    /// Starts the next interval at the end of the gap, unless that took too long.
+    /// Starts the next interval at the end of the gap, unless that took too long. Nothing starts in a pause, or while the
+    /// journal cannot be written.
     pub(super) fn end_gap(&mut self, at: Moment) {
+        if self.saves.trouble.is_some() || self.paused.is_some() {
+            return;
+        }
         if let Phase::Gap {
             ended,
             start_after_s,
@@ -406,7 +410,11 @@ impl Session {
             && let Some(max_s) = self.exposure().max_s
             && at.seconds_since(since) >= max_s
         {
-            self.request_stop(false, false, at);
+            match self.feels_standard() {
+                // The level follows, as after Enter.
+                true => self.leave_level(at),
+                false => self.request_stop(false, false, at),
+            }
         }
     }
 

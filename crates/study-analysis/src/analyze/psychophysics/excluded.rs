@@ -1,10 +1,10 @@
 //! What the exclusion rules see of the trials of a part.
 
 use super::part_data::{Intervals, asked};
-use crate::analyze::exclude::force;
+use crate::analyze::exclude::force as said;
 use std::collections::BTreeMap;
 use study_base::text::{ModelId, ParticipantId};
-use study_plan::protocol::rules::{Answers, Given, Realization, Trial, Trials};
+use study_plan::protocol::rules::{Answers, Force, Given, Realization, Trial, Trials};
 use study_plan::protocol::{Part, Protocol, Role};
 use study_session::outcome::RatingRow;
 
@@ -41,12 +41,19 @@ pub(super) fn trials<'a>(
             duplicate_of: original(id),
         })
         .collect();
-    let trial = |row: &&'a RatingRow| Trial {
-        participant: participants[&row.participant],
-        realization: (row.model.as_ref()).and_then(|id| places.get(id).copied()),
-        answer: answer(row),
-        strokes: intervals.strokes(row),
-        force: (row.fidelity.as_ref()).map(|worst| force(worst.verdict)),
+    let sets = part.task.adjustment().is_some();
+    let trial = |row: &&'a RatingRow| {
+        let (strokes, force) = match sets {
+            true => of_a_setting(row, intervals),
+            false => (intervals.strokes(row), worst(row)),
+        };
+        Trial {
+            participant: participants[&row.participant],
+            realization: (row.model.as_ref()).and_then(|id| places.get(id).copied()),
+            answer: answer(row),
+            strokes,
+            force,
+        }
     };
     Trials {
         answers: match numbers.is_empty() {
@@ -58,4 +65,22 @@ pub(super) fn trials<'a>(
         realizations,
         trials: rows.iter().map(trial).collect(),
     }
+}
+
+/// The force of the worst playback of a trial.
+fn worst(row: &RatingRow) -> Option<Force> {
+    row.fidelity.as_ref().map(|worst| said(worst.verdict))
+}
+
+/// Strokes and force of a level that was set: levels on the way are felt for a moment, in which nothing has to be explored and
+/// little can be verified. A wrong force is one on the way, too.
+fn of_a_setting(row: &RatingRow, intervals: &Intervals<'_>) -> (Option<u32>, Option<Force>) {
+    let set = intervals.counted(row).last();
+    let strokes = set.and_then(|set| set.strokes);
+    let own = set.and_then(|set| set.fidelity.as_ref());
+    let force = match worst(row) {
+        Some(Force::Unverified) => own.map(|own| said(own.verdict)),
+        other => other,
+    };
+    (strokes, force)
 }

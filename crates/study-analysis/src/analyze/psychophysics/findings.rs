@@ -1,11 +1,12 @@
 //! The findings of a part that is no rating.
 
 mod rankings;
+mod settings;
 
 pub(super) use rankings::of_rankings;
+pub(super) use settings::settings_of;
 
 use super::abilities::AbilityDifference;
-use super::adjustment::Adjusted;
 use super::again::Again;
 use super::identification::Identified;
 use super::over_participants::{ConditionModel, Contrast, FTest, GroupSensitivity};
@@ -405,55 +406,6 @@ fn map_follows(facts: &PartFacts, name: &str, fit: &MapFit, realizations: usize)
         );
     }
     finding
-}
-
-/// Whether settings differ from the standard, if that is a level, and whether they depend on their start.
-pub(super) fn settings_of(facts: &PartFacts, found: &Adjusted) -> Vec<PartFinding> {
-    let error = found.error.as_ref().map(|error| {
-        let question = PartQuestion::Adjusted;
-        let (mean, p) = (error.mean.number(), error.p.number());
-        let (Some(mean), Some(p)) = (mean, p) else {
-            return facts.undefined(question, &error.p, 0);
-        };
-        let test = Test::single(TestKind::OneSampleT, p, facts.alpha);
-        let test = test.with("t", error.t.number(), &[error.df.number()]);
-        of_difference(
-            facts,
-            question,
-            test,
-            estimate("difference", mean, &error.ci95),
-        )
-    });
-    let (start, question) = (&found.start, PartQuestion::Starts);
-    let (mean, p) = (start.difference.number(), start.p.number());
-    let sides = match (mean, p) {
-        (Some(mean), Some(p)) => {
-            let test = Test::single(TestKind::OneSampleT, p, facts.alpha);
-            let test = test.with("t", start.t.number(), &[start.df.number()]);
-            of_difference(
-                facts,
-                question,
-                test,
-                estimate("difference", mean, &start.ci95),
-            )
-        }
-        _ => facts.undefined(question, &start.p, 0),
-    };
-    error.into_iter().chain([sides]).collect()
-}
-
-fn of_difference(
-    facts: &PartFacts,
-    question: PartQuestion,
-    test: Test,
-    difference: Estimate,
-) -> PartFinding {
-    let direction = Direction::of(difference.value);
-    Finding {
-        direction: Some(direction).filter(|_| test.is_significant()),
-        estimate: Some(difference),
-        ..Finding::decided(question, test, facts.design(0))
-    }
 }
 
 /// Whether estimates differ between realizations, their contrasts, and whether VAF predicts them.

@@ -15,7 +15,7 @@ pub(super) fn doubts(part: &Part) -> Vec<Fault> {
     let Task::Adjustment(own) = &part.task else {
         return Vec::new();
     };
-    let all = [coarse(part, own), few(part, own)];
+    let all = [coarse(part, own), few(part, own), replays(part)];
     all.into_iter().flatten().collect()
 }
 
@@ -40,5 +40,15 @@ fn few(part: &Part, own: &Adjustment) -> Option<Fault> {
             part.id
         );
         Fault::warning(what).hint(format!("take repetitions = {SETTINGS} or more"))
+    })
+}
+
+fn replays(part: &Part) -> Option<Fault> {
+    (part.exposure.replays > 0).then(|| {
+        let what = format!(
+            "`replays` has no effect in the part `{}`: a level is changed until it is confirmed",
+            part.id
+        );
+        Fault::warning(what).hint("leave it out, or give the part an `exposure` without it")
     })
 }

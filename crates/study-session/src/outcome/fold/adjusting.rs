@@ -17,6 +17,9 @@ impl Attempt {
     pub(super) fn adjusted(&mut self, to: &ModelId, standard: bool) {
         self.models.push(to.clone());
         self.ended = None;
+        // What is answered is felt from now on.
+        self.rated_earlier_s = 0.0;
+        self.rating = None;
         let interval = self.intervals();
         let standards = self.standards.get_or_insert_default();
         if standard {

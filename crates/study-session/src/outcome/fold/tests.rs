@@ -225,6 +225,79 @@ fn without_telemetry_there_are_no_strokes_and_no_number_is_never_a_number() {
     assert_eq!((rows[1].strokes, rows[1].least_energy_j), (Some(3), None));
 }
 
+/// Two intervals without any exploration leave what follows a number.
+#[test]
+fn intervals_without_exploration_have_no_part_in_a_rate() {
+    let interval = |exploration_s, switches_per_s| Ended {
+        playback: Playback {
+            exploration_s,
+            switches_per_s,
+            samples: 9,
+            ..Playback::default()
+        },
+        stopped: false,
+    };
+    let mut attempt = Attempt::new(1, &Sitting::default(), None);
+    let models = ["A", "B", "C", "A"].map(|id| ModelId::new(id).unwrap());
+    attempt.models = models.to_vec();
+    for (n, (s, rate)) in (1..).zip([(0.0, 0.0), (0.0, 0.0), (3.0, 2.0), (1.0, 6.0)]) {
+        attempt.started(n, at(u64::from(n)));
+        attempt.interval_ended(n, interval(s, rate), None, at(u64::from(n)));
+    }
+    let sum = attempt.ended.unwrap().playback;
+    assert_eq!((sum.exploration_s, sum.switches_per_s), (4.0, 3.0));
+}
+
+/// Without the line of its start a trial of adjustment begins as planned: each level that comes later is that of its own
+/// interval.
+#[test]
+fn an_adjustment_without_its_start_begins_as_planned() {
+    let id = |id: &str| ModelId::new(id).unwrap();
+    let start = |interval| Event::PlaybackStarted {
+        trial: 1,
+        attempt: 1,
+        interval: Some(interval),
+    };
+    let adjusted = Event::Adjusted {
+        trial: 1,
+        attempt: 1,
+        to: id("C"),
+        standard: false,
+    };
+    let mut entries = journal(vec![start(1), start(2), adjusted]);
+    if let Event::SessionStarted(start) = &mut entries[0].event {
+        start.schedule[0].stimuli = Stimuli::Adjusted {
+            start: id("B"),
+            standard: Some(id("A")),
+        };
+    }
+    let history = History::of(&entries);
+    let attempt = history.open().unwrap().attempt;
+    assert_eq!(attempt.models, [id("A"), id("B"), id("C")]);
+    assert!(attempt.is_standard(1) && !attempt.is_standard(2));
+    assert_eq!(attempt.set_to(), Some(&id("C")));
+}
+
+/// A level that is felt again after the program was left is answered after that.
+#[test]
+fn the_time_before_a_level_is_felt_again_is_no_time_of_its_answer() {
+    let mut events = play(1, 1, 9).to_vec();
+    events.push(reopened(None, &[1, 2, 3]));
+    let open = |events: &[Event]| {
+        let history = History::of(&journal(events.to_vec()));
+        let attempt = history.open().unwrap().attempt;
+        attempt.rated_earlier_s
+    };
+    assert_eq!(open(&events), 1.0);
+    events.push(Event::Adjusted {
+        trial: 1,
+        attempt: 1,
+        to: ModelId::new("A").unwrap(),
+        standard: false,
+    });
+    assert_eq!(open(&events), 0.0);
+}
+
 #[test]
 fn the_last_event_that_sets_a_state_determines_it() {
     let state = |events| History::of(&journal(events)).standing.state;

@@ -60,7 +60,7 @@ pub struct Attempt {
     pub sitting: Sitting,
     /// Its start; `None` if that line of the journal is damaged.
     pub start: Option<AttemptStart>,
-    /// The realization of each interval; empty if the line of its start is damaged.
+    /// The realization of each interval; empty if the line of its start is damaged, but for an adjustment, which begins as planned.
     pub models: Vec<ModelId>,
     /// What its track presents.
     pub level: Option<TrackLevel>,
@@ -155,15 +155,18 @@ impl Ended {
     /// What two playbacks add up to.
     fn and(self, next: Self) -> Self {
         let (a, b) = (self.playback, next.playback);
+        let exploration_s = a.exploration_s + b.exploration_s;
+        let switches = a.switches_per_s * a.exploration_s + b.switches_per_s * b.exploration_s;
         Self {
             playback: Playback {
-                exploration_s: a.exploration_s + b.exploration_s,
+                exploration_s,
                 strokes: a.strokes.saturating_add(b.strokes),
                 least_energy_j: a.least_energy_j.min(b.least_energy_j),
-                // Per second of both.
-                switches_per_s: (a.switches_per_s * a.exploration_s
-                    + b.switches_per_s * b.exploration_s)
-                    / (a.exploration_s + b.exploration_s),
+                // Per second of both. A level that is changed at once is not explored.
+                switches_per_s: match exploration_s > 0.0 {
+                    true => switches / exploration_s,
+                    false => a.switches_per_s,
+                },
                 clamp_count: a.clamp_count + b.clamp_count,
                 samples: a.samples + b.samples,
                 samples_lost: a.samples_lost + b.samples_lost,

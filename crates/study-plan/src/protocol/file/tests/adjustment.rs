@@ -150,6 +150,11 @@ fn doubtful_designs_are_warned_of() {
             "repetitions = 1",
             "1 setting of `equal` from each side",
         ),
+        (
+            "repetitions = 3",
+            "repetitions = 3\nexposure = { replays = 1 }",
+            "`replays` has no effect in the part `equal`",
+        ),
     ] {
         let parsed = parse("p", &with(old, new));
         let protocol = parsed.protocol.unwrap();
