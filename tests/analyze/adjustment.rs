@@ -51,7 +51,7 @@ fn settings_have_their_table() {
         &["--task", "adjustment"],
     ));
     assert!(
-        page.contains("Settings by participant")
+        page.contains("participant  settings     PSE")
             && page.contains("Mean point of subjective equality"),
         "{page}"
     );

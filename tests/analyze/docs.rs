@@ -201,8 +201,10 @@ fn statistics(all: Vec<Declared>) -> Vec<(String, &'static str, bool)> {
 }
 
 /// What stands for names of the data.
-const NAMES: [&str; 19] = [
+const NAMES: [&str; 21] = [
     "M",
+    "OUTCOME",
+    "EFFECT",
     "R",
     "D",
     "S",
@@ -227,6 +229,8 @@ const NAMES: [&str; 19] = [
 fn patterns(id: &str) -> Vec<String> {
     let part = |part: &str| match part {
         "a|b" | "A|B" | "j|k" => r"[^/|]+\|[^/|]+".to_owned(),
+        "FACTOR=a|b" => r"[^/=]+=[^/|]+\|[^/|]+".to_owned(),
+        "FACTOR=LEVEL" => "[^/=]+=[^/]+".to_owned(),
         name if NAMES.contains(&name) => "[^/]+".to_owned(),
         word => word.to_owned(),
     };
