@@ -201,7 +201,7 @@ fn statistics(all: Vec<Declared>) -> Vec<(String, &'static str, bool)> {
 }
 
 /// What stands for names of the data.
-const NAMES: [&str; 19] = [
+const NAMES: [&str; 23] = [
     "M",
     "R",
     "D",
@@ -221,6 +221,10 @@ const NAMES: [&str; 19] = [
     "ITEM",
     "X",
     "P",
+    "OUTCOME",
+    "EFFECT",
+    "FACTOR=LEVEL",
+    "FACTOR=a|b",
 ];
 
 /// Regular expressions of the identifiers of a statistic.
