@@ -58,6 +58,7 @@ fn the_schema_describes_factors_and_outcomes() {
         "factorial/friction:detent/F",
         "factorial_mean/friction=low/mean",
         "factorial_contrast/friction=high|low@detent=soft/p",
+        "outcomes/time/model/sd/friction",
         "outcomes/time/model/effect/friction:detent/chi2",
         "outcomes/errors/factorial_mean/detent=crisp/mean",
     ] {
