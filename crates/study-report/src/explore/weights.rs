@@ -159,7 +159,7 @@ fn sentence(own: &Perceived, names: &[String]) -> String {
             )
         }
         Verdict::Equal => {
-            "Weights that differ do not predict choices that were left out better than VAF does: nothing speaks against VAF."
+            "It was not shown that weights that differ predict left-out choices, also between left-out realizations, better than VAF does."
                 .to_owned()
         }
         Verdict::Nothing => {
