@@ -310,7 +310,10 @@ fn a_generalized_mixed_model_without_an_estimate_says_why() {
     let found = analyze(&ratings, &rules);
     for (id, told) in [
         ("outcomes/errors/model/loglik", "an estimate is infinite"),
-        ("outcomes/hits/model/loglik", "no number of this kind"),
+        (
+            "outcomes/hits/model/loglik",
+            "not a whole number from 0 to 10",
+        ),
     ] {
         match found.values.get(id) {
             Some(Value::Undefined(why)) => assert!(why.contains(told), "{why}"),

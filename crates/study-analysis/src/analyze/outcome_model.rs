@@ -176,7 +176,10 @@ impl Design {
             true => Integral::Laplace,
             false => Integral::Adaptive,
         };
-        let why = |error: GlmmError| Why::from(error.to_string());
+        let why = |error: GlmmError| match error {
+            GlmmError::NotOfFamily => not_of(family, of),
+            other => Why::from(other.to_string()),
+        };
         let data = GlmmData::new(kind, &observations).map_err(why)?;
         let fit = glmm(&data, integral).map_err(why)?;
         let mut differ = None;
@@ -290,6 +293,15 @@ impl Design {
             ratio: two.map(|(log, _)| Stat::of(log.exp())),
             ratio_ci95: two.map(|two| Interval::or(Some(ends(two)), "it overflows")),
         }
+    }
+}
+
+/// What a number is not that is outside of the family.
+fn not_of(family: OutcomeFamily, of: f64) -> Why {
+    match family {
+        OutcomeFamily::Poisson => "a number is not a whole number of at least 0".into(),
+        OutcomeFamily::Binomial => format!("a number is not a whole number from 0 to {of}").into(),
+        OutcomeFamily::Gamma => "a number is not above 0".into(),
     }
 }
 
