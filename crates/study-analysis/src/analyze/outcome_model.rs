@@ -15,9 +15,9 @@ use study_stats::glmm::{
 /// Most combinations of levels: each is a fixed effect.
 const MAX_COMBINATIONS: usize = 40;
 
-/// With more factors within participants these differ in the effect of each single one only: two to the number of
-/// factors would be too many standard deviations.
-const MOST_CROSSED: usize = 3;
+/// With more combinations of levels within participants these differ in the effects of single factors only: the work grows
+/// with their cube.
+const MOST_CROSSED: usize = 12;
 
 /// Half of the width of a 95 % interval, in standard errors.
 const WIDTH: f64 = 1.959_963_984_540_054;
@@ -232,8 +232,8 @@ impl Design {
     /// of single realizations, and finds too much with any number of them.
     fn shared(&self) -> Vec<Vec<usize>> {
         let all = (1usize << self.within.len()) - 1;
-        let is_kept =
-            |factors: &Vec<usize>| factors.len() == 1 || self.within.len() <= MOST_CROSSED;
+        let combinations: usize = self.sizes[..self.within.len()].iter().product();
+        let is_kept = |factors: &Vec<usize>| factors.len() == 1 || combinations <= MOST_CROSSED;
         (1..all).map(members).filter(is_kept).collect()
     }
 

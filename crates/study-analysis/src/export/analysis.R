@@ -271,7 +271,10 @@ generalized <- function(id) {
   d[names(by)] <- by
   within <- names(by)[seq_along(factors)]
   of_size <- function(size) combn(within, size, paste, collapse = ":")
-  shared <- if (length(within) > 1) unlist(lapply(if (length(within) > 3) 1 else seq_len(length(within) - 1), of_size))
+  shared <- if (length(within) > 1) {
+    most <- if (prod(sapply(by[within], nlevels)) > 12) 1 else length(within) - 1
+    unlist(lapply(seq_len(most), of_size))
+  }
   repeats <- anyDuplicated(d[c("participant", "model")]) > 0
   cells <- is.na(of) || of > 1 || repeats
   left <- if (is.na(of)) "number" else "cbind(number, of - number)"
