@@ -23,7 +23,7 @@ const TOGETHER: f64 = 0.99;
 /// A group of components of whose differences less than this is its own is hardly told from the others.
 const OWN: f64 = 0.05;
 /// With less of its own its weight would be what the penalty makes of it: nothing is told of any weight.
-const UNTOLD: f64 = 0.01;
+const UNTOLD: f64 = 0.001;
 
 /// The errors of realizations against a reference, in components.
 #[derive(Debug, Clone, PartialEq)]
