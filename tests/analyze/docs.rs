@@ -201,10 +201,8 @@ fn statistics(all: Vec<Declared>) -> Vec<(String, &'static str, bool)> {
 }
 
 /// What stands for names of the data.
-const NAMES: [&str; 21] = [
+const NAMES: [&str; 23] = [
     "M",
-    "OUTCOME",
-    "EFFECT",
     "R",
     "D",
     "S",
@@ -223,14 +221,16 @@ const NAMES: [&str; 21] = [
     "ITEM",
     "X",
     "P",
+    "OUTCOME",
+    "EFFECT",
+    "FACTOR=LEVEL",
+    "FACTOR=a|b",
 ];
 
 /// Regular expressions of the identifiers of a statistic.
 fn patterns(id: &str) -> Vec<String> {
     let part = |part: &str| match part {
         "a|b" | "A|B" | "j|k" => r"[^/|]+\|[^/|]+".to_owned(),
-        "FACTOR=a|b" => r"[^/=]+=[^/|]+\|[^/|]+".to_owned(),
-        "FACTOR=LEVEL" => "[^/=]+=[^/]+".to_owned(),
         name if NAMES.contains(&name) => "[^/]+".to_owned(),
         word => word.to_owned(),
     };

@@ -275,7 +275,7 @@ fn generalized_mixed_models_are_those_of_r_and_decide_nothing() {
             "{id}: {own}, and R {value}"
         );
     }
-    assert_eq!(expected.lines().count(), 32);
+    assert_eq!(expected.lines().count(), 36);
     // Simulated with a dispersion of 1/8 and a ratio of e^½.
     assert!((0.09..0.17).contains(&number("outcomes/time/model/dispersion")));
     assert!((1.4..1.9).contains(&number("outcomes/time/model/effect/friction/ratio")));
@@ -310,7 +310,10 @@ fn a_generalized_mixed_model_without_an_estimate_says_why() {
     let found = analyze(&ratings, &rules);
     for (id, told) in [
         ("outcomes/errors/model/loglik", "an estimate is infinite"),
-        ("outcomes/hits/model/loglik", "no number of this kind"),
+        (
+            "outcomes/hits/model/loglik",
+            "not a whole number from 0 to 10",
+        ),
     ] {
         match found.values.get(id) {
             Some(Value::Undefined(why)) => assert!(why.contains(told), "{why}"),

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use crate::parts::{cells, of_table, rehearsed, study};
+use crate::parts::{analyzed, cells, of_table, rehearsed, study};
 use crate::trials::{analyze, close, csv, golden, joined, text, values};
 use std::fs;
 
@@ -86,6 +86,32 @@ fn the_salads_of_vargo_differ_in_tartness() {
         assert!((found - expected).abs() <= tolerance, "{id}: {found}");
     }
     assert!(number("agreement/p") < 0.001);
+}
+
+/// Everybody felt the realizations in one order: what ranks have in common may be due to it.
+#[test]
+fn ranks_in_one_order_for_everybody_decide_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let arguments = ["new", "--seed", "7", "ranking", "--kind", "ranking"];
+    let (code, _, err) = study(&arguments, at);
+    assert_eq!(code, 0, "{err}");
+    let path = at.join("ranking/protocol.toml");
+    let text = fs::read_to_string(&path).unwrap();
+    let fixed = text.replace("order = \"williams\"", "order = \"fixed\"");
+    assert_ne!(text, fixed);
+    fs::write(&path, fixed).unwrap();
+    let arguments = ["rehearse", "ranking", "--participants", "6", "--out", "out"];
+    let (code, _, err) = study(&arguments, at);
+    assert_eq!(code, 0, "{err}");
+    let part = analyzed(at)["parts"][0].clone();
+    for finding in part["findings"].as_array().unwrap() {
+        assert_eq!(finding["verdict"], "undefined", "{finding}");
+    }
+    assert!(part["values"]["ranking/agreement/w"].is_number());
+    assert!(part["values"]["ranking/agreement/p"].is_null());
+    let why = part["undefined"]["ranking/agreement/p"].as_str().unwrap();
+    assert!(why.contains("in the same order"), "{why}");
 }
 
 /// The study and a table of its ranks have the same statistics.

@@ -49,6 +49,24 @@ fn the_schema_describes_what_is_printed() {
     }
 }
 
+/// Outcomes, factors and their levels have the names that a study gives them.
+#[test]
+fn the_schema_describes_factors_and_outcomes() {
+    let mut document = printed(&["tests/golden/data/sim_paper/data.csv"]);
+    let values = document["values"].as_object_mut().unwrap();
+    for id in [
+        "factorial/friction:detent/F",
+        "factorial_mean/friction=low/mean",
+        "factorial_contrast/friction=high|low@detent=soft/p",
+        "outcomes/time/model/sd/friction",
+        "outcomes/time/model/effect/friction:detent/chi2",
+        "outcomes/errors/factorial_mean/detent=crisp/mean",
+    ] {
+        values.insert(id.to_owned(), json!(0.5));
+    }
+    assert_eq!(described(&document), Ok(()));
+}
+
 #[test]
 fn a_document_that_differs_from_the_schema_is_found() {
     let schema = schema_of("study-analysis/1");

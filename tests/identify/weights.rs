@@ -84,6 +84,20 @@ fn methods_are_compared_by_what_is_weighed() {
     assert!(known >= 2, "{candidates:?}");
 }
 
+/// A spring has no detents, so that weights of detents alone say nothing of it.
+#[test]
+fn weights_that_say_nothing_do_not_compare() {
+    let dir = tempfile::tempdir().unwrap();
+    files(dir.path());
+    let spring = |x: f64, v: f64| 0.3 * (x - 15.0) + 0.2 * (v / 5.0).tanh();
+    fs::write(dir.path().join("s.csv"), text_of(7, 30.0, spring)).unwrap();
+    let args = ["s.csv", "--weights", "detents.toml"];
+    let (_, out, err) = study(dir.path(), &args);
+    let said =
+        "perceptual VAF is not defined there, so that methods are compared by their residual";
+    assert!(out.contains(said), "{out}{err}");
+}
+
 #[test]
 fn files_of_weights_that_are_wrong_are_named() {
     let dir = tempfile::tempdir().unwrap();

@@ -70,6 +70,9 @@ pub enum NoAbilities {
     /// Nobody preferred anything.
     #[error("every comparison is a tie")]
     AllTied,
+    /// Items were tied in every choice that allowed it, so that a parameter of ties is unbounded; only of rankings.
+    #[error("items were tied whenever they could be: how readily they are is unbounded")]
+    AlwaysTied,
     /// Sets of tied items that are too many to count; only of rankings.
     #[error("so many items can be tied in so many ways that the likelihood is not computed")]
     TooManySets,

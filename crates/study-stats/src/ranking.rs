@@ -153,6 +153,15 @@ pub fn worths(items: usize, rankings: &[Ranking]) -> Result<Worths, NoAbilities>
     if made.iter().any(|(_, c)| of(c.left.len()) > MOST_SETS) {
         return Err(NoAbilities::TooManySets);
     }
+    // Of one size wherever there were enough items, or of any size and never a single item.
+    let always = |size: &usize| {
+        let mut could = made.iter().filter(|(_, c)| c.left.len() >= *size);
+        could.all(|(_, c)| c.taken.len() == *size)
+    };
+    let any_single = made.iter().any(|(_, c)| c.taken.len() == 1);
+    if !tied.is_empty() && (!any_single || tied.iter().any(always)) {
+        return Err(NoAbilities::AlwaysTied);
+    }
     let size = items - 1 + tied.len();
     let weight = |set: &[usize]| -> Vec<f64> {
         let mut sum = vec![0.0; size];

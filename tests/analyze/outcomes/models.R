@@ -28,13 +28,19 @@ unlink("models.txt")
 for (name in c("errors", "hits")) {
   fitted <- function(x) {
     d$x <- x
-    formula <- paste(if (name == "hits") "cbind(hits, 10 - hits)" else name, "~ 0 + x + (1 | subject) + (1 | subject:model)")
-    glmer(as.formula(formula), d, family = if (name == "hits") binomial else poisson, control = ctl)
+    formula <- paste(if (name == "hits") "cbind(hits, 10 - hits)" else name,
+                     "~ 0 + x + (1 | subject) + (1 | subject:friction) + (1 | subject:detent) + (1 | subject:model)")
+    # A search can stop at a standard deviation of 0: the best of three starts.
+    fits <- lapply(c(.3, 1, .05), function(theta) glmer(as.formula(formula), d, family = if (name == "hits") binomial else poisson,
+                                                        control = ctl, start = list(theta = rep(theta, 4), fixef = rep(0, ncol(x)))))
+    fits[[which.max(sapply(fits, logLik))]]
   }
   full <- fitted(X); id <- paste0("outcomes/", name, "/model/")
   line(paste0(id, "n"), nrow(d)); line(paste0(id, "loglik"), c(logLik(full)))
   sds <- sapply(VarCorr(full), function(v) attr(v, "stddev"))
-  line(paste0(id, "sd_participant"), sds[["subject.(Intercept)"]]); line(paste0(id, "sd_cell"), sds[["subject:model.(Intercept)"]])
+  sd_of <- function(group) { sd <- sds[[paste0(group, ".(Intercept)")]]; if (sd < 1e-4) 0 else sd }
+  line(paste0(id, "sd_participant"), sd_of("subject")); line(paste0(id, "sd_cell"), sd_of("subject:model"))
+  for (f in c("friction", "detent")) line(paste0(id, "sd/", f), sd_of(paste0("subject:", f)))
   effects <- c("friction", "detent", "friction:detent")
   for (t in 1:3) {
     less <- fitted(X[, term != t]); chi2 <- 2 * c(logLik(full) - logLik(less)); df <- sum(term == t)
@@ -42,7 +48,7 @@ for (name in c("errors", "hits")) {
     line(paste0(own, "chi2"), chi2); line(paste0(own, "df"), df); line(paste0(own, "p"), pchisq(chi2, df, lower.tail = FALSE))
   }
   dev <- update(full, devFunOnly = TRUE); at <- c(getME(full, "theta"), fixef(full))
-  se <- sqrt(diag(2 * solve(hessian(dev, at, method.args = list(d = 1e-2, r = 4)))))[4]
+  se <- sqrt(diag(2 * solve(hessian(dev, at, method.args = list(d = 1e-2, r = 4)))))[length(getME(full, "theta")) + 2]
   own <- paste0(id, "effect/friction/")
   line(paste0(own, "ratio"), exp(-2 * fixef(full)[[2]]))
   line(paste0(own, "ratio_ci95_lo"), exp(-2 * fixef(full)[[2]] - qnorm(.975) * 2 * se))

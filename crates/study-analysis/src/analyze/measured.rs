@@ -78,7 +78,7 @@ statistics! {
         ratio_ci95: Option<Interval>,
     }
 
-    /// A generalized mixed model of the numbers of the trials ([statistics-mixed.md](statistics-mixed.md#8-counts-shares-and-positive-numbers)), with intercepts of participants and, where numbers repeat in them or are counts, of the cells of participant and realization; with these by Laplace's approximation, else by quadrature. It decides nothing.
+    /// A generalized mixed model of the numbers of the trials ([statistics-mixed.md](statistics-mixed.md#8-counts-shares-and-positive-numbers)), with intercepts of participants and, where numbers repeat in them or are counts, of the cells of participant and realization and, with several factors within participants, of participants at the levels of each and of two of three; by Laplace's approximation, with intercepts of participants alone by quadrature. It decides nothing.
     pub struct OutcomeModel {
         /// trials of test realizations
         n: Stat,
@@ -90,6 +90,8 @@ statistics! {
         sd_participant: Stat,
         /// standard deviation of the cells, on the scale of the link
         sd_cell: Option<Stat>,
+        /// standard deviation of a participant's intercepts at the levels of a factor, or of two of three, on the scale of the link
+        sds: BTreeMap<EffectName, Stat> as "sd",
         /// variance over squared mean, of a gamma model
         dispersion: Option<Stat>,
         /// of the realizations, in a study without factors

@@ -15,6 +15,10 @@ use study_stats::glmm::{
 /// Most combinations of levels: each is a fixed effect.
 const MAX_COMBINATIONS: usize = 40;
 
+/// With more combinations of levels within participants these differ in the effects of single factors only: the work grows
+/// with their cube.
+const MOST_CROSSED: usize = 12;
+
 /// Half of the width of a 95 % interval, in standard errors.
 const WIDTH: f64 = 1.959_963_984_540_054;
 
@@ -49,6 +53,8 @@ struct Design {
     trials: Vec<Trial>,
     /// Number of levels of each factor.
     sizes: Vec<usize>,
+    /// The names of the factors within participants, which are the first ones; none without factors.
+    within: Vec<String>,
     /// The factors of each effect of the full crossing; its columns follow those of the one before.
     effects: Vec<Vec<usize>>,
     /// The effects that are tested, with their names; without a name that of the realizations.
@@ -69,6 +75,7 @@ fn by_realization(used: &Ratings, trials: &[(usize, f64)]) -> Result<Design, Why
     Ok(Design {
         trials,
         sizes: vec![present.len()],
+        within: Vec::new(),
         effects: vec![vec![0]],
         tested: vec![(None, vec![0])],
     })
@@ -100,22 +107,27 @@ fn by_factors(used: &Ratings, trials: &[(usize, f64)], crossing: &Crossing) -> R
         }
         sizes.push(present.len());
     }
-    let effects: Vec<Vec<usize>> = (1..1usize << sizes.len())
-        .map(|chosen| {
-            (0..sizes.len())
-                .filter(|f| (chosen >> f) & 1 == 1)
-                .collect()
-        })
-        .collect();
+    let effects: Vec<Vec<usize>> = (1..1usize << sizes.len()).map(members).collect();
+    let within = 0..crossing.factors.len();
     let tested = (crossing.effects.iter())
         .map(|effect| (Some(crossing.effect_name(effect)), effect.clone()))
         .collect();
     Ok(Design {
         trials,
         sizes,
+        within: within
+            .map(|place| crossing.name(place).to_owned())
+            .collect(),
         effects,
         tested,
     })
+}
+
+/// The places of the bits of a number that are set.
+fn members(set: usize) -> Vec<usize> {
+    (0..usize::BITS as usize)
+        .filter(|place| (set >> place) & 1 == 1)
+        .collect()
 }
 
 /// The trials of the realizations under test.
@@ -138,6 +150,7 @@ impl Design {
             return Err(format!("more than {MAX_COMBINATIONS} combinations of levels").into());
         }
         let with_cells = self.with_cells(family, of);
+        let shared = self.shared();
         let cells: BTreeSet<(usize, usize)> =
             self.trials.iter().map(|t| (t.subject, t.model)).collect();
         let cells: BTreeMap<(usize, usize), usize> = cells.into_iter().zip(0..).collect();
@@ -149,6 +162,7 @@ impl Design {
                 x: self.row(&trial.levels),
                 levels: std::iter::once(trial.subject)
                     .chain(cell.filter(|_| with_cells))
+                    .chain(shared.iter().map(|factors| self.part_of(trial, factors)))
                     .collect(),
             }
         };
@@ -158,11 +172,14 @@ impl Design {
             OutcomeFamily::Binomial => Family::Binomial,
             OutcomeFamily::Gamma => Family::Gamma,
         };
-        let integral = match with_cells {
+        let integral = match with_cells || !shared.is_empty() {
             true => Integral::Laplace,
             false => Integral::Adaptive,
         };
-        let why = |error: GlmmError| Why::from(error.to_string());
+        let why = |error: GlmmError| match error {
+            GlmmError::NotOfFamily => not_of(family, of),
+            other => Why::from(other.to_string()),
+        };
         let data = GlmmData::new(kind, &observations).map_err(why)?;
         let fit = glmm(&data, integral).map_err(why)?;
         let mut differ = None;
@@ -178,13 +195,20 @@ impl Design {
                 None => differ = Some(test),
             }
         }
-        let sd = |at: usize| fit.sd.get(at).map(|sd| Stat::of(*sd));
+        let of_shared = fit.sd.iter().skip(1 + usize::from(with_cells));
+        let named = |factors: &Vec<usize>| -> EffectName {
+            let names: Vec<&str> = factors.iter().map(|f| self.within[*f].as_str()).collect();
+            names.join(":").as_str().into()
+        };
         Ok(OutcomeModel {
             n: Stat::count(self.trials.len()),
             loglik: Stat::of(fit.loglik),
             aic: Stat::of(fit.aic()),
             sd_participant: Stat::or(fit.sd.first().copied(), "there are no participants"),
-            sd_cell: sd(1),
+            sd_cell: (fit.sd.get(1).filter(|_| with_cells)).map(|sd| Stat::of(*sd)),
+            sds: (shared.iter().zip(of_shared))
+                .map(|(factors, sd)| (named(factors), Stat::of(*sd)))
+                .collect(),
             dispersion: fit.dispersion.map(Stat::of),
             differ,
             effects,
@@ -201,6 +225,23 @@ impl Design {
             OutcomeFamily::Binomial => repeats || of > 1.0,
             OutcomeFamily::Gamma => repeats,
         }
+    }
+
+    /// The factors within participants by whose levels, together, several realizations are alike: participants have an
+    /// intercept for each of their combinations. Without these a test takes what participants differ in its effect for noise
+    /// of single realizations, and finds too much with any number of them.
+    fn shared(&self) -> Vec<Vec<usize>> {
+        let all = (1usize << self.within.len()) - 1;
+        let combinations: usize = self.sizes[..self.within.len()].iter().product();
+        let is_kept = |factors: &Vec<usize>| factors.len() == 1 || combinations <= MOST_CROSSED;
+        (1..all).map(members).filter(is_kept).collect()
+    }
+
+    /// The number of a participant and of the levels of a trial in some factors.
+    fn part_of(&self, trial: &Trial, factors: &[usize]) -> usize {
+        (factors.iter()).fold(trial.subject, |number, f| {
+            number * self.sizes[*f] + trial.levels[*f]
+        })
     }
 
     /// The intercept, and the products of the sum-to-zero codes of the factors of each effect.
@@ -252,6 +293,15 @@ impl Design {
             ratio: two.map(|(log, _)| Stat::of(log.exp())),
             ratio_ci95: two.map(|two| Interval::or(Some(ends(two)), "it overflows")),
         }
+    }
+}
+
+/// What a number is not that is outside of the family.
+fn not_of(family: OutcomeFamily, of: f64) -> Why {
+    match family {
+        OutcomeFamily::Poisson => "a number is not a whole number of at least 0".into(),
+        OutcomeFamily::Binomial => format!("a number is not a whole number from 0 to {of}").into(),
+        OutcomeFamily::Gamma => "a number is not above 0".into(),
     }
 }
 

@@ -318,6 +318,10 @@ impl Made<'_> {
         for _ in 0..own.repetitions {
             let mut ranks: Vec<usize> = (1..=own.models.len()).collect();
             self.draws.shuffle(&mut ranks);
+            // Every ranking has another order than the one before.
+            let mut felt: Vec<&ModelId> = own.models.iter().collect();
+            let n = felt.len().max(1);
+            felt.rotate_left(self.intervals.len() / n % n);
             let mut answers = (own.asked(&part.asks).iter())
                 .zip(ranks)
                 .map(|(question, rank)| (question.clone(), Answer::Rating(rank as i64)));
@@ -327,7 +331,7 @@ impl Made<'_> {
             let row = self.row(part, who, answer, &question);
             row.answers.extend(answers);
             let trial = row.trial;
-            for (interval, model) in (1..).zip(&own.models) {
+            for (interval, model) in (1..).zip(felt) {
                 self.felt(part, who, (trial, interval), model);
             }
         }

@@ -178,14 +178,21 @@ impl<'r> Reference<'r> {
         Some([self.parts(errors)?, self.force].map(|parts| self.squares * sum(parts)))
     }
 
-    /// The mean of a signal in each bin that has samples.
+    /// The mean of a signal in each bin that has samples of both directions, each of which counts alike, so that friction is
+    /// no detent where one of them has more samples. If all motion is in one direction, of each bin with samples.
     fn means(&self, signal: &[f64]) -> Vec<Option<f64>> {
-        let mut sums = vec![(0.0, 0.0); self.falls.len()];
-        for (bin, value) in self.bins.iter().zip(signal) {
-            add(&mut sums[*bin], *value);
+        let mut sums = vec![[(0.0, 0.0); 2]; self.falls.len()];
+        for ((bin, negative), value) in self.bins.iter().zip(&self.is_negative).zip(signal) {
+            add(&mut sums[*bin][usize::from(*negative)], *value);
         }
+        let mean = |(sum, n): (f64, f64)| (n > 0.0).then(|| sum / n);
+        let one_way = !(sums.iter()).any(|[plus, minus]| plus.1 > 0.0 && minus.1 > 0.0);
         sums.into_iter()
-            .map(|(sum, n)| (n > 0.0).then(|| sum / n))
+            .map(|both| match both.map(mean) {
+                [Some(plus), Some(minus)] => Some(0.5 * (plus + minus)),
+                [one, other] if one_way => one.or(other),
+                _ => None,
+            })
             .collect()
     }
 

@@ -9,7 +9,7 @@ use study_analysis::analyze::results::{
 };
 use study_analysis::analyze::{Analysis, Finding, OutcomeAnswer, Question, Verdict};
 use study_base::text::sentence;
-use study_plan::protocol::{BetterEnd, OutcomeFamily, OutcomeRules, Transform};
+use study_plan::protocol::{BetterEnd, OutcomeFamily, Transform};
 
 /// An answer for each outcome that was measured.
 pub(super) fn outcomes(a: &Analysis) -> Vec<Answer> {
@@ -39,14 +39,18 @@ fn answer(a: &Analysis, outcome: &OutcomeAnswer, record: &MeasuredOutcome) -> An
         "Measured outcomes decide no question of the study; p is corrected over the tests of all of them (Holm)."
             .to_owned(),
     );
-    answer.more.extend(second_opinion(a, rules, record));
+    answer.more.extend(second_opinion(a, outcome, record));
     answer
 }
 
 /// What the generalized mixed model says of each effect, which decides nothing.
-fn second_opinion(a: &Analysis, rules: &OutcomeRules, record: &MeasuredOutcome) -> Option<String> {
+fn second_opinion(
+    a: &Analysis,
+    outcome: &OutcomeAnswer,
+    record: &MeasuredOutcome,
+) -> Option<String> {
     let model = record.model.as_ref()?;
-    let (name, compared) = match rules.model? {
+    let (name, compared) = match outcome.rules.model? {
         OutcomeFamily::Poisson => ("A Poisson mixed model", "means"),
         OutcomeFamily::Binomial => ("A binomial mixed model", "odds"),
         OutcomeFamily::Gamma => ("A gamma mixed model", "means"),
@@ -56,14 +60,21 @@ fn second_opinion(a: &Analysis, rules: &OutcomeRules, record: &MeasuredOutcome) 
             "{name} was asked for as a second opinion and has no estimate: {why}"
         )));
     }
-    let realizations = model
-        .differ
-        .iter()
-        .map(|test| ("realizations".to_owned(), test));
-    let effects = (model.effects.iter()).map(|(effect, test)| (effect.as_str().to_owned(), test));
-    let all: Vec<String> = (realizations.chain(effects))
-        .map(|(effect, test)| likelihood_ratio(a, &effect, compared, test))
+    let measured: Vec<&str> = (a.realizations.iter())
+        .filter(|own| own.tested && outcome.order.contains(&own.id))
+        .map(|own| own.id.as_str())
         .collect();
+    let two = match measured[..] {
+        [first, second] => Some([first, second]),
+        _ => None,
+    };
+    let realizations =
+        (model.differ.iter()).map(|test| likelihood_ratio("realizations", two, compared, test));
+    let effects = model.effects.iter().map(|(effect, test)| {
+        let effect = effect.as_str();
+        likelihood_ratio(effect, levels_of(a, effect), compared, test)
+    });
+    let all: Vec<String> = realizations.chain(effects).collect();
     Some(sentence(&format!(
         "{name} of the single trials, by likelihood ratios and not corrected for their number, is a second opinion \
          and decides nothing: {}",
@@ -72,7 +83,12 @@ fn second_opinion(a: &Analysis, rules: &OutcomeRules, record: &MeasuredOutcome) 
 }
 
 /// The test of an effect and, of two levels, the ratio of their means or odds.
-fn likelihood_ratio(a: &Analysis, effect: &str, compared: &str, test: &OutcomeModelTest) -> String {
+fn likelihood_ratio(
+    effect: &str,
+    levels: Option<[&str; 2]>,
+    compared: &str,
+    test: &OutcomeModelTest,
+) -> String {
     let named = effect.replace(':', " × ");
     let (Some(chi2), Some(df), Some(p)) = (test.chi2.number(), test.df.number(), test.p.number())
     else {
@@ -81,7 +97,7 @@ fn likelihood_ratio(a: &Analysis, effect: &str, compared: &str, test: &OutcomeMo
     };
     let ratio = test.ratio.number().map_or_else(String::new, |ratio| {
         let ci = sentences::ci(test.ratio_ci95.as_ref(), apa::two);
-        let levels = levels_of(a, effect).map(|levels| levels.map(apa::name));
+        let levels = levels.map(|levels| levels.map(apa::name));
         let [first, second] =
             levels.unwrap_or_else(|| ["the first", "the second"].map(str::to_owned));
         format!(
@@ -234,4 +250,27 @@ fn trade_offs(a: &Analysis, outcome: &OutcomeAnswer, record: &MeasuredOutcome) -
         ))
     };
     record.pairs.iter().filter_map(one).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use study_analysis::analyze::results::Stat;
+
+    /// A ratio says of which two levels or realizations it is.
+    #[test]
+    fn a_ratio_names_what_it_compares() {
+        let test = OutcomeModelTest {
+            chi2: Stat::of(5.0),
+            df: Stat::of(1.0),
+            p: Stat::of(0.025),
+            ratio: Some(Stat::of(1.5)),
+            ratio_ci95: None,
+        };
+        let told = likelihood_ratio("realizations", Some(["soft", "crisp"]), "means", &test);
+        assert!(
+            told.ends_with("ratio of the means crisp over soft = 1.50"),
+            "{told}"
+        );
+    }
 }

@@ -159,7 +159,11 @@ fn sentence(own: &Perceived, names: &[String]) -> String {
             )
         }
         Verdict::Equal => {
-            "Weights that differ do not predict choices that were left out better than VAF does: nothing speaks against VAF."
+            "It was not shown that weights that differ predict left-out choices, also between left-out realizations, better than VAF does."
+                .to_owned()
+        }
+        Verdict::Nothing if own.weighed.sensitivity_ci95.1 < 0.0 => {
+            "Of two realizations that with the larger errors was preferred: what decides is something else than these errors."
                 .to_owned()
         }
         Verdict::Nothing => {
@@ -332,6 +336,21 @@ These weights predict choices that were left out better than VAF does; the large
         let said = text_of(unknown);
         assert!(
             said.ends_with("\nNo weights: 3 choices are too few; 10 are needed.\n\n"),
+            "{said}"
+        );
+    }
+
+    /// Larger errors that are preferred are known, though nothing is weighed as an error.
+    #[test]
+    fn what_is_preferred_for_its_errors_is_told() {
+        let mut found = weighing(Verdict::Nothing);
+        assert!(text_of(found.clone()).contains("\nThese choices do not tell "));
+        if let Ok(own) = &mut found.found {
+            own.weighed.sensitivity_ci95 = (-60.0, -20.0);
+        }
+        let said = text_of(found);
+        assert!(
+            said.contains("\nOf two realizations that with the larger errors was preferred"),
             "{said}"
         );
     }

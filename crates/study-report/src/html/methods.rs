@@ -299,8 +299,9 @@ fn outcomes(a: &Analysis) -> Option<String> {
     };
     let besides = match a.outcomes.iter().any(|o| o.rules.model.is_some()) {
         true => {
-            " Generalized mixed models of single trials with random intercepts of participants, and of their cells where \
-             they repeat or are counts, are given besides and decide nothing."
+            " Generalized mixed models of single trials with random intercepts of participants, of their cells where \
+             they repeat or are counts, and of participants at the levels of the factors where there are several, are given \
+             besides and decide nothing."
         }
         false => "",
     };

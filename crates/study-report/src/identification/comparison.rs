@@ -56,9 +56,12 @@ pub(super) fn table(results: &Identification, comparison: &Comparison) -> String
         true => "strokes",
         false => "tenths of the travel in one direction",
     };
-    let perceptual = match comparison.by_perceptual {
-        true => "; perceptual: the VAF of weighted components there",
-        false => "",
+    let perceptual = match (comparison.by_perceptual, &results.weights) {
+        (true, _) => "; perceptual: the VAF of weighted components there",
+        (false, Some(_)) => {
+            "; perceptual VAF is not defined there, so that methods are compared by their residual"
+        }
+        (false, None) => "",
     };
     let mut out = format!(
         "VAF left out: on {left_out} that were left out of the training, a fifth at a time{perceptual}\n{}",

@@ -255,6 +255,14 @@ fn what_has_no_maximum_has_a_reason() {
     assert_eq!(reason(&[([1, 1, 1], 5)]), NoAbilities::AllTied);
     let best = reason(&[([1, 2, 3], 2), ([1, 3, 2], 3)]);
     assert_eq!(best, NoAbilities::Unbounded(vec![0]));
+    // Two items at the top each time, or two or three.
+    let two = [([1, 1, 2], 1), ([2, 1, 1], 1), ([1, 2, 1], 1)];
+    assert_eq!(reason(&two), NoAbilities::AlwaysTied);
+    let more = [&two[..], &[([1, 1, 1], 2)]].concat();
+    assert_eq!(reason(&more), NoAbilities::AlwaysTied);
+    // At the bottom there was a choice before, of a single item.
+    let below = [([1, 2, 2], 1), ([2, 1, 2], 1), ([2, 2, 1], 1)];
+    assert!(worths(3, &rankings(&below)).is_ok());
     assert_eq!(
         reason(&[]),
         NoAbilities::Disconnected(vec![vec![0], vec![1], vec![2]])

@@ -6,7 +6,7 @@ use super::results::PartResults;
 use crate::analyze::Rules;
 use crate::analyze::warning::Warning;
 use std::collections::{BTreeMap, BTreeSet};
-use study_base::text::{QuestionId, counted};
+use study_base::text::{ModelId, QuestionId, counted};
 use study_plan::protocol::parts::Part;
 use study_plan::protocol::{Answer, Ranking};
 use study_session::outcome::RatingRow;
@@ -34,7 +34,10 @@ pub(super) fn of_ranking(
         asked.filter_map(rank).collect()
     };
     let ranks: Vec<RankingRow> = rows.iter().flat_map(ranked).collect();
-    let found = ranking(&ranks, (rules.seed, part.id.as_str()));
+    let mut found = ranking(&ranks, (rules.seed, part.id.as_str()));
+    if is_one_order(rows, intervals) {
+        found.cannot_be_told(ONE_ORDER);
+    }
     let mut results = PartResults::undefined("");
     results.over.ranking = Some(found);
     Found {
@@ -45,6 +48,23 @@ pub(super) fn of_ranking(
         names: Vec::new(),
         data: PartData::default(),
     }
+}
+
+const ONE_ORDER: &str = "everybody felt the realizations in the same order, so that ranks may follow it in place of them; \
+                         present them in several orders";
+
+/// Whether all of several rankings had the realizations in one order.
+fn is_one_order(rows: &[&RatingRow], intervals: &Intervals<'_>) -> bool {
+    let order = |row: &&RatingRow| -> Vec<(u32, ModelId)> {
+        let felt = intervals.counted(row).iter();
+        let mut felt: Vec<(u32, ModelId)> = felt
+            .filter_map(|i| Some((i.interval, i.model.clone()?)))
+            .collect();
+        felt.sort();
+        felt
+    };
+    let orders: Vec<Vec<(u32, ModelId)>> = rows.iter().map(order).collect();
+    orders.len() > 1 && orders.windows(2).all(|two| two[0] == two[1])
 }
 
 /// The ranks of each ranking.

@@ -22,6 +22,8 @@ const VARIES: f64 = 0.1;
 const TOGETHER: f64 = 0.99;
 /// A group of components of whose differences less than this is its own is hardly told from the others.
 const OWN: f64 = 0.05;
+/// With less of its own its weight would be what the penalty makes of it: nothing is told of any weight.
+const UNTOLD: f64 = 0.001;
 
 /// The errors of realizations against a reference, in components.
 #[derive(Debug, Clone, PartialEq)]
@@ -93,10 +95,21 @@ pub enum Unknown {
     /// There is nothing that could be weighed against something else.
     #[error("the compared realizations differ in one respect only: {}", joined(.0))]
     OneGroup(Vec<&'static str>),
+    /// Groups whose differences follow from those of the others.
+    #[error(
+        "what the compared realizations differ in changes together ({}), so that no weight can be told: compare more of them, some of which differ in one of these alone",
+        listed(.0)
+    )]
+    NotTold(Vec<Vec<&'static str>>),
 }
 
 fn joined(names: &[&str]) -> String {
     names.join(" with ")
+}
+
+fn listed(groups: &[Vec<&str>]) -> String {
+    let names: Vec<String> = groups.iter().map(|group| joined(group)).collect();
+    names.join(", ")
 }
 
 /// The choices of each part in which realizations are compared: pairs and searches. Which participants and trials count is
@@ -248,8 +261,13 @@ fn perceived(
         groups.iter().map(sum).collect()
     };
     let sums: Vec<Vec<f64>> = errors.iter().map(sums).collect();
-    let weighed = weigh(&sums, chosen, random)?;
     let own = spread(&sums, chosen)?.own;
+    let untold = groups.iter().zip(&own).filter(|(_, own)| **own < UNTOLD);
+    let untold: Vec<Vec<&'static str>> = untold.map(|(group, _)| names(group)).collect();
+    if !untold.is_empty() {
+        return Err(Unknown::NotTold(untold));
+    }
+    let weighed = weigh(&sums, chosen, random)?;
     let mixed = (0..groups.len()).filter(|i| own[*i] < OWN);
     Ok(Perceived {
         mixed: mixed.collect(),
@@ -267,7 +285,7 @@ fn verdict(weighed: &Weighed) -> Verdict {
     };
     let of_people = weighed.left_out.as_ref().is_some_and(is_better);
     let of_stimuli = weighed.other_stimuli.as_ref();
-    let of_stimuli = of_stimuli.is_none_or(|left_out| left_out.gain > 0.0);
+    let of_stimuli = of_stimuli.is_some_and(|left_out| left_out.gain > 0.0);
     if weighed.shares.is_some() && of_people && of_stimuli {
         Verdict::Unequal
     } else if weighed.sensitivity_ci95.0 > 0.0 {
@@ -362,6 +380,20 @@ mod tests {
         assert_eq!(
             refused.to_string(),
             "the compared realizations differ in one respect only: level with detent"
+        );
+        // Errors of opposite signs vary together, too: between two realizations only how they differ in all counts.
+        let two = [vec![1.0, 0.0, 0.2], vec![0.0, 1.2, 0.2]];
+        let choose = |i: usize| Chosen {
+            preferred: usize::from(i % 4 == 0),
+            other: usize::from(i % 4 != 0),
+            participant: i % 8,
+        };
+        let between: Vec<Chosen> = (0..80).map(choose).collect();
+        let refused = perceived(&NAMES[..3], &two, &between, &mut random).unwrap_err();
+        assert_eq!(
+            refused.to_string(),
+            "what the compared realizations differ in changes together (level, detent), so that no weight can be told: compare \
+             more of them, some of which differ in one of these alone"
         );
         let same = vec![vec![1.0; 3]; 20];
         let refused = perceived(&NAMES[..3], &same, &chosen, &mut random).unwrap_err();

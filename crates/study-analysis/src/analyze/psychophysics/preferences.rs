@@ -303,6 +303,7 @@ pub(super) fn reason(error: &NoAbilities, items: &[&str]) -> String {
         NoAbilities::NoPairs
         | NoAbilities::OneOrder
         | NoAbilities::AllTied
+        | NoAbilities::AlwaysTied
         | NoAbilities::TooManySets
         | NoAbilities::NotFound => error.to_string(),
     }

@@ -10,6 +10,7 @@ use crate::analyze::record::{
 use std::collections::{BTreeMap, BTreeSet};
 use study_stats::correlation::spearman;
 use study_stats::describe::{mean, mean_of, sd};
+use study_stats::pairs::NoAbilities;
 use study_stats::rank::mid_ranks;
 use study_stats::ranking::{Ranking, Worths, concordance, shares, worths};
 
@@ -117,6 +118,20 @@ statistics! {
     }
 }
 
+impl Rankings {
+    /// Leaves out every p for this reason; what is described stays.
+    pub(super) fn cannot_be_told(&mut self, why: &str) {
+        let both = [&mut self.agreement.p, &mut self.best.p];
+        let of_pairs = (self.pairs.values_mut())
+            .flat_map(|pair| [&mut pair.worths.p, &mut pair.worths.p_holm]);
+        for p in both.into_iter().chain(of_pairs) {
+            if p.number().is_some() {
+                *p = Stat::missing(why.to_owned());
+            }
+        }
+    }
+}
+
 /// One rank.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RankingRow {
@@ -158,7 +173,7 @@ pub fn ranking(rows: &[RankingRow], (seed, name): (u64, &str)) -> Rankings {
     let why = match &fit {
         _ if rankings.is_empty() => NO_RANKINGS.to_owned(),
         Ok(_) => String::new(),
-        Err(error) => reason(error, &items),
+        Err(error) => no_worths(error, &items),
     };
     let fit = fit.ok();
     let abilities = fit.as_ref().map(|fit| &fit.abilities);
@@ -205,6 +220,18 @@ pub fn ranking(rows: &[RankingRow], (seed, name): (u64, &str)) -> Rankings {
             })
             .collect(),
     }
+}
+
+/// Why there are no worths, in the words of rankings.
+fn no_worths(error: &NoAbilities, items: &[&str]) -> String {
+    let NoAbilities::Unbounded(top) = error else {
+        return reason(error, items);
+    };
+    let names: Vec<&str> = top.iter().map(|i| items[*i]).collect();
+    format!(
+        "none of the others was ever ranked above {}, or with the same rank: worths are unbounded",
+        names.join(" or ")
+    )
 }
 
 /// Rankings by participant; those of fewer than two realizations say nothing. Several ranks of a realization in one
@@ -516,10 +543,26 @@ mod tests {
         assert_eq!(tied.best.p.reason(), Some("every comparison is a tie"));
         let always = found(&[&["a b c"], &["a c b"]]);
         let reason = always.best.p.reason().unwrap();
-        assert!(reason.contains("ever preferred to a"), "{reason}");
+        assert!(reason.contains("ever ranked above a,"), "{reason}");
         // One realization is no ranking.
         let one = found(&[&["a"], &["a"]]);
         assert_eq!(one.n.number(), Some(0.0));
+    }
+
+    /// What is described stays, and no test decides.
+    #[test]
+    fn what_cannot_be_told_has_no_p() {
+        let mut found = found(SIX);
+        found.cannot_be_told("one order");
+        assert!(found.agreement.w.number().is_some() && found.best.difference.number().is_some());
+        let pair = &found.pairs[&PairName::of("a", "b")].worths;
+        for p in [&found.agreement.p, &found.best.p, &pair.p, &pair.p_holm] {
+            assert_eq!(p.reason(), Some("one order"));
+        }
+        // A reason that there is already stays.
+        let mut none = ranking(&[], (1, "order"));
+        none.cannot_be_told("one order");
+        assert_eq!(none.best.p.reason(), Some(NO_RANKINGS));
     }
 
     /// A declined rank leaves a realization out of one ranking; W does without such rankings.

@@ -132,6 +132,22 @@ fn falls_are_between_crest_and_valley() {
     assert_eq!(found, expected);
 }
 
+/// A spring with friction, of which one half of the travel is left three times as fast as it is entered.
+#[test]
+fn friction_of_uneven_strokes_is_no_detent() {
+    let mut text = String::from("t_s,x_mm,v_mm_s,a_m_s2,f_n\n");
+    let (mut i, mut x) = (0, 0.0);
+    for (v, samples) in [(10.0, 3000), (-10.0, 1500), (-30.0, 500)].repeat(2) {
+        for _ in 0..samples {
+            let force = 0.02 * x + 0.5 * f64::signum(v);
+            writeln!(text, "{},{x},{v},0,{force}", f64::from(i) * 0.001).unwrap();
+            (i, x) = (i + 1, x + 0.001 * v);
+        }
+    }
+    let r = crate::recording::read("r", text.as_bytes()).unwrap();
+    assert!(!Reference::of(&r).unwrap().has_detents());
+}
+
 #[test]
 fn files_read_back() {
     let known = [Some(0.125), Some(1.5), None, Some(0.0), None];

@@ -3,8 +3,8 @@
 use super::{Spans, adjustments, answers_s, counted_out, maps, pace};
 use crate::procedure::{Rule, Staircase};
 use crate::protocol::{
-    DeviceKind, Identification, IntervalOrder, Magnitude, Method, Mushra, Part, Protocol, Question,
-    Role, Task, TrackRules,
+    DeviceKind, Identification, IntervalOrder, Magnitude, Method, Mushra, Order, Part, Protocol,
+    Question, Role, Task, TrackRules,
 };
 use study_base::apa;
 use study_base::diagnostic::Fault;
@@ -131,6 +131,7 @@ pub(super) fn warnings(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Faul
             one_order(part),
             few_pairs(protocol, part),
             few_rankers(protocol, part),
+            one_ranked_order(part),
         ];
         let doubts = doubts.into_iter().flatten();
         let doubts = doubts.chain(maps::doubts(protocol, part));
@@ -291,6 +292,20 @@ fn few_rankers(protocol: &Protocol, part: &Part) -> Option<Fault> {
             apa::p(least)
         );
         Fault::warning(what).hint("add participants or realizations")
+    })
+}
+
+/// Ranks of realizations that everybody feels in the same order may be due to it.
+fn one_ranked_order(part: &Part) -> Option<Fault> {
+    let Task::Ranking(own) = &part.task else {
+        return None;
+    };
+    (own.order == Order::Fixed).then(|| {
+        let what = format!(
+            "everybody feels the realizations of `{}` in the same order: whether ranks follow it or them cannot be told",
+            part.id
+        );
+        Fault::warning(what).hint("take \"blocked\", \"williams\" or \"latin-square\"")
     })
 }
 

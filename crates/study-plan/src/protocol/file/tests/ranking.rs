@@ -283,3 +283,13 @@ fn so_few_that_no_agreement_shows_are_warned_of() {
         none
     );
 }
+
+#[test]
+fn one_order_for_everybody_is_warned_of() {
+    let text = RANKED.replace("repetitions = 3", "repetitions = 3\norder = \"fixed\"");
+    let parsed = parse("p", &text);
+    let protocol = parsed.protocol.unwrap();
+    let faults = crate::protocol::check::warnings(&protocol, &parsed.spans, &[]);
+    let own = faults.iter().filter(|f| f.message.contains("same order"));
+    assert_eq!(own.count(), 1);
+}
