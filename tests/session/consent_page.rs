@@ -24,7 +24,7 @@ fn document() -> Screen {
 
 #[test]
 fn by_keys_it_is_scrolled_and_answered_by_a_letter() {
-    for (width, height) in [(60, 20), (80, 24), (200, 50)] {
+    for (width, height) in [(80, 24), (100, 40), (200, 50)] {
         let mut surface = Surface::new(ColorDepth::None);
         let view = view(document());
         let mut seen = picture(&drawn(&mut surface, &view, width, height));

@@ -36,7 +36,15 @@ fn give(rig: &mut Rig, interval: usize, rank: i64) {
 /// One step; ranks are those of [`rank`].
 fn step(rig: &mut Rig) {
     let Some(interval) = page(rig) else {
-        rig.step();
+        // A gap passes by itself: a step would also end the interval after it.
+        match rig.view().screen {
+            Screen::Loading { .. } => {
+                rig.wait(1.0);
+            }
+            _ => {
+                rig.step();
+            }
+        }
         return;
     };
     let trial = rig.session.history().open().unwrap().trial.trial;
