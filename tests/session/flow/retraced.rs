@@ -367,6 +367,15 @@ fn others(rig: &Rig) -> Vec<(QuestionId, Answer)> {
     given.collect()
 }
 
+/// Whether another process went on with the session since something was felt. Where the steps back lead then is not in the journal.
+fn is_resumed(rig: &Rig) -> bool {
+    let since =
+        (rig.journal.iter().rev()).take_while(|e| !matches!(e.event, Event::PlaybackEnded { .. }));
+    since
+        .into_iter()
+        .any(|e| matches!(e.event, Event::Reopened { .. }))
+}
+
 fn perform(mut rig: Rig, protocol: &Protocol, act: Act) -> Rig {
     rig.wait(0.01);
     let view = rig.view();
@@ -413,7 +422,7 @@ fn perform(mut rig: Rig, protocol: &Protocol, act: Act) -> Rig {
                 text: "loud".to_owned(),
             });
         }
-        Act::Back if view.can_go_back => {
+        Act::Back if view.can_go_back && !is_resumed(&rig) => {
             rig.send(Input::Back);
             rig.wait(0.01);
             let answers = others(&rig);

@@ -6,7 +6,7 @@
 //! saved and no device is asked.
 //!
 //! A journal has what was done and not what was looked at. A page that was left without a
-//! trace is not shown again: one to which somebody went back and changed nothing, the pages
+//! trace is not shown again: one to which somebody went back and changed nothing, or in a form that was resumed, the pages
 //! between two texts at which the program ended, the rating after a stop until it is answered, the
 //! request to mount a sample, a fault of device or disk between trials.
 
@@ -16,7 +16,7 @@ use super::project_view::can_advance;
 use super::saving::SaveState;
 use super::trial::PLAYED_AGAIN;
 use super::view::MessageKind;
-use super::{ClaimFacts, Config, Effect, Screen, Session, View};
+use super::{ClaimFacts, Config, Effect, Ending, Screen, Session, View};
 use crate::outcome::fold::History;
 use crate::outcome::{Entry, Event, Failure, FormId, Moment, STEP_BACK, Start, Verdict};
 use std::sync::Arc;
@@ -163,6 +163,9 @@ impl Retrace<'_> {
                     self.lead(false, at);
                 }
                 self.take();
+                // The page that says so.
+                self.session.phase = Phase::Over(Ending::Interrupted);
+                self.show(at);
                 (self.runs, self.session.paused) = (false, None);
             }
             Event::Consented { accepted, .. } => {
