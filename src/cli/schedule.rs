@@ -229,7 +229,7 @@ fn show(
             .map(|row| Ok((row, planners.plan(row)?)))
             .collect::<Result<Vec<_>, Failure>>()?;
         if protocol.only_asks() {
-            return console.out("No trials: the study only asks questionnaires.\n".to_owned());
+            return console.out("No trials: the study only asks questionnaires.\n");
         }
         if !protocol.parts.is_empty() {
             return console.out(parts::render(protocol, &plans, console.width));

@@ -4,6 +4,12 @@
 //! The shares are compared with chance by hand-made bounds: 0.02 and four standard errors of
 //! the simulation, which is printed (`--nocapture`).
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a test that fails says where, and rates are read"
+)]
+
 use crate::parts::{PAIRS, protocol, similarity};
 use std::collections::BTreeMap;
 use study_plan::protocol::{Method, Protocol, Seat, Stimuli};

@@ -210,7 +210,8 @@ fn changes_and_answers_of_no_session_are_problems() {
         found
     };
     assert_eq!(planted(|events| events), [""; 0]);
-    let forged: [(fn(Vec<Event>) -> Vec<Event>, &str); 9] = [
+    type Forged = fn(Vec<Event>) -> Vec<Event>;
+    let forged: [(Forged, &str); 9] = [
         (jump, "which is not a step"),
         (skip, "and what came before was not felt"),
         (change_later, "and is not under way"),

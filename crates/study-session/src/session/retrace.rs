@@ -338,7 +338,7 @@ impl Retrace<'_> {
             next.at == at && matches!(next.event, Event::AttemptStarted { .. })
         });
         let rests = marked && matches!(self.session.phase, Phase::Break { .. });
-        if !(again && goes_on) && !rests {
+        if !(rests || again && goes_on) {
             self.session.phase = Phase::Saving;
         }
     }

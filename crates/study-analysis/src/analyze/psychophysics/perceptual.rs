@@ -384,8 +384,8 @@ mod tests {
         // Errors of opposite signs vary together, too: between two realizations only how they differ in all counts.
         let two = [vec![1.0, 0.0, 0.2], vec![0.0, 1.2, 0.2]];
         let choose = |i: usize| Chosen {
-            preferred: usize::from(i % 4 == 0),
-            other: usize::from(i % 4 != 0),
+            preferred: usize::from(i.is_multiple_of(4)),
+            other: usize::from(!i.is_multiple_of(4)),
             participant: i % 8,
         };
         let between: Vec<Chosen> = (0..80).map(choose).collect();

