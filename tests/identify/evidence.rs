@@ -144,3 +144,56 @@ fn a_mass_that_the_encoder_cannot_show_is_not_claimed() {
     assert!(damping.carried, "{damping:?}");
     assert!((damping.value - 0.03).abs() < 0.1 * 0.03, "{damping:?}");
 }
+
+/// 20 s of a lever at 500 Hz whose friction sticks over four lengths at once (Maxwell-slip elements), with neither mass nor damping.
+fn sticking_at_four_lengths(stream: &mut Stream) -> Recording {
+    let travel_mm = 30.0;
+    let tones: Vec<[f64; 3]> = (0..9)
+        .map(|_| {
+            let hz = 0.15 * (3.5f64 / 0.15).powf(stream.unit());
+            let phase = std::f64::consts::TAU * stream.unit();
+            [hz, hz.powf(-0.7) * (0.3 * stream.normal()).exp(), phase]
+        })
+        .collect();
+    let most: f64 = tones.iter().map(|[_, size, _]| size).sum();
+    let shares: Vec<f64> = (0..4).map(|_| -stream.unit().ln()).collect();
+    let all: f64 = shares.iter().sum();
+    let lengths_mm: Vec<f64> = [0.002, 0.006, 0.015, 0.03]
+        .map(|share| share * travel_mm * (0.5 + stream.unit()))
+        .to_vec();
+    let (mut states, mut last_mm) = ([0.0f64; 4], None);
+    let mut text = String::from("t_s,x_mm,f_n\n");
+    // in steps of 0.25 ms, of which every eighth is recorded
+    for i in 0..80_000 {
+        let t = f64::from(i) * 2.5e-4;
+        let wave: f64 = (tones.iter())
+            .map(|[hz, size, phase]| size * (std::f64::consts::TAU * hz * t + phase).sin())
+            .sum();
+        let x = 0.5 * travel_mm * (1.0 + 0.96 * wave / most);
+        let moved = x - last_mm.replace(x).unwrap_or(x);
+        for (state, length_mm) in states.iter_mut().zip(&lengths_mm) {
+            *state = (*state + moved / length_mm).clamp(-1.0, 1.0);
+        }
+        if i % 8 > 0 {
+            continue;
+        }
+        let friction: f64 = states.iter().zip(&shares).map(|(z, s)| z * s / all).sum();
+        let f = 3.0 + 2.0 * (0.3 * x).sin() + 0.5 * friction + 0.02 * stream.normal();
+        let measured = (x / 0.005).round() * 0.005;
+        writeln!(text, "{t:.4},{measured:.4},{f:.4}").unwrap();
+    }
+    recording::read("sticking", text.as_bytes()).unwrap()
+}
+
+/// Friction that sticks over several lengths leaves forces at each reversal that a single length does not explain. They are neither mass
+/// nor damping.
+#[test]
+fn friction_of_four_lengths_is_neither_mass_nor_damping() {
+    let mut stream = Stream::new(26, &["evidence"]);
+    for set in 0..12 {
+        let recording = sticking_at_four_lengths(&mut stream);
+        for term in evidence::of(&[&recording], recording.range_mm()).unwrap() {
+            assert!(!term.found, "{set} {term:?}");
+        }
+    }
+}

@@ -3,11 +3,13 @@
 //! The question is asked of a reference model with one mass and one damping,
 //!
 //! ```text
-//! F = Σ_j h_j(x) (C_j + z D_j) + b v + m a + (s z + r sign(a)) exp(−(5 v / v_rms)²)
+//! F = Σ_j h_j(x) (C_j + z D_j) + b v + m a + (s z + r sign(a)) exp(−(5 v / v_rms)²) + Σ_k e_k z_k
 //! ```
 //!
-//! with the hat functions h_j, the direction state z that fits best (the sign of v, or play or Dahl of several lengths)
-//! and a ridge on the second differences of C and D. Two different things are asked.
+//! with the hat functions h_j, the direction state z that fits best (the sign of v, or play or Dahl of several lengths),
+//! and a ridge on the second differences of C and D. Friction that sticks over several lengths at once is a sum of plays (Prandtl–Ishlinskii; Brokate &
+//! Sprekels, Hysteresis and Phase Transitions, 1996, section 2.4), of which one length leaves what looks like damping and mass at every reversal: the
+//! z_k are plays of six lengths from 0.5 to 16 % of the travel, whose force is the same everywhere. Two different things are asked.
 //!
 //! **Does a table take the term up?** A table is identified by least squares, from velocity and acceleration as they are, and is there to predict. It takes up
 //! what least squares finds and what predicts data left out (`carried`), unless the answer to the second question contradicts (`reference`).
@@ -23,7 +25,7 @@
 //!   another in time (`spread`): V(m) is the mean square of the sum over a hundred cyclic shifts, with both scaled by the
 //!   residual's local size. V(m) is a parabola, because the residual has −m times the noise of a. What friction does at low speed and at a reversal
 //!   is not known, and would be taken for damping and mass: the columns of s and r take it. The largest difference of the estimates without s,
-//!   and with rules of z that fit nearly as well, counts as an error, too.
+//!   without the z_k where that fits nearly as well, and with rules of z that fit nearly as well, counts as an error, too.
 //! * *Found.* The recordings show a term if blocks of samples that are left out are predicted better with it, and θ exceeds four errors (a search over two
 //!   terms and many recordings meets three by chance). Where twice the bound would be found, it is enough that θ exceeds four errors without that
 //!   of the model, and is above 0 in all models that fit nearly as well; or that it exceeds 2.326 errors (99 %), and the squared

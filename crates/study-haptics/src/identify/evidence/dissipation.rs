@@ -82,6 +82,7 @@ mod tests {
         let rule = Rule {
             direction: Direction::Sign,
             smooth: 1,
+            other_lengths: false,
         };
         let rows = rows(&recordings, (&nodes, EVERYWHERE), rule, &instruments);
         Dissipation::of(&rows, nodes.len()).damping.unwrap()

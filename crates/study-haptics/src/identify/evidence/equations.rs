@@ -3,7 +3,7 @@
 use super::instruments::Instruments;
 use crate::identify::banded::Banded;
 use crate::identify::vaf::motion;
-use crate::recording::Recording;
+use crate::recording::{Recording, range};
 use study_wire::predict::{Direction, DirectionState, Lookup, locate};
 
 /// Blocks of consecutive samples that are left out in turn, over all recordings.
@@ -20,8 +20,10 @@ const FLOOR: f64 = 1e-9;
 const LOW_SPEED: f64 = 0.2;
 /// The weight of low speed above which a sample is slow: below √(ln 2) of the low speed.
 const LOW: f64 = 0.5;
-/// Unknowns beside the nodes: of acceleration, velocity, friction at low speed, and reversals.
-pub(super) const BORDER: usize = 4;
+/// The first of the unknowns beside the nodes that belong to plays of other lengths.
+pub(super) const OTHER_LENGTHS: usize = 4;
+/// Unknowns beside the nodes: of acceleration, velocity, friction at low speed, reversals, and plays of [`DELTAS`].
+pub(super) const BORDER: usize = OTHER_LENGTHS + DELTAS.len();
 /// Unknowns per node: C and D.
 pub(super) const PER_NODE: usize = 2;
 /// Half-bandwidth: second differences reach two nodes.
@@ -35,7 +37,7 @@ pub(super) struct Row {
     left: usize,
     share: f64,
     z: f64,
-    /// What stands for acceleration and velocity, friction at low speed, and what happens at reversals there.
+    /// What stands for acceleration and velocity, friction at low speed, what happens at reversals there, and plays of other lengths.
     pub(super) border: [f64; BORDER],
     /// Whether its speed is low.
     pub(super) slow: bool,
@@ -44,22 +46,27 @@ pub(super) struct Row {
 }
 
 impl Row {
-    /// The sample `i` with its direction state and what is low speed, and with what stands for acceleration and velocity.
+    /// The sample `i` with its direction state and what is low speed, with what stands for acceleration and velocity, and with plays
+    /// of other lengths.
     fn new(
         recording: &Recording,
         i: usize,
         nodes: &[f64],
         (z, low_mm_s): (f64, f64),
         [a, v]: [f64; 2],
+        plays: [f64; DELTAS.len()],
     ) -> Self {
         let (left, share) = locate(nodes, Lookup::Linear, recording.x_mm[i]);
         let low = (-(v / low_mm_s).powi(2)).exp();
         let sign = if a == 0.0 { 0.0 } else { a.signum() };
+        let mut border = [0.0; BORDER];
+        border[..OTHER_LENGTHS].copy_from_slice(&[a, v, low * z, low * sign]);
+        border[OTHER_LENGTHS..].copy_from_slice(&plays);
         Self {
             left,
             share,
             z,
-            border: [a, v, low * z, low * sign],
+            border,
             slow: low > LOW,
             signals: [recording.f_n[i], recording.a_m_s2[i], recording.v_mm_s[i]],
         }
@@ -73,16 +80,18 @@ impl Row {
             1 => (0, 0, 0.0),
             _ => (self.left * PER_NODE, (self.left + 1) * PER_NODE, self.share),
         };
-        [
+        let mut entries = [(0, 0.0); 2 * PER_NODE + BORDER];
+        let (of_nodes, beside) = entries.split_at_mut(2 * PER_NODE);
+        of_nodes.copy_from_slice(&[
             (left, 1.0 - share),
             (left + 1, z * (1.0 - share)),
             (right, share),
             (right + 1, z * share),
-            (border, self.border[0]),
-            (border + 1, self.border[1]),
-            (border + 2, self.border[2]),
-            (border + 3, self.border[3]),
-        ]
+        ]);
+        for (k, (entry, one)) in beside.iter_mut().zip(self.border).enumerate() {
+            *entry = (border + k, one);
+        }
+        entries
     }
 
     /// The node that is nearest.
@@ -106,6 +115,8 @@ pub(super) struct Rule {
     pub(super) direction: Direction,
     /// Samples, an odd number, over which it is averaged, as a low-pass of the force does.
     pub(super) smooth: usize,
+    /// Whether plays of other lengths, whose force is the same everywhere, are beside it.
+    pub(super) other_lengths: bool,
 }
 
 impl Rule {
@@ -154,11 +165,25 @@ pub(super) fn rows(
     let low_mm_s = low_speed(instruments.iter().flat_map(|of| &of.v));
     let mut rows = Vec::new();
     for (recording, of) in recordings.iter().zip(instruments) {
-        let mut state = DirectionState::default();
-        let of_motion = |i: usize| state.step(rule.direction, motion(recording, i));
-        let states: Vec<f64> = (0..recording.len()).map(of_motion).collect();
-        let smoothed = smoothed(&states, rule.smooth);
-        let row = |(i, z)| Row::new(recording, i, nodes, (z, low_mm_s), [of.a[i], of.v[i]]);
+        let states = |direction: Direction| {
+            let mut state = DirectionState::default();
+            let of_motion = |i: usize| state.step(direction, motion(recording, i));
+            let states: Vec<f64> = (0..recording.len()).map(of_motion).collect();
+            smoothed(&states, rule.smooth)
+        };
+        let smoothed = states(rule.direction);
+        let plays = match rule.other_lengths {
+            true => plays(range(nodes)).map(states).to_vec(),
+            false => Vec::new(),
+        };
+        let row = |(i, z)| {
+            let mut at = [0.0; DELTAS.len()];
+            for (at, states) in at.iter_mut().zip(&plays) {
+                *at = states[i];
+            }
+            let derivatives = [of.a[i], of.v[i]];
+            Row::new(recording, i, nodes, (z, low_mm_s), derivatives, at)
+        };
         let counts = |(i, _): &(usize, f64)| {
             let x_mm = recording.x_mm[*i];
             within_mm[0] <= x_mm && x_mm <= within_mm[1]
@@ -181,7 +206,8 @@ pub(super) fn plain_rows(
             let motion = motion(recording, i);
             let z = state.step(rule, motion);
             let derivatives = [motion.a_m_s2, motion.v_mm_s];
-            Row::new(recording, i, nodes, (z, low_mm_s), derivatives)
+            let none = [0.0; DELTAS.len()];
+            Row::new(recording, i, nodes, (z, low_mm_s), derivatives, none)
         })
     })
 }
@@ -190,6 +216,13 @@ pub(super) fn plain_rows(
 fn low_speed<'v>(speeds: impl Iterator<Item = &'v f64>) -> f64 {
     let (sum, count) = speeds.fold((0.0, 0_usize), |(sum, n), v| (sum + v * v, n + 1));
     LOW_SPEED * (sum / count as f64).sqrt()
+}
+
+/// Plays of all lengths.
+fn plays([low, high]: [f64; 2]) -> [Direction; DELTAS.len()] {
+    DELTAS.map(|share| Direction::Play {
+        delta_mm: share * (high - low),
+    })
 }
 
 /// The rules for the direction state that are tried at first.
@@ -294,12 +327,12 @@ impl Equations {
     }
 
     /// Which unknowns are free: the kept ones of acceleration and velocity, and whether friction may
-    /// be another one at low speed and at reversals.
+    /// be another one at low speed and at reversals. Plays of other lengths are, if there are any.
     pub(super) fn free(&self, kept: [bool; 2], friction: [bool; 2]) -> Vec<bool> {
         let mut free = vec![true; self.total.right[0].len()];
         let first = free.len() - BORDER;
         free[first..first + 2].copy_from_slice(&kept);
-        free[first + 2..].copy_from_slice(&friction);
+        free[first + 2..first + OTHER_LENGTHS].copy_from_slice(&friction);
         free
     }
 
@@ -322,7 +355,7 @@ impl Equations {
 
 fn add_ridges(normal: &mut Banded, nodes: usize, samples: usize) {
     let information = samples as f64 / nodes as f64;
-    for friction in [2, 3] {
+    for friction in 2..BORDER {
         let at = nodes * PER_NODE + friction;
         normal.add(at, at, FLOOR * samples as f64);
     }

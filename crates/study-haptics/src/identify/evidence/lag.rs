@@ -54,6 +54,7 @@ pub fn of(recording: &Recording) -> Option<Lag> {
             let rule = Rule {
                 direction,
                 smooth: 1,
+                other_lengths: false,
             };
             let rows = rows(&[&moved], (&nodes, EVERYWHERE), rule, &instruments);
             let equations = Equations::of(rows.into_iter(), moved.len(), nodes.len());

@@ -3,10 +3,13 @@
 use super::Term;
 use super::alike::are_alike;
 use super::dissipation::Dissipation;
-use super::equations::{BORDER, EVERYWHERE, Equations, Row, Rule, directions, nodes, rows};
+use super::equations::{
+    BORDER, EVERYWHERE, Equations, OTHER_LENGTHS, Row, Rule, directions, nodes, rows,
+};
 use super::instruments::{self, Instruments};
 use super::spread::{ONE_SIDED, Spread};
 use crate::recording::Recording;
+use std::ops::Range;
 use study_wire::predict::Direction;
 
 /// Steps, as factors, in which the length of the play is refined.
@@ -120,7 +123,11 @@ impl Reference {
         for direction in directions(range_mm) {
             let mut last = f64::INFINITY;
             for smooth in SMOOTH {
-                let found = with(Rule { direction, smooth });
+                let found = with(Rule {
+                    direction,
+                    smooth,
+                    other_lengths: false,
+                });
                 let error = found.map_or(f64::INFINITY, |(error, ..)| error);
                 tried.extend(found);
                 // a longer mean is worse still
@@ -138,6 +145,10 @@ impl Reference {
             tried.sort_by(|a, b| a.0.total_cmp(&b.0));
         }
         let (least, rule, _) = *tried.first()?;
+        let rule = Rule {
+            other_lengths: true,
+            ..rule
+        };
         let rows = rows(recordings, places, rule, &instruments);
         let equations = Equations::of(rows.iter().copied(), rows.len(), unknown);
         // friction does not push, but there may be less of it than in slow motion
@@ -233,12 +244,29 @@ impl Reference {
     /// The largest difference from the estimate that models have which fit nearly as well.
     fn model_error(&self, free: &[bool], term: usize, value: f64) -> Option<f64> {
         // what friction does at low speed is not known: its column may be there or not
-        let mut constant_friction = free.to_vec();
-        constant_friction[free.len() - BORDER + 2] = false;
-        let without_column = estimates(&self.equations, &constant_friction)?[term];
+        let border = free.len() - BORDER;
+        let without = |columns: Range<usize>| {
+            let mut fewer = free.to_vec();
+            fewer[border..][columns].fill(false);
+            let error = self
+                .equations
+                .total
+                .error(&self.equations.solve(0, &fewer)?);
+            let away = (estimates(&self.equations, &fewer)?[term] - value).abs();
+            Some((error, away))
+        };
+        let (_, of_low_speed) = without(2..3)?;
+        // a single length may do as well
+        let least = self.equations.total.error(&self.equations.solve(0, free)?);
+        let (error, of_other_lengths) = without(OTHER_LENGTHS..BORDER)?;
+        let of_other_lengths = if error <= NEARLY * least {
+            of_other_lengths
+        } else {
+            0.0
+        };
         let best = self.by_rule.first()?[term];
         let rules = (self.by_rule.iter()).map(|rule| (rule[term] - best).abs());
-        Some(rules.fold((without_column - value).abs(), f64::max))
+        Some(rules.fold(of_low_speed.max(of_other_lengths), f64::max))
     }
 }
 
@@ -253,6 +281,7 @@ fn instruments_of(
     let rule = Rule {
         direction: Direction::Play { delta_mm },
         smooth: 1,
+        other_lengths: false,
     };
     // for acceleration and velocity: how much is shown, and the width
     let mut best = [(f64::NEG_INFINITY, 1); 2];
