@@ -2,12 +2,11 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use crate::parts_by_keys::{PROMPT, events, of, start_with, written};
+use crate::parts_by_keys::{PROMPT, events, of, start_with, written_newest};
 use crate::plain::Lines;
 use crate::support::player::{play, quit};
 use crate::support::{PATIENCE, Terminal, study};
 use serde_json::Value as Json;
-use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
 use study::tui::pace::TYPED;
@@ -110,10 +109,7 @@ repetitions = 1
 gap_s = 0.2
 "#
     );
-    written(folder, &part);
-    let file = folder.join("p/protocol.toml");
-    let text = fs::read_to_string(&file).unwrap();
-    fs::write(&file, text.replace("study-protocol/2", "study-protocol/3")).unwrap();
+    written_newest(folder, &part);
 }
 
 /// A step that is typed while the next level is loaded is forgotten with that page. The Enter after it is no confirmation.

@@ -48,6 +48,14 @@ uncertified = {{ play = true, force_n = 9.0, reason = "a test" }}
     fs::write(folder.join("p/protocol.toml"), text).unwrap();
 }
 
+/// The same as [`written`], in the newest format.
+pub(crate) fn written_newest(folder: &Path, rest: &str) {
+    written(folder, rest);
+    let file = folder.join("p/protocol.toml");
+    let text = fs::read_to_string(&file).unwrap();
+    fs::write(&file, text.replace("study-protocol/2", "study-protocol/3")).unwrap();
+}
+
 /// A track of two intervals on a family.
 fn track(vary: &str, procedure: &str) -> String {
     format!(
@@ -591,10 +599,7 @@ feedback = "always"
 "#,
         models()
     );
-    written(folder.path(), &part);
-    let file = folder.path().join("p/protocol.toml");
-    let text = fs::read_to_string(&file).unwrap();
-    fs::write(&file, text.replace("study-protocol/2", "study-protocol/3")).unwrap();
+    written_newest(folder.path(), &part);
     // Every lever is taken for the one after it, but the last one is known.
     let next = |attempt: &Json| {
         let places = ["l9991", "l9993", "l9995", "l9997", "l9999"];

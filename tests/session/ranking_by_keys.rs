@@ -2,11 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use crate::parts_by_keys::{models, written};
+use crate::parts_by_keys::{models, written_newest};
 use crate::support::player::{enter, play};
 use crate::support::{Terminal, study};
 use serde_json::Value as Json;
-use std::fs;
 use std::path::Path;
 use std::time::Duration;
 
@@ -25,10 +24,7 @@ gap_s = 0.2
 "#,
         models()
     );
-    written(folder, &part);
-    let file = folder.join("p/protocol.toml");
-    let text = fs::read_to_string(&file).unwrap();
-    fs::write(&file, text.replace("study-protocol/2", "study-protocol/3")).unwrap();
+    written_newest(folder, &part);
 }
 
 /// Chooses a rank and confirms it.

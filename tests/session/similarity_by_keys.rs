@@ -2,10 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use crate::parts_by_keys::{PROMPT, eventful, models, written};
+use crate::parts_by_keys::{PROMPT, eventful, models, written_newest};
 use crate::support::study;
 use serde_json::Value as Json;
-use std::fs;
 
 /// Differences on a slider, by its keys; identical pairs are among them.
 #[test]
@@ -25,10 +24,7 @@ practice = 1
 "#,
         models()
     );
-    written(folder.path(), &part);
-    let file = folder.path().join("p/protocol.toml");
-    let text = fs::read_to_string(&file).unwrap();
-    fs::write(&file, text.replace("study-protocol/2", "study-protocol/3")).unwrap();
+    written_newest(folder.path(), &part);
     // Places that are farther apart are rated higher.
     let rates = |attempt: &Json| {
         let places = ["l9991", "l9995", "l9997", "l9999"];

@@ -28,7 +28,17 @@ pub(super) const QUEST: &str =
     r#"{ rule = "quest+", trials = 16, lapse = [0.02], slope = [2, 4] }"#;
 
 pub(super) fn read(text: &str) -> Protocol {
-    let parsed = parse("p", &format!("{HEAD}{text}"));
+    whole(&format!("{HEAD}{text}"))
+}
+
+/// The same with keys that only the newest format has.
+fn read_newest(text: &str) -> Protocol {
+    let head = HEAD.replace("study-protocol/2", "study-protocol/3");
+    whole(&format!("{head}{text}"))
+}
+
+fn whole(text: &str) -> Protocol {
+    let parsed = parse("p", text);
     let shown = parsed.findings.render(false);
     parsed.protocol.unwrap_or_else(|| panic!("{shown}"))
 }
@@ -118,10 +128,7 @@ repetitions = 2
 {more}
 "#
     );
-    let head = HEAD.replace("study-protocol/2", "study-protocol/3");
-    let parsed = parse("p", &format!("{head}{text}"));
-    let shown = parsed.findings.render(false);
-    parsed.protocol.unwrap_or_else(|| panic!("{shown}"))
+    read_newest(&text)
 }
 
 /// Three realizations whose differences are rated; `more` is added to the part.
@@ -140,10 +147,7 @@ repetitions = 2
 {more}
 "#
     );
-    let head = HEAD.replace("study-protocol/2", "study-protocol/3");
-    let parsed = parse("p", &format!("{head}{text}"));
-    let shown = parsed.findings.render(false);
-    parsed.protocol.unwrap_or_else(|| panic!("{shown}"))
+    read_newest(&text)
 }
 
 /// Three realizations that are ranked; `more` is added to the part.
@@ -162,10 +166,7 @@ models = ["XQZ-7", "KJW-3", "VVB-9"]
 {more}
 "#
     );
-    let head = HEAD.replace("study-protocol/2", "study-protocol/3");
-    let parsed = parse("p", &format!("{head}{text}"));
-    let shown = parsed.findings.render(false);
-    parsed.protocol.unwrap_or_else(|| panic!("{shown}"))
+    read_newest(&text)
 }
 
 /// A level of damping that is set, from 1.5 and 2.5; `more` is added to the part.
@@ -188,10 +189,7 @@ repetitions = 2
 {more}
 "#
     );
-    let head = HEAD.replace("study-protocol/2", "study-protocol/3");
-    let parsed = parse("p", &format!("{head}{text}"));
-    let shown = parsed.findings.render(false);
-    parsed.protocol.unwrap_or_else(|| panic!("{shown}"))
+    read_newest(&text)
 }
 
 /// The answer of an observer who hears a level of 1.55 and above, and else says the other.
