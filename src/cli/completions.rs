@@ -5,6 +5,7 @@ use clap_complete::env::Shells;
 use clap_complete::{ArgValueCompleter, CompletionCandidate};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
+use study_base::sort::SmallSort as _;
 
 /// Arguments of `study completions`.
 #[derive(Debug, clap::Args)]
@@ -60,7 +61,7 @@ fn ids(results: &Path) -> Vec<String> {
     let sessions = studies.flat_map(|study| entries(&study.join("sessions")));
     let names = sessions.filter_map(|path| Some(path.file_name()?.to_str()?.to_owned()));
     let mut ids: Vec<String> = names.collect();
-    ids.sort();
+    ids.small_sort();
     ids.dedup();
     ids
 }

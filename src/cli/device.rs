@@ -17,6 +17,7 @@ use super::{Console, Failure};
 use serialport::SerialPortType;
 use std::path::{Path, PathBuf};
 use study_analysis::load;
+use study_base::sort::SmallSort as _;
 use study_base::text::Untrusted;
 use study_plan::protocol::DeviceKind;
 
@@ -122,7 +123,7 @@ fn list(json: bool, console: &mut Console) -> Result<(), Failure> {
             }
         })
         .collect();
-    ports.sort_by(|a, b| a.path.cmp(&b.path));
+    ports.small_sort_by(|a, b| a.path.cmp(&b.path));
     if json {
         let document = serde_json::json!({"format": "study-device-list/1", "ports": ports});
         return console.json(&document);

@@ -11,6 +11,7 @@ use study_analysis::export::{
 };
 use study_analysis::load;
 use study_base::hex::Digest;
+use study_base::sort::SmallSort as _;
 use study_base::text::{Untrusted, counted};
 use study_session::outcome::Event;
 use study_session::outcome::ratings::Origin;
@@ -469,7 +470,7 @@ impl Target {
         };
         let items = fs::read_dir(parent).into_iter().flatten().flatten();
         let mut found: Vec<PathBuf> = items.map(|i| i.path()).filter(is_left).collect();
-        found.sort();
+        found.small_sort();
         found
     }
 

@@ -10,6 +10,7 @@ use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use study_analysis::load;
+use study_base::sort::SmallSort as _;
 use study_base::text::{PartId, Untrusted, counted};
 use study_plan::protocol::file;
 
@@ -307,7 +308,7 @@ fn subfolders(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
             folders.push(path);
         }
     }
-    folders.sort();
+    folders.small_sort();
     Ok(folders)
 }
 
@@ -325,7 +326,7 @@ fn with_values(text: &str, id: &str, seed: u64) -> Result<String, Failure> {
         edits.push((span.clone(), value));
     }
     // from the end, so that the earlier span stays valid
-    edits.sort_by_key(|(span, _)| std::cmp::Reverse(span.start));
+    edits.small_sort_by_key(|(span, _)| std::cmp::Reverse(span.start));
     let mut text = text.to_owned();
     for (span, value) in edits {
         text.replace_range(span, &value);

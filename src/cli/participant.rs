@@ -4,6 +4,7 @@ use super::{Console, Failure, study_folder};
 use clap::ValueEnum;
 use std::io::{self, IsTerminal as _};
 use std::path::{Path, PathBuf};
+use study_base::sort::SmallSort as _;
 use study_base::text::{ParticipantId, counted};
 use study_session::outcome::State;
 use study_session::store::{self, StateChange, StateRequest, layout};
@@ -130,7 +131,7 @@ fn list(folder: &Path, files: &mut Vec<PathBuf>) {
         return;
     };
     let mut paths: Vec<PathBuf> = items.flatten().map(|item| item.path()).collect();
-    paths.sort();
+    paths.small_sort();
     for path in paths {
         if path.is_dir() && !path.is_symlink() {
             list(&path, files);

@@ -4,6 +4,7 @@ use super::trajectory::write_file;
 use super::{Console, Failure};
 use std::fs;
 use std::path::{Path, PathBuf};
+use study_base::sort::SmallSort as _;
 use study_base::text::{Untrusted, counted};
 use study_haptics::archive::{Bundle, BundleError, MAX_BYTES, Stated};
 use study_report::catalogue;
@@ -227,7 +228,7 @@ fn site(folder: &Path, out: &Path, console: &mut Console) -> Result<(), Failure>
                 .hint("`study stimulus pack` writes bundles"),
         );
     }
-    paths.sort();
+    paths.small_sort();
     let mut bundles = paths
         .iter()
         .map(|path| open(path))

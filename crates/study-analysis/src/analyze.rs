@@ -80,6 +80,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use study_base::sort::SmallSort as _;
 use study_plan::protocol::{
     BetterEnd, Crossing, OutcomeRules, Protocol, Role, Transform, Unfinished,
 };
@@ -588,7 +589,7 @@ fn comments(used: &Ratings) -> Vec<Comment> {
             text: c.text.clone(),
         })
         .collect();
-    comments.sort_by(|a, b| {
+    comments.small_sort_by(|a, b| {
         (&a.model, &a.subject, a.repetition).cmp(&(&b.model, &b.subject, b.repetition))
     });
     comments

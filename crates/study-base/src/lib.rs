@@ -11,6 +11,7 @@
 //! * [`perception`]: the least difference in force that people feel.
 //! * [`rng`]: random streams that are named, independent and the same on every
 //!   machine.
+//! * [`sort`]: sorting that is compiled once.
 //!
 //! * [`child`]: a program that exchanges lines with this one.
 //!
@@ -26,4 +27,5 @@ pub mod limits;
 mod named;
 pub mod perception;
 pub mod rng;
+pub mod sort;
 pub mod text;

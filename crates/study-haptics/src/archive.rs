@@ -25,6 +25,7 @@ use crate::model::{Realization, Units};
 use crate::recording::{self, Recording, RecordingError, mean_and_variance};
 use study_base::diagnostic::{Findings, Severity, table};
 use study_base::hex::sha256;
+use study_base::sort::SmallSort as _;
 use study_base::text::{Untrusted, is_unsafe};
 
 /// The `format` of a bundle.
@@ -300,7 +301,7 @@ impl Bundle {
         ];
         let numbered = recordings.iter().enumerate();
         files.extend(numbered.map(|(i, kept)| (path(i), kept.bytes.clone())));
-        files.sort();
+        files.small_sort();
         let bytes = tar::write(&files)?;
         Ok(Self {
             realization,
@@ -551,7 +552,7 @@ fn related(
             kept.recording.name.clone(),
         )
     };
-    kept.sort_by_key(key);
+    kept.small_sort_by_key(key);
     // That of a turning handle needs a lever arm, which is not known.
     let judged = kept.iter().filter(|_| realization.units == Units::Linear);
     let training = judged.filter(|kept| kept.purpose == Purpose::Training);

@@ -8,6 +8,7 @@ use super::chart::{Axis, Figure, Look, Mark, PALETTE, Panel};
 use super::html::page_head;
 use maud::{DOCTYPE, Markup, html};
 use std::cmp::Ordering;
+use study_base::sort::SmallSort as _;
 use study_base::text::{Untrusted, counted};
 use study_haptics::archive::{Bundle, Feel, at_rest};
 use study_haptics::identify::repetition::WITHIN;
@@ -84,7 +85,7 @@ pub fn files(bundles: &[Bundle]) -> Vec<(String, String)> {
     let mut all: Vec<(String, Feel, &Bundle)> = (bundles.iter())
         .map(|bundle| (bundle.sha256(), Feel::of(&bundle.realization), bundle))
         .collect();
-    all.sort_by(|(a, _, x), (b, _, y)| (&x.realization.id, a).cmp(&(&y.realization.id, b)));
+    all.small_sort_by(|(a, _, x), (b, _, y)| (&x.realization.id, a).cmp(&(&y.realization.id, b)));
     all.dedup_by(|(a, ..), (b, ..)| a == b);
     let mut files: Vec<(String, String)> = (all.iter())
         .map(|(address, _, bundle)| (picture_path(address), figure(bundle).picture().to_svg()))
@@ -92,7 +93,7 @@ pub fn files(bundles: &[Bundle]) -> Vec<(String, String)> {
     for sorting in &SORT_ORDERS {
         let mut sorted: Vec<&(String, Feel, &Bundle)> = all.iter().collect();
         // stable: equal ones stay in the order of names
-        sorted.sort_by(|(_, a, x), (_, b, y)| {
+        sorted.small_sort_by(|(_, a, x), (_, b, y)| {
             let units = |bundle: &Bundle| bundle.realization.units.names();
             let value = (sorting.2)(a).total_cmp(&(sorting.2)(b));
             match sorting.0 {

@@ -34,6 +34,7 @@ use std::collections::BTreeMap;
 use study_analysis::analyze::results::{Described, Number as _, Stat};
 use study_analysis::analyze::{Analysis, RealizationSummary};
 pub use study_analysis::study::Trace;
+use study_base::sort::SmallSort as _;
 use study_session::outcome::Role;
 use study_stats::describe::mean;
 
@@ -204,7 +205,7 @@ impl<'a> Scene<'a> {
             (!m.tested, along.unwrap_or(f64::INFINITY))
         };
         let mut models = scene.models.clone();
-        models.sort_by(|a, b| {
+        models.small_sort_by(|a, b| {
             let (a, b) = (key(a), key(b));
             a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
         });

@@ -7,6 +7,7 @@ use study_analysis::analyze::psychophysics::results::LabelPair;
 use study_analysis::analyze::psychophysics::{LevelData, PartAnalysis, PartFinding, PartQuestion};
 use study_analysis::analyze::results::{Interval, Number as _, Stat};
 use study_analysis::analyze::{Pair, Verdict};
+use study_base::sort::SmallSort as _;
 use study_base::text::counted;
 use study_plan::protocol::Occasion;
 use study_stats::psychometric::{Core, Spacing};
@@ -259,7 +260,7 @@ fn ranks(part: &PartAnalysis) -> Option<String> {
     let mut means: Vec<(&str, f64)> = (found.items.iter())
         .filter_map(|(name, item)| Some((name.as_str(), item.mean_rank.number()?)))
         .collect();
-    means.sort_by(|a, b| a.1.total_cmp(&b.1));
+    means.small_sort_by(|a, b| a.1.total_cmp(&b.1));
     let listed: Vec<String> = (means.iter().take(MAX_LISTED))
         .map(|(name, mean)| format!("{name} {}", apa::two(*mean)))
         .collect();

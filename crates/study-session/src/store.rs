@@ -73,6 +73,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
+use study_base::sort::SmallSort as _;
 use study_plan::protocol::Protocol;
 use study_plan::protocol::fingerprint::Fingerprints;
 
@@ -127,7 +128,7 @@ pub fn studies(path: &Path) -> Result<Vec<StudyFolder>, StoreError> {
         folders.push(item.map_err(unread)?.path());
     }
     folders.retain(|folder| is_study(folder));
-    folders.sort();
+    folders.small_sort();
     if folders.is_empty() {
         return Err(StoreError::Empty {
             path: path.to_owned(),

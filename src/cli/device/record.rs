@@ -7,6 +7,7 @@ use crate::cli::device_selection::Tested;
 use crate::cli::{Failure, Kind};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+use study_base::sort::SmallSort as _;
 use study_device::commission::{Numbers, Side};
 
 /// `study-device-record/1`.
@@ -158,7 +159,7 @@ fn all(results: &Path, serial: &str, kind: RecordKind) -> Vec<Record> {
         own.then_some(record)
     });
     let mut records: Vec<Record> = records.collect();
-    records.sort_by_key(|record| record.at);
+    records.small_sort_by_key(|record| record.at);
     records
 }
 

@@ -11,6 +11,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use study_analysis::power::{Chunk, Plan, Progress, Unit};
+use study_base::sort::SmallSort as _;
 use study_base::text::counted;
 
 /// The format of a part.
@@ -177,7 +178,7 @@ fn files(dir: &Path) -> Result<Vec<PathBuf>, Failure> {
             found.push(path);
         }
     }
-    found.sort();
+    found.small_sort();
     if found.is_empty() {
         return Err(
             Failure::input(format!("{}: no parts of a simulation", shown(dir)))

@@ -3,6 +3,7 @@
 use chrono::{DateTime, FixedOffset};
 use std::cmp::Reverse;
 use std::ops::RangeInclusive;
+use study_base::sort::SmallSort as _;
 use study_plan::protocol::Protocol;
 use study_session::outcome::fold::History;
 use study_session::session::Roster;
@@ -83,7 +84,7 @@ pub(super) fn interrupted<'a>(
         .filter_map(|s| Some((s.history.last_activity?.wall, s)))
         .filter(|(last, _)| is_recent(*last, now, within_h))
         .collect();
-    left.sort_by_key(|(last, _)| Reverse(*last));
+    left.small_sort_by_key(|(last, _)| Reverse(*last));
     let mut newest_first = left.into_iter().map(|(_, session)| session);
     newest_first.find(|session| !is_open(session))
 }

@@ -2,6 +2,7 @@
 
 use super::{Comparing, Percepts, TIE};
 use crate::rater::{Effect, Rater};
+use study_base::sort::SmallSort as _;
 use study_base::text::ModelId;
 use study_plan::protocol::{Answer, Part, Protocol, Ranking, Task, Trial};
 
@@ -18,7 +19,7 @@ impl Comparing {
             felt = anywhere.iter().map(|place| *place as f64).collect();
         }
         let mut order: Vec<usize> = (0..felt.len()).collect();
-        order.sort_by(|a, b| felt[*b].total_cmp(&felt[*a]));
+        order.small_sort_by(|a, b| felt[*b].total_cmp(&felt[*a]));
         self.ranks = vec![1; felt.len()];
         for (place, two) in (2..).zip(order.windows(2)) {
             let near = ties && felt[two[0]] - felt[two[1]] < TIE * self.noise;

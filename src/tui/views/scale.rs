@@ -7,6 +7,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::{Margin, Rect};
 use ratatui::widgets::Widget;
 use std::collections::BTreeMap;
+use study_base::sort::SmallSort as _;
 
 /// Maximum number of boxes; a longer scale is drawn as a line.
 pub const MOST_BOXES: i64 = 11;
@@ -89,7 +90,7 @@ impl Boxes<'_> {
         let places = self.places(area);
         let label = |(n, place): &(i64, Rect)| Some((*place, self.labels.get(n)?.as_str()));
         let mut labeled: Vec<(Rect, &str)> = places.iter().filter_map(label).collect();
-        labeled.sort_by_key(|(place, _)| place.x);
+        labeled.small_sort_by_key(|(place, _)| place.x);
         captions(&labeled, covering(&places), 24)
     }
 
@@ -298,7 +299,7 @@ impl Track<'_> {
         let mut places: Vec<(Rect, &str)> = labels
             .map(|(at, label)| (self.place_of(line, *at), *label))
             .collect();
-        places.sort_by_key(|(place, _)| place.x);
+        places.small_sort_by_key(|(place, _)| place.x);
         captions(&places, line, 30)
     }
 

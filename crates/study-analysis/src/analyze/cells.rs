@@ -6,6 +6,7 @@
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::ops::Range;
+use study_base::sort::SmallSort as _;
 use study_session::outcome::ratings::Ratings;
 use study_stats::describe::{mean, mean_of, squares_about};
 use study_stats::lmm::CellSummary;
@@ -95,7 +96,7 @@ impl<'a> Cells<'a> {
         let mut groups: Vec<Range<usize>> = Vec::new();
         for group in order.chunk_by_mut(|&a, &b| place(a) == place(b)) {
             if !group.is_sorted_by_key(|&i| ratings.repetition[i]) {
-                group.sort_by_key(|&i| ratings.repetition[i]);
+                group.small_sort_by_key(|&i| ratings.repetition[i]);
             }
             let start = groups.last().map_or(0, |g| g.end);
             groups.push(start..start + group.len());

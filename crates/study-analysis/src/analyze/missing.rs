@@ -13,6 +13,7 @@ use super::adjusted::Adjusted;
 use super::cells::{Cell, Cells};
 use super::record::{RealizationName, Stat, statistics};
 use std::collections::BTreeMap;
+use study_base::sort::SmallSort as _;
 use study_stats::correlation::{p_of_r, pearson};
 use study_stats::describe::mean;
 use study_stats::level::rejects;
@@ -404,7 +405,7 @@ impl<'a> Moves<'a> {
 
     fn best(&self) -> Moved {
         let mut ranked: Vec<usize> = (0..self.means.len()).collect();
-        ranked.sort_by(|&a, &b| self.rules.better.best_first(self.means[a], self.means[b]));
+        ranked.small_sort_by(|&a, &b| self.rules.better.best_first(self.means[a], self.means[b]));
         let [first, second, ..] = ranked[..] else {
             return Moved::undefined("there is only one realization");
         };

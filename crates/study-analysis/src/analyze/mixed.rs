@@ -15,6 +15,7 @@ pub use records::{
 use super::cells::Cells;
 use super::record::{Interval, Number as _, RealizationName, Stat, Why};
 use std::collections::BTreeMap;
+use study_base::sort::SmallSort as _;
 use study_stats::describe::{mean, sum_of_squares};
 use study_stats::distribution::chi2_upper;
 use study_stats::lmm::{
@@ -125,7 +126,7 @@ impl Data {
                     .iter()
                     .filter_map(|&i| cells.ratings.vaf[i].zip(cells.centered[i]))
                     .collect();
-                rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+                rows.small_sort_by(|a, b| a.0.total_cmp(&b.0));
                 for same in rows.chunk_by(|a, b| a.0 == b.0) {
                     let ratings: Vec<f64> = same.iter().map(|r| r.1).collect();
                     with_vaf.extend(of_rows(c.subject, c.model, same[0].0, &ratings));

@@ -4,6 +4,7 @@
 use super::cells::Cells;
 use super::record::{Interval, RealizationName, Stat, statistics};
 use std::collections::BTreeMap;
+use study_base::sort::SmallSort as _;
 use study_stats::carry_over::{OrderedRating, carry_over};
 use study_stats::describe::Sum;
 use study_stats::paired::holm;
@@ -81,7 +82,7 @@ pub(super) fn order(cells: &Cells<'_>) -> Order {
     for own in known.chunk_by(|a, b| r.subject[a.0] == r.subject[b.0]) {
         trials.clear();
         trials.extend(own.iter().map(|&(i, trial)| (trial, i)));
-        trials.sort_by_key(|p| p.0);
+        trials.small_sort_by_key(|p| p.0);
         for &(i, trial) in own {
             let before = trial - 1;
             let first = trials.partition_point(|p| p.0 < before);

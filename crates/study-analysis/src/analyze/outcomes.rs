@@ -14,6 +14,7 @@ use super::results::{AdjustedCells, FactorialTests};
 use super::warning::Warning;
 use super::{Better, Rules, effects, factorial, outcome_model};
 use std::collections::{BTreeMap, BTreeSet};
+use study_base::sort::SmallSort as _;
 use study_base::text::counted;
 use study_plan::protocol::{BetterEnd, Measure, OutcomeRules, Transform};
 use study_session::outcome::ratings::{Measured, Ratings};
@@ -352,7 +353,7 @@ fn order(means: &AdjustedCells, better: Option<BetterEnd>) -> Vec<String> {
     let mut ranked: Vec<(f64, &str)> = (means.means.iter())
         .filter_map(|(name, of)| Some((of.mean.number()?, name.as_str())))
         .collect();
-    ranked.sort_by(|x, y| better.best_first(x.0, y.0).then(x.1.cmp(y.1)));
+    ranked.small_sort_by(|x, y| better.best_first(x.0, y.0).then(x.1.cmp(y.1)));
     ranked
         .into_iter()
         .map(|(_, name)| name.to_owned())

@@ -5,6 +5,7 @@ use super::describe::{NO_REPETITION, ONE};
 use super::exclude::{pairs, trials};
 use super::record::{ParticipantName, Stat, statistics};
 use std::collections::BTreeMap;
+use study_base::sort::SmallSort as _;
 use study_plan::protocol::Role;
 use study_stats::correlation::pearson;
 use study_stats::describe::{mean, sd};
@@ -86,7 +87,7 @@ pub(super) fn subjects(cells: &Cells<'_>) -> Screening {
         }
         let ordered = rows.iter().all(|&i| r.trial_index[i].is_some());
         let (mean, sd) = (mean(&x), sd(&x));
-        rows.sort_by_key(|&i| r.trial_index[i]);
+        rows.small_sort_by_key(|&i| r.trial_index[i]);
         let run = rows
             .chunk_by(|&a, &b| r.rating[a] == r.rating[b])
             .map(<[usize]>::len)

@@ -4,6 +4,7 @@ use super::results::{
     AdjustedCells, AdjustedMean, Correlation, Described, Number as _, Realistic, ReferenceTest,
 };
 use super::{Analysis, Better, Finding, Pair, Question, RealizationSummary};
+use study_base::sort::SmallSort as _;
 
 /// Whether two means or VAF are equal but for rounding.
 fn is_close(x: f64, y: f64) -> bool {
@@ -25,7 +26,7 @@ pub(super) fn ranked<'a>(
 ) -> Vec<(f64, &'a str)> {
     let mean = |name: &str| cells.means.get(name)?.mean.number();
     let mut ranked: Vec<(f64, &str)> = names.filter_map(|name| Some((mean(name)?, name))).collect();
-    ranked.sort_by(|x, y| better.best_first(x.0, y.0).then(x.1.cmp(y.1)));
+    ranked.small_sort_by(|x, y| better.best_first(x.0, y.0).then(x.1.cmp(y.1)));
     ranked
 }
 

@@ -14,6 +14,7 @@ use super::subjects::MAX_LISTED;
 use super::warning::Warning;
 use std::collections::BTreeMap;
 use study_base::apa;
+use study_base::sort::SmallSort as _;
 use study_base::text::counted;
 use study_stats::level::rejects;
 use study_stats::permutation::{DRAWS, MAX_EXACT};
@@ -330,7 +331,7 @@ fn missing(warn: &mut impl FnMut(&'static str, String), evidence: &Evidence, alp
             Some((name.as_str().to_owned(), of.share.number()?))
         };
         let mut shares: Vec<(String, f64)> = missing.realization.iter().filter_map(share).collect();
-        shares.sort_by(|a, b| a.1.total_cmp(&b.1));
+        shares.small_sort_by(|a, b| a.1.total_cmp(&b.1));
         if let (Some(least), Some(most)) = (shares.first(), shares.last()) {
             warn(
                 "missing-by-realization",

@@ -4,6 +4,7 @@ use super::{ExportError, Options, Source};
 use chrono::{DateTime, FixedOffset};
 use std::collections::{BTreeMap, BTreeSet};
 use study_base::hex::Digest;
+use study_base::sort::SmallSort as _;
 use study_base::text::ParticipantId;
 use study_plan::protocol::Answer;
 use study_session::outcome::ratings::Origin;
@@ -70,11 +71,11 @@ pub(super) fn select(source: &Source<'_>, options: &Options) -> Result<Selected,
             id.clone_from(new);
         }
     }
-    rows.sort_by(|a, b| {
+    rows.small_sort_by(|a, b| {
         (&a.participant, a.session, a.trial).cmp(&(&b.participant, b.session, b.trial))
     });
-    participants.sort_by(|a, b| a.participant.cmp(&b.participant));
-    intervals.sort_by(|a, b| a.participant.cmp(&b.participant));
+    participants.small_sort_by(|a, b| a.participant.cmp(&b.participant));
+    intervals.small_sort_by(|a, b| a.participant.cmp(&b.participant));
     let mut ages_cut = 0;
     for participant in &mut participants {
         for (question, answer) in &mut participant.answers {
@@ -113,7 +114,7 @@ fn renamed(
         digest.finish()
     };
     let mut order: Vec<&ParticipantId> = ids.iter().copied().collect();
-    order.sort_by_key(|id| secret(id));
+    order.small_sort_by_key(|id| secret(id));
     (1..)
         .zip(order)
         .map(|(n, id)| (id.clone(), numbered(n)))

@@ -3,6 +3,7 @@
 use super::{OtherFiles, families};
 use study_base::diagnostic::{Fault, Findings, Severity, did_you_mean};
 use study_base::perception::force_jnd_n;
+use study_base::sort::SmallSort as _;
 use study_base::text::Untrusted;
 use study_haptics::model::Realization;
 use study_haptics::safe_play;
@@ -81,7 +82,7 @@ pub(super) fn vaf(
             Untrusted(wanted)
         ))
         .at(spans.get("analysis.vaf").cloned());
-        names_seen.sort();
+        names_seen.small_sort();
         names_seen.dedup();
         let names: Vec<&str> = names_seen.iter().map(String::as_str).collect();
         findings

@@ -1,6 +1,7 @@
 //! What is known without simulation, and the search for the smallest design.
 
 use super::{Cell, CellResult, Link, Scale, Settings, Vaf};
+use study_base::sort::SmallSort as _;
 use study_stats::level;
 use study_stats::permutation;
 use study_stats::power::covariate::{Design, Expected, Spread, Values};
@@ -187,7 +188,7 @@ pub fn smallest(
                 };
                 // Without simulation the closed form decides.
                 let mut near: Vec<&CellResult> = results.iter().filter(own).collect();
-                near.sort_by_key(|r| r.cell.participants);
+                near.small_sort_by_key(|r| r.cell.participants);
                 let enough = |r: &&CellResult| r.tests.first().is_some_and(|t| t.power >= target);
                 let found = near.into_iter().find(enough);
                 let first = found.filter(|r| r.cell.participants <= participants + 1);

@@ -7,6 +7,7 @@ use super::tracks::{TrackWorld, TracksWorld, Truth};
 use super::{Assumptions, Cell, Overrides, Pace, Plan, PlanError, Scale, Settings, Test, Vaf};
 use crate::analyze::ALPHA;
 use crate::analyze::psychophysics::{have_ratios, track_settings};
+use study_base::sort::SmallSort as _;
 use study_base::text::{ModelId, PartId};
 use study_plan::procedure::Ladder;
 use study_plan::protocol::conditions::by_condition;
@@ -270,7 +271,7 @@ fn of_pairs(
 ) -> Result<Planned, PlanError> {
     let mut items: Vec<_> = pairs.pairs.iter().flatten().collect();
     // In the order of the protocol.
-    items.sort_by_key(|id| protocol.models.iter().position(|m| m.id == **id));
+    items.small_sort_by_key(|id| protocol.models.iter().position(|m| m.id == **id));
     items.dedup();
     let place = |id: &ModelId| items.iter().position(|item| **item == *id).unwrap_or(0);
     let ties = stated.ties;

@@ -14,6 +14,7 @@ use super::expected::LOGISTIC_SD;
 use super::{Assumptions, Link, Scale};
 use crate::analyze::Analysis;
 use study_base::rng::Stream;
+use study_base::sort::SmallSort as _;
 use study_plan::protocol::power::{PowerPlan, PowerSpread};
 use study_stats::clm::{CategoryCount, CategoryCounts, ClmError, Predictor};
 use study_stats::clmm::{CrossedClmm, CrossedParameters, clmm_crossed};
@@ -227,7 +228,7 @@ impl Pilot {
                 rows.push((analysis.subject(row), j, rating));
             }
         }
-        rows.sort_by(|a, b| (a.0, a.1).cmp(&(b.0, b.1)));
+        rows.small_sort_by(|a, b| (a.0, a.1).cmp(&(b.0, b.1)));
         let (x, sd) = standardized(&realizations.iter().map(|r| r.1).collect::<Vec<_>>());
         let mut cells: Vec<CellSummary> = Vec::new();
         for (subject, own) in rows.chunk_by(|a, b| a.0 == b.0).enumerate() {

@@ -4,6 +4,7 @@
 use crate::analyze::psychophysics::{PartAnalysis, StudyData, parts};
 use crate::analyze::{Include, Rules};
 use study_base::rng::Stream;
+use study_base::sort::SmallSort as _;
 use study_base::text::{ModelId, PartId, ParticipantId, QuestionId};
 use study_plan::protocol::pairs::Pairs;
 use study_plan::protocol::parts::{Part, Task, TrackRules};
@@ -37,7 +38,7 @@ pub fn complete_study(protocol: &Protocol, question: &QuestionId, participants: 
     };
     let mut models: Vec<_> = protocol.models.iter().filter(presented).collect();
     let participants = participants.min(ENOUGH);
-    models.sort_by(|a, b| a.id.as_str().cmp(b.id.as_str()));
+    models.small_sort_by(|a, b| a.id.as_str().cmp(b.id.as_str()));
     let groups = protocol.groups.as_ref().map_or(&[][..], |g| &g.list);
     let group_of = |i: u32| {
         let group = groups.get(i as usize % groups.len().max(1));

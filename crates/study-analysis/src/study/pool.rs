@@ -6,6 +6,7 @@ use crate::analyze::{Deviation, Include, Rules, Warning};
 use chrono::DateTime;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use study_base::sort::SmallSort as _;
 use study_base::text::{QuestionId, Untrusted};
 use study_plan::protocol::difference::{self, Change};
 use study_plan::protocol::fingerprint::Parts;
@@ -388,7 +389,7 @@ fn site(read: &Read, question: &QuestionId) -> Site {
     let mut sessions: Vec<_> = (read.study.sessions.iter())
         .filter_map(|s| Some((s.history.started_at()?.wall, s.history.start()?)))
         .collect();
-    sessions.sort_by_key(|(at, start)| (*at, start.participant.clone()));
+    sessions.small_sort_by_key(|(at, start)| (*at, start.participant.clone()));
     for (at, start) in sessions {
         days.push(at.format("%Y-%m-%d").to_string());
         let kind = start.device_kind.as_str();

@@ -18,6 +18,7 @@ use super::{ESTIMATORS, IdentifyError, Method, Training, direction_state, eviden
 use crate::model::Realization;
 use crate::recording::Recording;
 use std::sync::OnceLock;
+use study_base::sort::SmallSort as _;
 use study_wire::predict::Lookup;
 
 /// Increments that are tried, in units of [`Recording::scale_mm`].
@@ -189,7 +190,7 @@ pub fn run_weighed(
     let mut sound: Vec<usize> = (0..candidates.len())
         .filter(|i| candidates[*i].failure().is_none())
         .collect();
-    sound.sort_by(|a, b| residual(*a).total_cmp(&residual(*b)));
+    sound.small_sort_by(|a, b| residual(*a).total_cmp(&residual(*b)));
     let hardly_larger = |i: &&usize| residual(**i) <= (1.0 + HARDLY) * residual(sound[0]);
     let recommended = sound.iter().filter(hardly_larger).min().copied();
     Ok(Comparison {

@@ -7,6 +7,7 @@ use crate::model::coverage::{Coverage, Determined, Origin};
 use crate::model::{Mechanism, Realization};
 use crate::recording::Recording;
 use std::collections::BTreeMap;
+use study_base::sort::SmallSort as _;
 
 /// Places of the map.
 const PLACES: usize = 20;
@@ -100,7 +101,7 @@ fn held_mm(coverage: &Coverage, mechanism: Option<&Mechanism>) -> Vec<[f64; 2]> 
         held.extend([[low, detent.first_mm], [end_mm, high]]);
     }
     held.retain(|[from, to]| from < to);
-    held.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    held.small_sort_by(|a, b| a[0].total_cmp(&b[0]));
     let mut joined: Vec<[f64; 2]> = Vec::new();
     for [from, to] in held {
         match joined.last_mut().filter(|last| last[1] >= from) {

@@ -24,6 +24,7 @@ use super::{Estimate, IdentifyError, Warning};
 use crate::model::coverage::Origin;
 use crate::model::{Branch, Realization};
 use crate::recording::{Recording, mean_and_variance};
+use study_base::sort::SmallSort as _;
 
 /// A share of the samples of a dynamic recording that have to be where the table is.
 const LEAST_INSIDE: f64 = 0.5;
@@ -191,7 +192,7 @@ impl Elsewhere {
             }
         }
         // mass, then damping, whatever the training recordings said first
-        (cell.terms).sort_by_key(|term| term.name != Term::Mass.as_str());
+        (cell.terms).small_sort_by_key(|term| term.name != Term::Mass.as_str());
         cell.certificate = cell.realization.certificate();
         cell.scores = (recordings.iter())
             .map(|recording| vaf::score(&cell.realization, recording))

@@ -16,6 +16,7 @@ use super::vaf;
 use crate::model::Realization;
 use crate::recording::{Recording, mean_and_variance};
 use rayon::prelude::*;
+use study_base::sort::SmallSort as _;
 
 /// Folds.
 pub const FOLDS: usize = 5;
@@ -148,7 +149,7 @@ impl<'r> Folds<'r> {
 
     /// The perceptual VAF of all recordings together.
     fn perceptual(&self, mut errors: Vec<Error>, weights: &Weights) -> Option<f64> {
-        errors.sort_by_key(|(r, i, _)| (*r, *i));
+        errors.small_sort_by_key(|(r, i, _)| (*r, *i));
         let (mut missed, mut force) = (0.0, 0.0);
         for own in errors.chunk_by(|a, b| a.0 == b.0) {
             let samples: Vec<usize> = own.iter().map(|(_, i, _)| *i).collect();
@@ -176,7 +177,7 @@ fn kinds(recordings: &[&Recording], strokes: &[Vec<usize>]) -> Vec<usize> {
         }
     }
     let mut order: Vec<usize> = (0..top_mm_s.len()).collect();
-    order.sort_by(|a, b| top_mm_s[*a].total_cmp(&top_mm_s[*b]));
+    order.small_sort_by(|a, b| top_mm_s[*a].total_cmp(&top_mm_s[*b]));
     let mut of = vec![0; order.len()];
     for (rank, stroke) in order.iter().enumerate() {
         of[*stroke] = rank * FOLDS / order.len();

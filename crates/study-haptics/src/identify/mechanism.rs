@@ -18,6 +18,7 @@ mod start;
 #[cfg(test)]
 mod tests;
 
+use study_base::sort::SmallSort as _;
 use super::elements::start_of;
 use super::method::Progress;
 use super::samples::weight_of;
@@ -226,7 +227,7 @@ pub fn identify(
         })
         .collect();
     let mut order: Vec<usize> = (0..starts.len()).collect();
-    order.sort_by(|a, b| attempts[*a].compared_n.total_cmp(&attempts[*b].compared_n));
+    order.small_sort_by(|a, b| attempts[*a].compared_n.total_cmp(&attempts[*b].compared_n));
     let best = begun[order[0]].as_ref().ok_or(IdentifyError::NoMechanism)?;
     let (filter, decision) = match known {
         Some(known) => (known, None),

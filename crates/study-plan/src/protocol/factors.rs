@@ -8,6 +8,7 @@
 use super::{Groups, ModelEntry, Protocol, Role};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
+use study_base::sort::SmallSort as _;
 use study_base::text::{QuestionId, Untrusted};
 
 /// The name of the factor between participants: their group.
@@ -152,7 +153,7 @@ fn crossed(places: &[usize]) -> Vec<Vec<usize>> {
 
 fn sorted(effects: BTreeSet<Vec<usize>>) -> Vec<Vec<usize>> {
     let mut effects: Vec<Vec<usize>> = effects.into_iter().collect();
-    effects.sort_by_key(Vec::len);
+    effects.small_sort_by_key(Vec::len);
     effects
 }
 

@@ -3,6 +3,7 @@
 use super::frame::Frame;
 use super::{Anchor, Color, MAX_LABEL, Mark, Panel, SMALL, shortened, text_width};
 use crate::picture::{Path, Pen, Picture, Point, Text};
+use study_base::sort::SmallSort as _;
 
 /// Distances of a name from its point that are tried, px.
 const DISTANCES: [f64; 9] = [9.0, 15.0, 22.0, 32.0, 45.0, 62.0, 84.0, 110.0, 145.0];
@@ -141,7 +142,7 @@ pub(super) fn places(panel: &Panel, f: &Frame) -> Vec<Place> {
             Some((point, text, width))
         })
         .collect();
-    named.sort_by(|a, b| b.0.1.total_cmp(&a.0.1));
+    named.small_sort_by(|a, b| b.0.1.total_cmp(&a.0.1));
     let mut found: Vec<Place> = Vec::new();
     for (point, text, width) in &named {
         let place = best(*point, text, *width, &found, &obstacles, f);

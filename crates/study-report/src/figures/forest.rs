@@ -6,6 +6,7 @@ use crate::apa::digits;
 use crate::chart::{Axis, Color, Look, Mark, PALETTE, Panel, Shape, Whisker, shortened};
 use std::collections::BTreeMap;
 use study_analysis::analyze::psychophysics::results::{CellName, ConditionName};
+use study_base::sort::SmallSort as _;
 use study_stats::psychometric::Spacing;
 
 /// A value with its interval.
@@ -188,7 +189,7 @@ pub(super) fn by_condition<R>(
     mean: impl Fn(&ConditionName) -> Option<Estimated>,
 ) -> Rows {
     let mut cells: Vec<(&CellName, &R)> = cells.iter().collect();
-    cells.sort_by_key(|(name, _)| &name.condition);
+    cells.small_sort_by_key(|(name, _)| &name.condition);
     let row = |name: &str, (value, ci95): Estimated, mean: bool| {
         Some(Row {
             name: name.to_owned(),

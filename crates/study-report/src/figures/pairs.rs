@@ -5,6 +5,7 @@ use crate::apa::digits;
 use crate::chart::{Anchor, MAX_LABEL, Note, shortened, widest};
 use crate::chart::{Axis, Color, Look, Mark, PALETTE, Panel, Shape, Whisker};
 use study_analysis::analyze::{Pair, Verdict};
+use study_base::sort::SmallSort as _;
 
 /// The compared pairs, the higher mean first, the largest difference first.
 fn pairs(scene: &Scene<'_>) -> Vec<Pair> {
@@ -18,7 +19,7 @@ fn pairs(scene: &Scene<'_>) -> Vec<Pair> {
             p.seen_from(higher)
         })
         .collect();
-    found.sort_by(|a, b| b.difference.value.total_cmp(&a.difference.value));
+    found.small_sort_by(|a, b| b.difference.value.total_cmp(&a.difference.value));
     found
 }
 

@@ -17,6 +17,7 @@ use crate::chart::{Axis, Dash, Label, Look, Mark, PALETTE, Panel, Shape, Whisker
 use study_analysis::analyze::psychophysics::results::{At, GeometricMean, Sensitivity};
 use study_analysis::analyze::psychophysics::{LevelData, PartAnalysis, TrackData, TrackTrial};
 use study_analysis::analyze::results::Number as _;
+use study_base::sort::SmallSort as _;
 use study_stats::psychometric::Spacing;
 
 /// What the files of these figures are called before the number of the part.
@@ -171,7 +172,7 @@ fn abilities(part: &PartAnalysis) -> Vec<Row> {
             })
         })
         .collect();
-    rows.sort_by(|a, b| b.value.total_cmp(&a.value));
+    rows.small_sort_by(|a, b| b.value.total_cmp(&a.value));
     rows
 }
 

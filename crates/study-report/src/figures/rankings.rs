@@ -4,6 +4,7 @@ use super::Drawn;
 use super::forest::{Row, forest};
 use study_analysis::analyze::psychophysics::PartAnalysis;
 use study_analysis::analyze::results::Number as _;
+use study_base::sort::SmallSort as _;
 use study_stats::psychometric::Spacing;
 
 /// Worths with their intervals, the first realization first.
@@ -20,7 +21,7 @@ pub(super) fn worths(name: &str, part: &PartAnalysis) -> Option<Drawn> {
             })
         })
         .collect();
-    rows.sort_by(|a, b| b.value.total_cmp(&a.value));
+    rows.small_sort_by(|a, b| b.value.total_cmp(&a.value));
     let caption = "Rankings: logarithms of the worths (their sum is 0) with 95 % intervals, the realization with the first ranks \
                    first. A difference of 1.1 means that of two untied realizations the higher one is above the other in three of four rankings."
         .to_owned();

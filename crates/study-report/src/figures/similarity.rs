@@ -6,6 +6,7 @@ use crate::chart::{Axis, Label, Look, Mark, PALETTE, Panel, Whisker, shortened};
 use study_analysis::analyze::psychophysics::PartAnalysis;
 use study_analysis::analyze::psychophysics::results::Place;
 use study_analysis::analyze::results::Number as _;
+use study_base::sort::SmallSort as _;
 
 /// Width and height of labels and ticks of axes, px.
 const MARGINS: f64 = 56.0;
@@ -82,7 +83,7 @@ pub(super) fn map(name: &str, part: &PartAnalysis) -> Option<Drawn> {
 /// One dimension: a row for each realization, in their order along it.
 fn line(rows: &[Placed]) -> Panel {
     let mut rows: Vec<&Placed> = rows.iter().collect();
-    rows.sort_by(|a, b| a.at[0].0.total_cmp(&b.at[0].0));
+    rows.small_sort_by(|a, b| a.at[0].0.total_cmp(&b.at[0].0));
     let names: Vec<String> = rows.iter().map(|row| row.name.clone()).collect();
     let ends = rows.iter().flat_map(|row| {
         let (x, se) = row.at[0];

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use study_analysis::analyze::psychophysics::PartAnalysis;
 use study_analysis::analyze::psychophysics::results::CellName;
 use study_analysis::analyze::results::{Interval, Number as _};
+use study_base::sort::SmallSort as _;
 use study_stats::psychometric::Spacing;
 
 /// How far means stand beside the participants, of the distance of two conditions.
@@ -86,7 +87,8 @@ pub(super) fn by_conditions(name: &str, part: &PartAnalysis) -> Option<Drawn> {
     panels.retain(|(_, rows)| rows.iter().any(|row| row.mean));
     // In the order of the tracks.
     let levels = &part.data.levels;
-    panels.sort_by_key(|(condition, _)| levels.iter().position(|c| c.condition == *condition));
+    panels
+        .small_sort_by_key(|(condition, _)| levels.iter().position(|c| c.condition == *condition));
     let most = panels.iter().map(|(_, rows)| rows.len()).max()?;
     let is_law = part.results.over.webers_law.is_some();
     if panels.len() < 2 || panels.len().max(most) > MAX_DRAWN || is_law {

@@ -7,6 +7,7 @@ use crate::chart::{Axis, Dash, Look, Mark, PALETTE, Panel, Whisker};
 use std::collections::BTreeMap;
 use study_analysis::analyze::psychophysics::PartAnalysis;
 use study_analysis::analyze::results::Number as _;
+use study_base::sort::SmallSort as _;
 
 /// The increment of everybody at a standard: geometric mean and interval.
 type Group = (f64, f64, Option<(f64, f64)>);
@@ -126,7 +127,7 @@ impl Drawing {
         let people: Vec<Vec<(f64, f64)>> = (self.people.iter())
             .map(|own| {
                 let mut own: Vec<_> = own.iter().map(|p| place(p.0, p.1)).collect();
-                own.sort_by(|a, b| a.0.total_cmp(&b.0));
+                own.small_sort_by(|a, b| a.0.total_cmp(&b.0));
                 own
             })
             .collect();

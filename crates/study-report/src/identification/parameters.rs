@@ -3,6 +3,7 @@
 use super::{Drawing, Shown, both, letter, points, zero_line};
 use crate::chart::{Axis, Color, ColorBar, Figure, Look, Mark, Note, Panel, Scale, Shape, Span};
 use std::fmt::Write as _;
+use study_base::sort::SmallSort as _;
 use study_haptics::model::{Branch, Realization};
 
 /// A parameter: column of the CSV, name, values by node.
@@ -119,7 +120,7 @@ pub fn map(by_lambda: &[(f64, &Realization)], shown: Shown) -> Option<Drawing> {
     let mut sorted: Vec<(f64, Realization)> = (by_lambda.iter())
         .map(|(lambda, r)| (*lambda, shown.realization(r)))
         .collect();
-    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    sorted.small_sort_by(|a, b| a.0.total_cmp(&b.0));
     let x = &sorted.first()?.1.x_mm;
     if sorted.len() < 2 || sorted.iter().any(|(_, r)| r.x_mm != *x) {
         return None;

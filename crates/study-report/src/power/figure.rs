@@ -4,6 +4,7 @@
 use super::{Report, deciding};
 use crate::chart::{Axis, Dash, Figure, Look, Mark, Panel, Whisker};
 use study_analysis::power::{Cell, PartWorld};
+use study_base::sort::SmallSort as _;
 
 /// Height of a panel, px.
 const HEIGHT: f64 = 300.0;
@@ -20,7 +21,7 @@ fn line(report: &Report) -> &'static str {
 pub fn figure(report: &Report) -> Option<Figure> {
     report.plan.settings.tests.first()?;
     let mut shapes = report.plan.shapes();
-    shapes.sort_by_key(|(q, r)| (*r, *q));
+    shapes.small_sort_by_key(|(q, r)| (*r, *q));
     let cells = report.shown();
     let most = cells.iter().map(|c| c.participants).max()? as f64;
     let repetitions: Vec<usize> = {

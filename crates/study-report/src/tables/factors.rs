@@ -4,6 +4,7 @@ use crate::apa::{self, bare_p, three, two, whole};
 use crate::table::{Builder, Table, page, report};
 use study_analysis::analyze::Analysis;
 use study_analysis::analyze::results::{ContrastName, FactorialEffect, LevelsName};
+use study_base::sort::SmallSort as _;
 
 /// The name of an effect, as in a paper.
 fn effect_name(name: &str) -> String {
@@ -35,7 +36,7 @@ pub(crate) fn effects(a: &Analysis) -> Table {
             (order.unwrap_or(usize::MAX), name, effect)
         })
         .collect();
-    all.sort_by(|x, y| (x.0, x.1.len(), &x.1).cmp(&(y.0, y.1.len(), &y.1)));
+    all.small_sort_by(|x, y| (x.0, x.1.len(), &x.1).cmp(&(y.0, y.1.len(), &y.1)));
     let note = "Analysis of variance of the participants’ means in each combination of levels, over the \
                 participants who rated every realization. Degrees of freedom are uncorrected; p has the \
                 Greenhouse–Geisser correction, p (Holm) also that over the tested effects. p (ranks): aligned \
@@ -103,7 +104,7 @@ pub(crate) fn means(a: &Analysis) -> Table {
         [vec![name.0.len()], factors, levels].concat()
     };
     let mut all: Vec<_> = tests.iter().flat_map(|tests| &tests.means).collect();
-    all.sort_by_key(|(name, _)| place(name));
+    all.small_sort_by_key(|(name, _)| place(name));
     Builder::new("Means at the levels of the factors", all)
         .text(report("levels").file("levels"), &|m| levels(m.0))
         .field(report("n").file("n"), whole, |m| &m.1.n)

@@ -17,6 +17,7 @@ use study_analysis::analyze::psychophysics::results::{
     Sensitivity,
 };
 use study_analysis::analyze::results::{Number as _, PairName, RealizationName};
+use study_base::sort::SmallSort as _;
 use study_base::text::Untrusted;
 
 /// A kind of table: the file it goes into, and how it is made.
@@ -382,7 +383,7 @@ fn abilities(results: &PartResults) -> Table {
     let mut items: Vec<(&RealizationName, &Ability)> =
         pairs.into_iter().flat_map(|p| &p.items.0).collect();
     let order = |item: &(&RealizationName, &Ability)| item.1.ability.number().unwrap_or(f64::MIN);
-    items.sort_by(|a, b| order(b).total_cmp(&order(a)));
+    items.small_sort_by(|a, b| order(b).total_cmp(&order(a)));
     let mut notes = Vec::new();
     if let Some(why) = items.first().and_then(|item| item.1.ability.reason()) {
         notes.push(format!("No abilities: {}.", name(why)));

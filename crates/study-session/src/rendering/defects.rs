@@ -3,6 +3,7 @@
 use super::ROUNDING_N;
 use super::moments::Lag;
 use crate::outcome::{Defect, Fidelity};
+use study_base::sort::SmallSort as _;
 use study_plan::protocol::RenderingRules;
 
 /// Largest error of the speed, and of the time of the samples.
@@ -93,7 +94,7 @@ pub(super) fn defects(fidelity: &Fidelity, found: &Found, rules: &RenderingRules
         if all.len() == before && excused {
             all.push(Defect::Constants);
         }
-        all.sort_by_key(|defect| *defect as u8);
+        all.small_sort_by_key(|defect| *defect as u8);
     }
     let weak = found.enough
         && (outside(fidelity.measured_gain)

@@ -6,6 +6,7 @@
 use super::Session;
 use crate::outcome::{FormId, Moment};
 use std::collections::{BTreeMap, BTreeSet};
+use study_base::sort::SmallSort as _;
 use study_plan::protocol::questionnaires::Stretch;
 use study_plan::protocol::{Question, Questionnaire};
 
@@ -30,7 +31,7 @@ impl Session {
         let mut asked: Vec<&Questionnaire> = all
             .filter(|own| self.ended_with(own).contains(&trial))
             .collect();
-        asked.sort_by_key(|own| own.after);
+        asked.small_sort_by_key(|own| own.after);
         asked.into_iter().flat_map(|own| &own.questions).collect()
     }
 

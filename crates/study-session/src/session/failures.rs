@@ -3,6 +3,7 @@
 use super::phase::{DeviceProblem, LOAD_WITHIN_S, Phase, STOP_WITHIN_S};
 use super::{Effect, Session};
 use crate::outcome::{Event, Failure, Moment};
+use study_base::sort::SmallSort as _;
 use study_plan::protocol::Trial;
 use study_plan::schedule::{self, Felt};
 
@@ -170,7 +171,7 @@ impl Session {
         // What is not told to a track, or to practice, that has ended takes it up again.
         if self.history.has_ended(&trial) {
             rest.extend(self.dropped(&[number]));
-            rest.sort_by_key(|t| t.trial);
+            rest.small_sort_by_key(|t| t.trial);
         }
         let design = &self.protocol.design_of(trial.part.as_ref());
         let mut constraint_broken = false;

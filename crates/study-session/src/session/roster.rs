@@ -2,6 +2,7 @@
 
 use crate::outcome::{ParticipantRow, State};
 use std::collections::BTreeMap;
+use study_base::sort::SmallSort as _;
 use study_base::text::ParticipantId;
 use study_plan::protocol::Confirms;
 
@@ -58,7 +59,7 @@ impl Roster {
         });
         let mut begun: Vec<&ParticipantRow> =
             rows.iter().filter(|row| row.started_at.is_some()).collect();
-        begun.sort_by_key(|row| std::cmp::Reverse(row.started_at));
+        begun.small_sort_by_key(|row| std::cmp::Reverse(row.started_at));
         let recent = begun.iter().take(RECENT);
         Self {
             recent: recent.map(|row| row.participant.clone()).collect(),

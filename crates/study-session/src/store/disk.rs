@@ -11,6 +11,7 @@ mod unix;
 mod windows;
 
 #[cfg(unix)]
+use study_base::sort::SmallSort as _;
 use unix as system;
 #[cfg(windows)]
 use windows as system;
@@ -245,7 +246,7 @@ impl Disk for RealDisk {
                 kind: kind_of(entry.file_type()?),
             });
         }
-        items.sort();
+        items.small_sort();
         Ok(items)
     }
 

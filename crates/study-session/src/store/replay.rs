@@ -13,6 +13,7 @@ use crate::outcome::fold::History;
 use serde::de::IgnoredAny;
 use std::collections::BTreeMap;
 use std::fmt;
+use study_base::sort::SmallSort as _;
 use study_plan::protocol::Seat;
 
 /// One file of a journal, in order.
@@ -395,7 +396,7 @@ impl Reader {
     fn finish(mut self, segments: &[Segment], head: &HeadFile) -> Replay {
         self.out.next_seq += self.lost;
         self.compare(segments, head);
-        self.out.entries.sort_by_key(|e| e.seq);
+        self.out.entries.small_sort_by_key(|e| e.seq);
         self.out.history = History::of(&self.out.entries);
         if let (None, Some(first), true) = (&self.out.claim, segments.first(), self.out.records > 0)
         {

@@ -12,6 +12,7 @@ use crate::outcome::{Entry, State};
 use rayon::prelude::*;
 use std::io;
 use std::path::{Path, PathBuf};
+use study_base::sort::SmallSort as _;
 use study_base::text::ParticipantId;
 use study_plan::protocol::Seat;
 
@@ -131,7 +132,7 @@ impl StudyFolder {
             .into_iter()
             .filter_map(|name| ParticipantId::new(name).ok())
             .collect();
-        ids.sort();
+        ids.small_sort();
         Ok(ids)
     }
 

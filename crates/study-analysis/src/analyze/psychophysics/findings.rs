@@ -19,6 +19,7 @@ use crate::analyze::record::{Interval, Number, PairName, Stat};
 use crate::analyze::results::{Correlation, Permuted};
 use std::collections::BTreeMap;
 use study_base::apa;
+use study_base::sort::SmallSort as _;
 use study_stats::level::rejects;
 
 /// A question about a part.
@@ -209,7 +210,7 @@ fn preferred(facts: &PartFacts, preferences: &Preferences, pairs: &[Pair]) -> Pa
     let mut abilities: Vec<(&str, f64)> = (items.iter())
         .map(|(name, item)| (name.as_str(), item.ability.number().unwrap_or(0.0)))
         .collect();
-    abilities.sort_by(|a, b| b.1.total_cmp(&a.1));
+    abilities.small_sort_by(|a, b| b.1.total_cmp(&a.1));
     found.names = abilities.iter().map(|a| a.0.to_owned()).collect();
     if facts.participants < 2 {
         found.caveat(

@@ -6,6 +6,7 @@ use super::results::PartResults;
 use crate::analyze::Rules;
 use crate::analyze::warning::Warning;
 use std::collections::{BTreeMap, BTreeSet};
+use study_base::sort::SmallSort as _;
 use study_base::text::{ModelId, QuestionId, counted};
 use study_plan::protocol::parts::Part;
 use study_plan::protocol::{Answer, Ranking};
@@ -60,7 +61,7 @@ fn is_one_order(rows: &[&RatingRow], intervals: &Intervals<'_>) -> bool {
         let mut felt: Vec<(u32, ModelId)> = felt
             .filter_map(|i| Some((i.interval, i.model.clone()?)))
             .collect();
-        felt.sort();
+        felt.small_sort();
         felt
     };
     let orders: Vec<Vec<(u32, ModelId)>> = rows.iter().map(order).collect();

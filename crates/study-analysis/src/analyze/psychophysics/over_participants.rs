@@ -4,6 +4,7 @@
 use crate::analyze::keys::ConditionName;
 use crate::analyze::record::{Interval, Number as _, PairName, Stat, statistics};
 use std::collections::BTreeMap;
+use study_base::sort::SmallSort as _;
 use study_stats::lmm::{CellSummary, FixedEffects, LmmData, adjusted_means};
 use study_stats::paired::{holm, one_sample};
 
@@ -207,7 +208,7 @@ pub struct Measured {
 pub(super) fn mixed(thresholds: &[Threshold<'_>], ratios: bool) -> Option<ConditionModel> {
     let names = |of: fn(&Threshold<'_>) -> String| -> Vec<String> {
         let mut names: Vec<String> = thresholds.iter().map(of).collect();
-        names.sort();
+        names.small_sort();
         names.dedup();
         names
     };

@@ -8,6 +8,7 @@ use crate::analyze::record::{
     Interval, Number as _, PairName, ParticipantName, RealizationName, Stat, statistics,
 };
 use std::collections::{BTreeMap, BTreeSet};
+use study_base::sort::SmallSort as _;
 use study_stats::correlation::spearman;
 use study_stats::describe::{mean, mean_of, sd};
 use study_stats::pairs::NoAbilities;
@@ -299,7 +300,7 @@ pub(super) fn by_worth(found: &Rankings) -> Vec<&str> {
     let mut all: Vec<(&str, f64)> = (found.items.iter())
         .map(|(name, item)| (name.as_str(), item.log_worth.number().unwrap_or(0.0)))
         .collect();
-    all.sort_by(|a, b| b.1.total_cmp(&a.1));
+    all.small_sort_by(|a, b| b.1.total_cmp(&a.1));
     all.into_iter().map(|(name, _)| name).collect()
 }
 
@@ -314,7 +315,7 @@ fn best(
     };
     let worths = &fit.abilities.abilities;
     let mut order: Vec<usize> = (0..items.len()).collect();
-    order.sort_by(|a, b| worths[*b].total_cmp(&worths[*a]));
+    order.small_sort_by(|a, b| worths[*b].total_cmp(&worths[*a]));
     let [first, next, ..] = order[..] else {
         return BestRank::undefined(ONE_REALIZATION);
     };

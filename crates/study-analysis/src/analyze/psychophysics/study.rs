@@ -28,6 +28,7 @@ use crate::analyze::results::Correlation;
 use crate::analyze::select::Include;
 use crate::analyze::warning::Warning;
 use std::collections::{BTreeMap, BTreeSet};
+use study_base::sort::SmallSort as _;
 use study_base::text::{ModelId, PartId, ParticipantId, counted};
 use study_plan::protocol::pairs::Pairs;
 use study_plan::protocol::parts::{Part, Task, TrackRules};
@@ -272,7 +273,7 @@ fn in_order(
             Some((row.participant.as_str(), row.session, row.trial, answered))
         })
         .collect();
-    trials.sort_by_key(|(who, session, trial, _)| (*who, *session, *trial));
+    trials.small_sort_by_key(|(who, session, trial, _)| (*who, *session, *trial));
     let of_one = trials.chunk_by(|a, b| a.0 == b.0).map(|own| {
         let sessions = own.chunk_by(|a, b| a.1 == b.1);
         sessions

@@ -7,6 +7,7 @@ use crate::analyze::psychophysics::results::{
 };
 use crate::analyze::results::{Correlation, Field, Key, Number as _};
 use std::collections::BTreeMap;
+use study_base::sort::SmallSort as _;
 use study_plan::protocol::OutcomeFamily;
 
 /// Most realizations with a VAF of which R goes through every permutation.
@@ -138,7 +139,7 @@ pub(super) fn of_part(part: &PartAnalysis) -> Vec<Number> {
     let retest = ["icc_agreement", "icc_consistency", "sem"];
     numbers.add("retest", &over.again.retest, &retest, CLOSED);
     let mut all = numbers.0;
-    all.sort_by(|a, b| a.0.cmp(&b.0));
+    all.small_sort_by(|a, b| a.0.cmp(&b.0));
     let named = |(id, value, tolerance)| (format!("{}:{id}", part.part), value, tolerance);
     all.into_iter().map(named).collect()
 }

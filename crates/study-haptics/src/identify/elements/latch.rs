@@ -1,6 +1,7 @@
 //! Where a recording asks for a latch: a spring that breaks at one position and holds again
 //! below another one.
 
+use study_base::sort::SmallSort as _;
 use super::force_n;
 use super::sums::follow;
 use crate::identify::Training;
@@ -30,7 +31,7 @@ pub(super) fn likely(training: &Training<'_>, elements: &Elements, every: usize)
     let mut found: Vec<(f64, [usize; 2])> = (pairs.into_par_iter())
         .filter_map(|[low, high]| Some((explained(&errors, nodes[low], nodes[high])?, [low, high])))
         .collect();
-    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    found.small_sort_by(|a, b| b.0.total_cmp(&a.0));
     (found.iter().take(MOST))
         .map(|(_, [low, high])| refined(&errors, [nodes[*low], nodes[*high]], nodes[1] - nodes[0]))
         .map(|[rearm_mm, break_mm]| Spring::Latch { rearm_mm, break_mm })

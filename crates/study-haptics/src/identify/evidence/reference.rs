@@ -7,6 +7,7 @@ use super::equations::{BORDER, EVERYWHERE, Equations, Row, Rule, directions, nod
 use super::instruments::{self, Instruments};
 use super::spread::{ONE_SIDED, Spread};
 use crate::recording::Recording;
+use study_base::sort::SmallSort as _;
 use study_wire::predict::Direction;
 
 /// Steps, as factors, in which the length of the play is refined.
@@ -137,12 +138,12 @@ impl Reference {
                 last = error;
             }
         }
-        tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+        tried.small_sort_by(|a, b| a.0.total_cmp(&b.0));
         for factor in REFINED {
             let best = tried.first()?.1;
             let beside = [factor, 1.0 / factor];
             tried.extend((beside.iter()).filter_map(|f| with(best.scaled(*f)?)));
-            tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+            tried.small_sort_by(|a, b| a.0.total_cmp(&b.0));
         }
         let (least, rule, _) = *tried.first()?;
         let rows = rows(recordings, places, rule, &instruments);

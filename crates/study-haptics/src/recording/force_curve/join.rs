@@ -3,6 +3,7 @@
 use super::ForceCurve;
 use crate::recording::{Columns, acceleration, range, resolution, velocity, write};
 use std::fmt::Write as _;
+use study_base::sort::SmallSort as _;
 use study_base::text::Untrusted;
 
 /// Rows a second of a curve that has no time, unless another rate is given.
@@ -55,7 +56,7 @@ pub fn unlike(curves: &[Source<'_>]) -> Vec<String> {
         let mut spreads: Vec<(f64, &str)> = (curves.iter())
             .map(|source| (spread(source), source.file))
             .collect();
-        spreads.sort_by(|a, b| a.0.total_cmp(&b.0));
+        spreads.small_sort_by(|a, b| a.0.total_cmp(&b.0));
         if let [(small, one), .., (large, other)] = spreads[..]
             && large > UNLIKE * small
         {

@@ -3,6 +3,7 @@
 use crate::procedure::ProcedureError;
 use serde::Serialize;
 use std::collections::VecDeque;
+use study_base::sort::SmallSort as _;
 
 /// The most points of a lattice.
 pub const MAX_POINTS: usize = study_stats::preference_gp::MAX_POINTS;
@@ -149,7 +150,7 @@ impl Lattice {
             group.sort_unstable();
             groups.push(group);
         }
-        groups.sort_by_key(|group| std::cmp::Reverse(group.len()));
+        groups.small_sort_by_key(|group| std::cmp::Reverse(group.len()));
         groups
     }
 

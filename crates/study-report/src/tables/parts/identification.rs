@@ -7,6 +7,7 @@ use study_analysis::analyze::psychophysics::results::{
     ConfusionName, Identified, LabelName, LabelUse, PartResults,
 };
 use study_analysis::analyze::results::Number as _;
+use study_base::sort::SmallSort as _;
 
 /// Most labels whose matrix is on a page.
 const MAX_COLUMNS: usize = 12;
@@ -15,7 +16,7 @@ const MAX_COLUMNS: usize = 12;
 fn labels(found: &Identified) -> Vec<(&LabelName, &LabelUse)> {
     let mut labels: Vec<_> = found.labels.iter().collect();
     let place = |label: &(&LabelName, &LabelUse)| label.1.place.number().unwrap_or(0.0);
-    labels.sort_by(|a, b| place(a).total_cmp(&place(b)));
+    labels.small_sort_by(|a, b| place(a).total_cmp(&place(b)));
     labels
 }
 
@@ -78,7 +79,7 @@ fn transfer(found: &Identified) -> Option<String> {
 pub(super) fn label_pairs(results: &PartResults) -> Table {
     let found = results.over.identification.as_ref();
     let mut pairs: Vec<_> = found.into_iter().flat_map(|own| &own.pairs).collect();
-    pairs.sort_by(|a, b| {
+    pairs.small_sort_by(|a, b| {
         let similarity = [a, b].map(|p| p.1.similarity.number().unwrap_or(0.0));
         similarity[1].total_cmp(&similarity[0])
     });

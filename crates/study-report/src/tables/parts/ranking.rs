@@ -5,6 +5,7 @@ use crate::apa::{self, bare_p, or_dash, two};
 use crate::table::{Builder, Table, file};
 use study_analysis::analyze::psychophysics::results::{PartResults, Rankings};
 use study_analysis::analyze::results::Number as _;
+use study_base::sort::SmallSort as _;
 
 fn found(results: &PartResults) -> Option<&Rankings> {
     results.over.ranking.as_ref()
@@ -14,7 +15,7 @@ fn found(results: &PartResults) -> Option<&Rankings> {
 pub(super) fn realizations(results: &PartResults) -> Table {
     let own = found(results);
     let mut items: Vec<_> = own.into_iter().flat_map(|own| &own.items).collect();
-    items.sort_by(|a, b| {
+    items.small_sort_by(|a, b| {
         let order = [a, b].map(|item| item.1.mean_rank.number().unwrap_or(f64::INFINITY));
         order[0].total_cmp(&order[1])
     });

@@ -5,6 +5,7 @@ use crate::apa::{interval_or_dash, name, plain, two};
 use crate::table::{Builder, Cell, Table};
 use study_analysis::analyze::psychophysics::results::{ConditionName, PartResults, Rated};
 use study_analysis::analyze::results::Number as _;
+use study_base::sort::SmallSort as _;
 use study_base::text::counted;
 
 /// Estimates of levels or of realizations.
@@ -115,7 +116,7 @@ pub(super) fn scores_after(results: &PartResults) -> Table {
     let after = results.questionnaire.iter().flat_map(|q| &q.after);
     let mut after: Vec<_> = after.collect();
     // Block 2 before 10; names as they are.
-    after.sort_by_key(|own| own.0.as_str().parse::<u32>().unwrap_or(0));
+    after.small_sort_by_key(|own| own.0.as_str().parse::<u32>().unwrap_or(0));
     let note = "After each realization, block or part: over participants, of each the mean.";
     let any = !after.is_empty();
     Builder::new("Scores between the trials", after)
@@ -132,7 +133,7 @@ pub(super) fn items(results: &PartResults) -> Table {
     let items = results.questionnaire.iter().flat_map(|q| &q.item);
     let mut items: Vec<_> = items.collect();
     // 2 before 10; names as they are.
-    items.sort_by_key(|item| item.0.as_str().parse::<u32>().unwrap_or(0));
+    items.small_sort_by_key(|item| item.0.as_str().parse::<u32>().unwrap_or(0));
     Builder::new("Items, as answered", items)
         .name("item", "item", &|i| i.0.as_str().to_owned())
         .field(column("mean", "mean"), two, |i| &i.1.mean)

@@ -5,6 +5,7 @@ use crate::apa::{one, or_dash, two};
 use crate::table::{Builder, Table, file};
 use study_analysis::analyze::psychophysics::results::{PartResults, Similarities};
 use study_analysis::analyze::results::Number as _;
+use study_base::sort::SmallSort as _;
 
 fn found(results: &PartResults) -> Option<&Similarities> {
     results.over.similarity.as_ref()
@@ -77,7 +78,7 @@ pub(super) fn pairs(results: &PartResults) -> Table {
         .into_iter()
         .flat_map(|own| &own.pairs)
         .collect();
-    pairs.sort_by(|a, b| {
+    pairs.small_sort_by(|a, b| {
         let mean = [a, b].map(|p| p.1.rescaled.number().unwrap_or(f64::INFINITY));
         mean[0].total_cmp(&mean[1])
     });

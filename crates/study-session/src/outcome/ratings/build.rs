@@ -4,6 +4,7 @@
 use super::{Comment, IndexedPracticeRow, Origin, Practice, Ratings, Realization, Row, Subject};
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
+use study_base::sort::SmallSort as _;
 use study_plan::protocol::Role;
 
 /// The index of each name, in order of first occurrence.
@@ -204,7 +205,7 @@ impl Builder {
 /// Sorts by name; returns the new index of each item.
 pub(super) fn sort<T: Clone>(items: &mut Vec<T>, name: impl Fn(&T) -> &str) -> Vec<u32> {
     let mut order: Vec<usize> = (0..items.len()).collect();
-    order.sort_by(|&a, &b| name(&items[a]).cmp(name(&items[b])));
+    order.small_sort_by(|&a, &b| name(&items[a]).cmp(name(&items[b])));
     let mut new_index = vec![0; items.len()];
     for (new, &old) in (0u32..).zip(&order) {
         new_index[old] = new;

@@ -7,6 +7,7 @@ use super::{Builder, Felt, Origin, Ratings, Row};
 use crate::outcome::rows::Status;
 use std::collections::BTreeMap;
 use std::io::BufRead;
+use study_base::sort::SmallSort as _;
 use study_plan::protocol::Role;
 use study_plan::protocol::columns::{self, RatingColumn as C, UsedColumn as Foreign};
 
@@ -156,7 +157,7 @@ fn repeated(ratings: &Ratings) -> Option<(usize, usize)> {
             continue;
         }
         let mut rows = rows.to_vec();
-        rows.sort_by_key(of);
+        rows.small_sort_by_key(of);
         for w in rows.windows(2).filter(|w| of(&w[0]) == of(&w[1])) {
             if found.is_none_or(|(_, second)| w[1] < second) {
                 found = Some((w[0], w[1]));
