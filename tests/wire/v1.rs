@@ -173,6 +173,7 @@ fn identity_1() -> Identity {
                 acceleration_from_speed: true,
                 mechanism: false,
                 elements: false,
+                fade: false,
             },
             commit_ms: 135,
             acceleration_hz: 20.0,
@@ -415,7 +416,7 @@ fn invalid_replies_are_rejected() {
     let later = spoiled(
         Reply::Identity(identity_1()),
         158,
-        &[0xf9, 0xff, 0xff, 0xff],
+        &[0xf1, 0xff, 0xff, 0xff],
     );
     assert_eq!(later.unwrap().1, Reply::Identity(identity_1()));
     // energy

@@ -340,6 +340,7 @@ fn a_constant_force_that_is_added_is_the_rms_difference_from_the_table() {
             samples,
             numbered: true,
             lost: 0,
+            faded_from_s: None,
             time_ratio: None,
             host_late_s: None,
             others: &[],
