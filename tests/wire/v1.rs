@@ -190,6 +190,24 @@ fn identity_1() -> Identity {
     }
 }
 
+/// The same device, with all features, to a host of minor version 3.
+fn identity_3() -> Identity {
+    let told = identity_1().constants.map(|told| Constants {
+        minor: 3,
+        features: Features {
+            acceleration_from_speed: true,
+            mechanism: true,
+            elements: true,
+            fade: true,
+        },
+        ..told
+    });
+    Identity {
+        constants: told,
+        ..identity_1()
+    }
+}
+
 fn outcome() -> Outcome {
     Outcome {
         state: DeviceState::Loaded,
@@ -293,7 +311,7 @@ fn every_request_has_the_specified_bytes() {
     }
     kinds.dedup();
     let all = [
-        1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 0x10, 0x11, 0x12, 0x13, 0x20, 0x21, 0x22, 0x30,
+        1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 0x10, 0x11, 0x12, 0x13, 0x20, 0x21, 0x22, 0x30,
     ];
     assert_eq!(kinds, all, "a message is not in the list");
 }
