@@ -249,7 +249,8 @@ impl Host {
         };
         let samples_lost = u64::from(outcome.samples).saturating_sub(self.received);
         self.health.samples_lost += samples_lost.saturating_sub(self.lost);
-        self.reports.extend(self.faded(&outcome));
+        let faded = self.faded(&outcome);
+        self.reports.extend(faded);
         self.reports.push(Report::Stopped(Playback {
             exploration_s,
             strokes: outcome.strokes,
