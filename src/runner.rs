@@ -116,6 +116,8 @@ pub struct Runner {
     has_telemetry: bool,
     /// Samples of the current playback, for its judgement.
     samples: Vec<Sample>,
+    /// From when its force fell to its end, s.
+    faded_from_s: Option<f64>,
     /// Whether wrong playbacks are only marked.
     only_flags: bool,
 }
@@ -149,6 +151,7 @@ impl Runner {
             limits,
             has_telemetry: false,
             samples: Vec::new(),
+            faded_from_s: None,
             only_flags,
         };
         runner.device_limp();
@@ -274,6 +277,11 @@ impl Runner {
                 let stopped = self.setup.device.stop(at);
                 stopped.err().map(|e| Input::DeviceLost(e.to_string()))
             }
+            Effect::Fade => {
+                let at = self.device_time();
+                let stopped = self.setup.device.fade(at);
+                stopped.err().map(|e| Input::DeviceLost(e.to_string()))
+            }
             Effect::Limp => {
                 self.device_limp();
                 self.send(Job::TelemetryEnd);
@@ -357,6 +365,7 @@ impl Runner {
         let limits = limits.unwrap_or(protocol.device.limits);
         self.has_telemetry = !by_hand && self.setup.device.identity().telemetry;
         self.samples.clear();
+        self.faded_from_s = None;
         let stimulus = Stimulus {
             model: model.as_str(),
             table,
@@ -411,6 +420,10 @@ impl Runner {
                     Input::DeviceSampled
                 }
                 Report::Progress { strokes, .. } => Input::DeviceProgress { strokes },
+                Report::Faded { from_s } => {
+                    self.faded_from_s = Some(from_s);
+                    continue;
+                }
                 Report::Stopped(playback) => Input::DeviceStopped(playback),
                 Report::Fault(what) => Input::DeviceFault(what),
                 Report::Lost(what) => Input::DeviceLost(what),

@@ -37,6 +37,7 @@ impl Runner {
             samples: &self.samples,
             numbered: device.numbered,
             lost: playback.samples_lost,
+            faded_from_s: self.faded_from_s,
             time_ratio: playback.time_ratio,
             host_late_s: playback.host_late_ms.map(|[_, most]| 1e-3 * most),
             others: &others,

@@ -111,7 +111,7 @@ fn the_simulated_device_passes_in_time() {
         assert!(
             found
                 .summary()
-                .starts_with("30 of 30 tests passed; round trip"),
+                .starts_with("31 of 31 tests passed; round trip"),
             "{}",
             found.summary()
         );

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod accused;
+mod changes;
 mod check;
 #[path = "../support/designs.rs"]
 mod designs;

@@ -147,6 +147,7 @@ pub(crate) fn judged(
         samples: &heard.samples,
         numbered: true,
         lost: heard.playback.map_or(0, |p| p.samples_lost),
+        faded_from_s: None,
         time_ratio: heard.playback.and_then(|p| p.time_ratio),
         host_late_s: None,
         others: &others,

@@ -132,8 +132,8 @@ fn the_enter_of_a_forgotten_step_confirms_nothing() {
     let played = count(folder, "playback_started");
     lines.types("+\n");
     until("adjusted", 1);
-    // The stop is over, and half a second of loading is not.
-    std::thread::sleep(Duration::from_millis(150));
+    // The fall of 0.4 s and the stop are over, and half a second of loading is not.
+    std::thread::sleep(Duration::from_millis(600));
     lines.types("+");
     until("playback_started", played + 1);
     // It is felt, and long enough for an Enter to be meant for it.
@@ -180,4 +180,56 @@ fn adjustment_by_keys() {
     for (id, expected) in [("pse", 2.0), ("error/mean", 0.0), ("start/difference", 0.0)] {
         assert!((value(id) - expected).abs() < 1e-9, "{id}: {}", value(id));
     }
+}
+
+/// On the simulated device each level but the confirmed one ends with a force that falls. Its force is judged, and no level is
+/// called wrong.
+#[test]
+fn every_level_but_the_confirmed_one_ends_with_a_fall() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    adjustment(folder);
+    let arguments = [
+        "rehearse",
+        "p",
+        "--participants",
+        "2",
+        "--out",
+        "r",
+        "--telemetry",
+        "1000",
+    ];
+    let (code, out, err) = study(&arguments, folder);
+    assert_eq!(code, 0, "{out}{err}");
+    let (mut falls, mut stops) = (0, 0);
+    for participant in ["SIM001", "SIM002"] {
+        let journal = format!("r/sessions/{participant}/journal.jsonl");
+        let text = std::fs::read_to_string(folder.join(journal)).unwrap();
+        let lines = text.lines();
+        let events: Vec<Json> = lines
+            .map(|line| serde_json::from_str(line).unwrap())
+            .collect();
+        for two in events
+            .windows(2)
+            .filter(|two| of(&two[0], "playback_ended"))
+        {
+            let ended = &two[0];
+            let verdict = ended["rendering"]["verdict"].as_str().unwrap();
+            assert!(!matches!(verdict, "flag" | "fault"), "{ended}");
+            let whole_s = ended["playback"]["exploration_s"].as_f64().unwrap();
+            match ended["rendering"]["faded_from_s"].as_f64() {
+                Some(from_s) => {
+                    falls += 1;
+                    assert!((whole_s - from_s - 0.4).abs() < 1e-6, "{ended}");
+                }
+                None => {
+                    stops += 1;
+                    assert!(of(&two[1], "answered"), "{ended}");
+                }
+            }
+        }
+    }
+    // Two settings each, and a look at the standard before each of them.
+    assert_eq!(stops, 4);
+    assert!(falls >= 8, "{falls}");
 }

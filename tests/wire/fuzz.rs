@@ -13,9 +13,9 @@ use study_device::firmware::{Firmware, Options};
 use study_wire::elements::Spring;
 use study_wire::frame::{Decoder, Frame, MAX_BODY};
 use study_wire::message::{
-    Commit, DeviceState, ElementsBegin, FixedVec, Heartbeat, Hello, MechanismBegin, MechanismChunk,
-    PathBegin, PathChunk, Play, Record, Reply, Request, Stop, TableBegin, TableChunk, UploadCrc,
-    kind,
+    Commit, DeviceState, ElementsBegin, FixedVec, Heartbeat, Hello, MINOR, MechanismBegin,
+    MechanismChunk, PathBegin, PathChunk, Play, Record, Reply, Request, Stop, TableBegin,
+    TableChunk, UploadCrc, kind,
 };
 use study_wire::predict::{Direction, Lookup};
 
@@ -98,7 +98,7 @@ impl Fuzz {
         match self.below(24) {
             0 => Request::Hello(Hello {
                 nonce: self.nonce + self.below(2) as u32,
-                minor: self.below(3) as u8,
+                minor: self.below(4) as u8,
             }),
             1 => Request::TableBegin(TableBegin {
                 nodes: small,
@@ -123,7 +123,10 @@ impl Fuzz {
                 longest_ms: word % 1_000_000,
                 every: NonZeroU16::new(small),
             }),
-            7 => Request::Stop(Stop { playback: word }),
+            7 => match word % 2 {
+                0 => Request::Stop(Stop { playback: word }),
+                _ => Request::Fade(Stop { playback: 1 }),
+            },
             8 => Request::Limp,
             9..=13 => {
                 self.beats = self.beats.wrapping_add(1);
@@ -241,7 +244,7 @@ impl Fuzz {
         self.nonce += 2;
         self.say(Request::Hello(Hello {
             nonce: self.nonce,
-            minor: 2,
+            minor: MINOR,
         }));
         self.at += Duration::from_millis(100);
         self.say(Request::Rearm);

@@ -2,6 +2,7 @@
 
 mod commit;
 mod elements;
+mod fade;
 mod firmware;
 mod firmware_probe;
 mod firmware_states;

@@ -173,6 +173,7 @@ fn identity_1() -> Identity {
                 acceleration_from_speed: true,
                 mechanism: false,
                 elements: false,
+                fade: false,
             },
             commit_ms: 135,
             acceleration_hz: 20.0,
@@ -186,6 +187,24 @@ fn identity_1() -> Identity {
             ramp_s: 0.4,
         }),
         ..identity()
+    }
+}
+
+/// The same device, with all features, to a host of minor version 3.
+fn identity_3() -> Identity {
+    let told = identity_1().constants.map(|told| Constants {
+        minor: 3,
+        features: Features {
+            acceleration_from_speed: true,
+            mechanism: true,
+            elements: true,
+            fade: true,
+        },
+        ..told
+    });
+    Identity {
+        constants: told,
+        ..identity_1()
     }
 }
 
@@ -292,7 +311,7 @@ fn every_request_has_the_specified_bytes() {
     }
     kinds.dedup();
     let all = [
-        1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 0x10, 0x11, 0x12, 0x13, 0x20, 0x21, 0x22, 0x30,
+        1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 0x10, 0x11, 0x12, 0x13, 0x20, 0x21, 0x22, 0x30,
     ];
     assert_eq!(kinds, all, "a message is not in the list");
 }
@@ -415,7 +434,7 @@ fn invalid_replies_are_rejected() {
     let later = spoiled(
         Reply::Identity(identity_1()),
         158,
-        &[0xf9, 0xff, 0xff, 0xff],
+        &[0xf1, 0xff, 0xff, 0xff],
     );
     assert_eq!(later.unwrap().1, Reply::Identity(identity_1()));
     // energy

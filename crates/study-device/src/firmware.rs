@@ -408,6 +408,7 @@ fn profile(options: &Options) -> Profile {
         features: Features {
             mechanism: true,
             elements: true,
+            fade: true,
             ..Features::default()
         },
         watchdog_ms: match options.flaw {

@@ -11,6 +11,7 @@
 
 mod arrivals;
 mod clock;
+mod fade;
 mod lateness;
 mod replies;
 mod stage;
@@ -135,6 +136,8 @@ pub struct Host {
     /// CRC of the table that is being uploaded or is loaded.
     crc: u32,
     playback: u32,
+    /// Whether nothing but a force that falls was asked to end the playback.
+    fades: bool,
     received: u64,
     lost: u64,
     /// When the samples of the playback arrived.
@@ -283,6 +286,7 @@ impl Host {
             every: Some(sample_interval(device.servo_hz, self.settings.telemetry_hz)),
         };
         (self.received, self.lost, self.reported) = (0, 0, (0, 0));
+        self.fades = false;
         self.arrivals = Arrivals::default();
         (self.late, self.unpolled) = (Lateness::default(), None);
         self.stage = Stage::Starting;
@@ -293,7 +297,7 @@ impl Host {
     /// [`Device::stop`](super::Device::stop), with its errors.
     pub fn stop(&mut self, at: Duration) -> Result<(), DeviceError> {
         match self.stage {
-            Stage::Playing { .. } => self.ask_to_stop(at),
+            Stage::Playing { .. } | Stage::Fading { .. } => self.ask_to_stop(at),
             // PLAY has to be answered first, or STOP would be refused.
             Stage::Starting => self.queue.push_back(Request::Stop(Stop {
                 playback: self.playback,
@@ -453,6 +457,7 @@ impl Host {
         let stop = Stop {
             playback: self.playback,
         };
+        self.fades = false;
         self.stage = Stage::Stopping { since: at };
         self.send(Request::Stop(stop), at);
     }

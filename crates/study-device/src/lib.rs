@@ -154,6 +154,11 @@ pub enum Report {
         /// Clamps.
         clamps: u64,
     },
+    /// The force of the playback fell to zero before it stopped; [`Report::Stopped`] follows.
+    Faded {
+        /// From when it fell, in the time of the samples, s.
+        from_s: f64,
+    },
     /// The playback has stopped and the device is limp.
     Stopped(Playback),
     /// The device has tripped and is limp until the next load.
@@ -209,6 +214,16 @@ pub trait Device: Send {
     /// # Errors
     /// [`DeviceError`] if the device does not answer or nothing was started.
     fn stop(&mut self, at: Duration) -> Result<(), DeviceError>;
+
+    /// Stops playing without a step of the force, which falls to zero before, on a device that can
+    /// do so; [`Report::Faded`] then precedes [`Report::Stopped`]. Other devices stop at once.
+    /// [`Device::stop`] and [`Device::limp`] end the fall at once.
+    ///
+    /// # Errors
+    /// As of [`Device::stop`].
+    fn fade(&mut self, at: Duration) -> Result<(), DeviceError> {
+        self.stop(at)
+    }
 
     /// Switches the force off at once. This cannot fail: a device that does not receive
     /// it goes limp by its watchdog. The playback is lost without a report.

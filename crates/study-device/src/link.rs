@@ -106,6 +106,7 @@ enum Command {
     Load(Box<LoadOrder>),
     Start,
     Stop,
+    Fade,
     Limp,
 }
 
@@ -330,6 +331,10 @@ impl Device for LinkedDevice {
         self.send(Command::Stop)
     }
 
+    fn fade(&mut self, _: Duration) -> Result<(), DeviceError> {
+        self.send(Command::Fade)
+    }
+
     fn limp(&mut self, _: Duration) {
         // Later reports about the present playback are discarded.
         self.epoch += 1;
@@ -471,6 +476,7 @@ impl LinkWorker {
                 }
                 Command::Start => self.host.start(now),
                 Command::Stop => self.host.stop(now),
+                Command::Fade => self.host.fade(now),
                 Command::Limp => {
                     self.host.limp(now);
                     Ok(())

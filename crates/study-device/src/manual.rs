@@ -191,6 +191,10 @@ impl Device for WithManual {
         self.current().stop(at)
     }
 
+    fn fade(&mut self, at: Duration) -> Result<(), DeviceError> {
+        self.current().fade(at)
+    }
+
     fn limp(&mut self, at: Duration) {
         self.person.limp(at);
         self.device.limp(at);

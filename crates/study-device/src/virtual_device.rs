@@ -288,6 +288,10 @@ impl Device for VirtualDevice {
         self.command(at, Host::stop)
     }
 
+    fn fade(&mut self, at: Duration) -> Result<(), DeviceError> {
+        self.command(at, Host::fade)
+    }
+
     fn limp(&mut self, at: Duration) {
         self.fault_at = None;
         self.command(at, Host::limp);

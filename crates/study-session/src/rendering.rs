@@ -89,6 +89,8 @@ pub struct Played<'a> {
     pub numbered: bool,
     /// Number of samples that were lost.
     pub lost: u64,
+    /// From when its force fell to its end, in the time of its samples, s.
+    pub faded_from_s: Option<f64>,
     /// Time of the samples over time of the host.
     pub time_ratio: Option<f64>,
     /// How late the host was at most, s; `None` if that was not measured.
@@ -110,6 +112,11 @@ impl Played<'_> {
             ..self.servo
         }
     }
+
+    /// Whether the force has not begun to fall at a sample.
+    fn is_whole(&self, sample: &Sample) -> bool {
+        self.faded_from_s.is_none_or(|from_s| sample.t_s < from_s)
+    }
 }
 
 /// Judges a playback.
@@ -121,6 +128,7 @@ pub fn judge(played: &Played<'_>, rules: &RenderingRules) -> Fidelity {
     let mut fidelity = Fidelity {
         lost_share: share(lost, played.samples.len() as f64 + lost),
         time_ratio: played.time_ratio,
+        faded_from_s: played.faded_from_s,
         ..Fidelity::default()
     };
     let Some(interval_s) = usual_s else {

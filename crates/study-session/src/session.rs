@@ -15,7 +15,7 @@
 //! * An answer is shown as saved only after [`Input::Saved`] has acknowledged it.
 //! * A rating opens only after the device has confirmed the start and the end of
 //!   the playback.
-//! * Every transition out of playing first sends [`Effect::Stop`] or
+//! * Every transition out of playing first sends [`Effect::Stop`], [`Effect::Fade`] or
 //!   [`Effect::Limp`].
 //! * After a stop, a pause or a fault nothing is loaded or started until somebody
 //!   requests it again.

@@ -336,6 +336,10 @@ impl<const NODES: usize, const POINTS: usize, R: Real> Handler<NODES, POINTS, R>
                 self.state = DeviceState::Run;
             }
         }
+        if self.servo.faded() {
+            self.end();
+            return Drive::Force(R::ZERO);
+        }
         Drive::Force(force_n)
     }
 
@@ -448,6 +452,7 @@ mod tests {
             acceleration_from_speed: true,
             mechanism: true,
             elements: true,
+            fade: true,
         },
         watchdog_ms: 30,
         longest_ms: 600_000,

@@ -35,11 +35,14 @@ pub use table::{Node, TableBegin, TableChunk, UploadCrc};
 pub const VERSION: u8 = 1;
 /// The newest minor version that this module implements. Minor versions only add: host
 /// and device use the lower one of both, see [`Hello`] and [`Constants`].
-pub const MINOR: u8 = 2;
+pub const MINOR: u8 = 3;
 /// The minor version that added mechanisms.
 pub const MECHANISM_MINOR: u8 = 2;
 /// The minor version that added elements, for devices with that feature.
 pub const ELEMENTS_MINOR: u8 = 2;
+/// The minor version that added forces that fall before the end of a playback, for devices
+/// with that feature.
+pub const FADE_MINOR: u8 = 3;
 
 /// Why a body is no message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -224,7 +227,7 @@ fields! {
 }
 
 fields! {
-    /// Ends a playback.
+    /// Ends a playback, at once or with a force that falls.
     #[derive(Debug, Clone, Copy, PartialEq, Eq)]
     Stop {
         /// The host's number of the playback or recording to stop.
@@ -342,6 +345,8 @@ messages! {
         Rearm = REARM 0x09;
         /// Asks for the state and the outcome of the last playback.
         State = STATE 0x0A;
+        /// Lets the force fall to zero and then stops playing; from minor version 3 on.
+        Fade(fields: Stop) = FADE 0x0C;
         /// Begins the upload of a path.
         PathBegin(fields: PathBegin) = PATH_BEGIN 0x10;
         /// Carries points of the path.
@@ -387,6 +392,7 @@ impl Request {
                 MECHANISM_MINOR
             }
             Self::ElementsBegin(_) => ELEMENTS_MINOR,
+            Self::Fade(_) => FADE_MINOR,
             _ => 0,
         }
     }

@@ -15,7 +15,8 @@
 //!    table's speed is limited to the trained range, and the mass to at least
 //!    [`ServoSettings::least_mass_kg`].
 //! 5. Beyond the identified range, use the force at its edge and add a spring wall.
-//! 6. Limit the slew rate, 7. apply the ramp, 8. clamp to the force limit.
+//! 6. Limit the slew rate, 7. apply the ramp, and the fall after [`Servo::fade`], 8. clamp to
+//!    the force limit.
 //!
 //! [`tally`] accumulates energy, strokes and counts on the way.
 //!
@@ -89,7 +90,23 @@ impl ServoSettings {
             ramp_s: 0.4,
         }
     }
+
+    /// Servo periods in which a force falls to zero after [`Servo::fade`]: those of the ramp, or
+    /// as many as the steepest part of the fall from the force limit needs within the slew limit.
+    pub fn fade_periods(&self) -> u32 {
+        let steepest_s = core::f64::consts::FRAC_PI_2 * self.force_n / self.slew_n_s;
+        // A limit that is no number gives no force.
+        let fade_s = match steepest_s.is_finite() {
+            true => steepest_s.max(self.ramp_s),
+            false => self.ramp_s,
+        };
+        // `as` saturates.
+        (libm::ceil(fade_s * self.servo_hz - ROUNDING) as u32).max(1)
+    }
 }
+
+/// Rounding that is no servo period more.
+const ROUNDING: f64 = 1e-6;
 
 /// The force of a realization as a function of the motion.
 #[derive(Debug, Clone, Copy)]
@@ -162,6 +179,8 @@ pub struct Servo<R = f64> {
     /// Force commanded in the current period, N.
     held_n: R,
     clamping: bool,
+    /// Servo periods of the fall so far, once the force falls.
+    fallen: Option<u32>,
     tally: Tally<R>,
 }
 
@@ -181,6 +200,8 @@ struct Constants<R> {
     servo_hz: R,
     period_s: R,
     ramp_s: R,
+    /// Servo periods of a fall.
+    fade_periods: R,
 }
 
 impl<R: Real> Constants<R> {
@@ -197,6 +218,7 @@ impl<R: Real> Constants<R> {
         servo_hz: R::ZERO,
         period_s: R::ZERO,
         ramp_s: R::ZERO,
+        fade_periods: R::ZERO,
     };
 
     fn of(settings: &ServoSettings) -> Self {
@@ -213,6 +235,7 @@ impl<R: Real> Constants<R> {
             servo_hz: R::of(settings.servo_hz),
             period_s: R::of(1.0 / settings.servo_hz),
             ramp_s: R::of(settings.ramp_s),
+            fade_periods: R::of(f64::from(settings.fade_periods())),
         }
     }
 }
@@ -249,6 +272,7 @@ impl<R: Real> Servo<R> {
             slewed_n: R::ZERO,
             held_n: R::ZERO,
             clamping: false,
+            fallen: None,
             tally: Tally::new(),
         }
     }
@@ -272,6 +296,18 @@ impl<R: Real> Servo<R> {
     pub fn start(&mut self) {
         *self = Self::new(self.settings);
         self.state = ServoState::Playing;
+    }
+
+    /// Lets the force fall to zero from the next period on, by half a cosine over
+    /// [`ServoSettings::fade_periods`]. It falls once: later calls change nothing.
+    pub fn fade(&mut self) {
+        self.fallen = self.fallen.or(Some(0));
+    }
+
+    /// Whether a force that falls has reached zero.
+    pub fn faded(&self) -> bool {
+        let fallen = self.fallen.map(|periods| R::of(f64::from(periods)));
+        fallen.is_some_and(|periods| periods >= self.constants.fade_periods)
     }
 
     /// Sets the force to zero at once. Totals and a trip are kept.
@@ -307,7 +343,7 @@ impl<R: Real> Servo<R> {
             self.trip(Trip::NotANumber);
             return R::ZERO;
         }
-        let ramp = self.ramp();
+        let ramp = self.ramp() * self.fall();
         self.count_clamps(wanted_n * ramp);
         // The target of the slew limit is clamped as well. Otherwise a force far
         // above the limit would delay the return to a smaller one.
@@ -416,6 +452,17 @@ impl<R: Real> Servo<R> {
         } else {
             R::ONE
         }
+    }
+
+    /// Factor of a force that falls in the current period, and the next one afterwards: half a
+    /// cosine from 1 to 0. The first one is below 1, the last one 0.
+    fn fall(&mut self) -> R {
+        let Some(fallen) = &mut self.fallen else {
+            return R::ONE;
+        };
+        *fallen = fallen.saturating_add(1);
+        let fraction = (R::of(f64::from(*fallen)) / self.constants.fade_periods).min(R::ONE);
+        R::HALF + R::HALF * (R::of(core::f64::consts::PI) * fraction).cos()
     }
 
     fn count_clamps(&mut self, force_n: R) {

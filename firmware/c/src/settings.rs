@@ -98,6 +98,7 @@ pub(crate) unsafe fn profile(settings: &StudySettings) -> Option<Profile> {
             acceleration_from_speed: s.acceleration_from_speed != 0,
             mechanism: true,
             elements: true,
+            fade: true,
         },
         watchdog_ms,
         longest_ms: LONGEST_MS,

@@ -46,6 +46,7 @@ mod firmware {
             acceleration_from_speed: true,
             mechanism: true,
             elements: true,
+            fade: true,
         },
         watchdog_ms: 30,
         longest_ms: 600_000,

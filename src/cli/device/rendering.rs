@@ -243,6 +243,7 @@ pub(super) fn fidelity(
         samples,
         numbered: device.identity().numbered,
         lost: playback.samples_lost,
+        faded_from_s: None,
         time_ratio: playback.time_ratio,
         host_late_s: playback.host_late_ms.map(|[_, most]| 1e-3 * most),
         others: &[],

@@ -45,6 +45,7 @@ impl Reader<'_> {
             attempt,
             playback,
             telemetry,
+            rendering,
             interval,
             ..
         } = event
@@ -60,7 +61,15 @@ impl Reader<'_> {
         };
         let samples = samples(&self.session.path.join(layout::TELEMETRY).join(&file))?;
         let expected = match self.revealed {
-            true => self.expected((*trial, *attempt, *interval), playback, &samples),
+            true => {
+                let faded_from_s = rendering.as_ref().and_then(|found| found.faded_from_s);
+                self.expected(
+                    (*trial, *attempt, *interval),
+                    playback,
+                    faded_from_s,
+                    &samples,
+                )
+            }
             false => None,
         };
         Some(Felt {
@@ -92,6 +101,7 @@ impl Reader<'_> {
         &self,
         (trial, attempt, interval): (u32, u32, Option<u32>),
         playback: &Playback,
+        faded_from_s: Option<f64>,
         samples: &[Sample],
     ) -> Option<Expected> {
         let mut attempts = self.session.history.all_attempts();
@@ -113,6 +123,7 @@ impl Reader<'_> {
             samples,
             numbered: kind != Some(DeviceKind::Process),
             lost: playback.samples_lost,
+            faded_from_s,
             time_ratio: playback.time_ratio,
             host_late_s: None,
             others: &[],

@@ -112,6 +112,43 @@ fn a_level_is_changed_step_by_step_and_confirmed() {
     assert_eq!(numbers, (1..=8).collect::<Vec<_>>());
 }
 
+/// A change lets the force fall before it stops; a confirmation stops, and a stop during a change leaves no force at once.
+#[test]
+fn a_change_has_no_step_of_force_and_a_stop_is_a_stop() {
+    let ends = |rig: &Rig| -> Vec<Effect> {
+        let of_end = |e: &&Effect| matches!(e, Effect::Stop | Effect::Fade | Effect::Limp);
+        rig.effects.iter().filter(of_end).cloned().collect()
+    };
+    let mut rig = Rig::new(adjustment("standard = 2.0\nexposure = { max_s = 5 }"));
+    rig.until("Playing");
+    for input in [
+        // From the standard to the level, one step, the standard again, and back to the level.
+        Input::Advance,
+        Input::Adjust(Turn::Higher),
+        Input::Adjust(Turn::Standard),
+    ] {
+        rig.wait(1.0).effects.clear();
+        rig.send(input.clone());
+        assert_eq!(ends(&rig), [Effect::Fade], "{input:?}");
+        rig.wait(1.0);
+    }
+    // The end of the longest exposure of the standard is a change, too.
+    rig.effects.clear();
+    rig.wait(5.0).wait(1.0);
+    assert_eq!(ends(&rig), [Effect::Fade]);
+    // During a change.
+    rig.device = DeviceMood::Silent;
+    rig.effects.clear();
+    rig.send(Input::Adjust(Turn::Higher)).send(Input::Stop);
+    assert_eq!(ends(&rig), [Effect::Fade, Effect::Limp]);
+
+    let mut rig = Rig::new(adjustment(""));
+    rig.until("Playing");
+    rig.wait(1.0).effects.clear();
+    rig.send(Input::Advance);
+    assert_eq!(ends(&rig), [Effect::Stop]);
+}
+
 /// Nothing that is shown has the level, and it cannot be typed later.
 #[test]
 fn what_was_set_is_not_shown_and_not_corrected() {

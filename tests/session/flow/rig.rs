@@ -214,7 +214,7 @@ impl Rig {
                         });
                     }
                 }
-                Effect::Stop => {
+                Effect::Stop | Effect::Fade => {
                     self.loaded = false;
                     if self.device == DeviceMood::Willing {
                         answers.push(Input::DeviceStopped(self.playback));

@@ -274,6 +274,19 @@ pub(super) fn requests() -> Vec<Golden<Request>> {
             frame: "0004010a0805a7b7b65c00",
         },
         Golden {
+            name: "FADE",
+            sequence: 17,
+            message: Request::Fade(Stop { playback: 7 }),
+            body: &[
+                ("01", "version"),
+                ("0c", "type FADE"),
+                ("1100", "sequence number 17"),
+                ("07000000", "playback 7"),
+            ],
+            crc: "045c753b",
+            frame: "0004010c110207010105045c753b00",
+        },
+        Golden {
             name: "PATH_BEGIN",
             sequence: 9,
             message: Request::PathBegin(PathBegin {

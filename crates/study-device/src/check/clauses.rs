@@ -53,6 +53,7 @@ clauses! {
     "7.5" "the force rises slowly and never exceeds its limit" playing::clamp;
     "11.3" "STOP switches the force off at once" playing::stop;
     "5.1" "LIMP switches the force off at once" playing::limp;
+    "5.5" "FADE lets the force fall before the end, or is unknown" playing::fade;
     "12" "a playback ends after its longest duration" playing::longest;
     "5.3" "REARM is refused while the handle moves" moving::rearm, ask "move the handle to and fro until the next line appears";
     "6.3" "without heartbeats the device goes limp in time and stays limp" playing::watchdog;

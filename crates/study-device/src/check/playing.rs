@@ -6,13 +6,19 @@ use super::{CheckFailure, ClauseResult, fail, tag};
 use std::num::NonZeroU16;
 use std::time::Duration;
 use study_wire::message::{
-    Ack, DeviceState, EventKind, Fault, Heartbeat, Outcome, Play, Request, Stop, TelemetrySample,
-    fixed,
+    Ack, DeviceState, EventKind, Fault, Heartbeat, MINOR, Outcome, Play, Refusal, Request, Stop,
+    TelemetrySample, fixed,
 };
+use study_wire::servo::ServoSettings;
 
 const SECOND: Duration = Duration::from_secs(1);
 /// Resolution of two clocks of whole ms, and one ms for the transfer.
 const CLOCK_RESOLUTION_MS: f64 = 2.0;
+
+/// Rounding of forces and their changes, N.
+const ROUNDING_N: f64 = 1e-3;
+/// Largest force of the last sample of a force that falls, N: it may be some milliseconds old.
+const LAST_N: f64 = 0.1;
 
 /// A current playback.
 pub(super) struct Playback {
@@ -251,6 +257,62 @@ pub(super) fn limp(exchange: &mut Exchange<'_>) -> ClauseResult {
         return fail(format!("LIMP: {}", outcome.state));
     }
     if late {
+        return fail(seen);
+    }
+    Ok(seen)
+}
+
+/// The force falls to zero before the end, from minor version 3 on, on a device that says so.
+pub(super) fn fade(exchange: &mut Exchange<'_>) -> ClauseResult {
+    let unasked = Request::Fade(Stop { playback: 1 });
+    // The connection is one of minor version 0.
+    exchange.expect_refusal(unasked, Refusal::UnknownType)?;
+    let told = exchange.hello_of(MINOR).ok();
+    let told = told.and_then(|device| device.constants);
+    let Some(told) = told.filter(|told| told.features.fade) else {
+        exchange.expect_refusal(unasked, Refusal::UnknownType)?;
+        return Ok("it ends at once; a fall is refused".to_owned());
+    };
+    exchange.first_heartbeat()?;
+    let playback = play_for(exchange, 1.0, SECOND / 2)?;
+    let device = exchange.identity()?;
+    let servo = ServoSettings {
+        servo_hz: device.servo_hz,
+        force_n: super::FORCE_N.min(device.force_n),
+        slew_n_s: told.slew_n_s,
+        ramp_s: told.ramp_s,
+        ..ServoSettings::default()
+    };
+    let fade_s = f64::from(servo.fade_periods()) / servo.servo_hz;
+    let ack = exchange.expect_done(Request::Fade(Stop {
+        playback: playback.number,
+    }))?;
+    if !ack.state.applies_force() {
+        return fail(format!("FADE: {}", ack.state));
+    }
+    // What is told may be anything.
+    exchange.wait(Duration::from_secs_f64(fade_s.min(2.0)) + SECOND / 10)?;
+    let outcome = exchange.outcome()?;
+    let took_ms = overhang_ms(&playback, &ack, outcome.ticks);
+    let (all, _) = samples(exchange, &playback);
+    let steepest_n_per_ms = all.windows(2).map(|two| {
+        let apart = two[1].tick.saturating_sub(two[0].tick).max(1);
+        let [before_n, after_n] = [two[0], two[1]].map(|s| fixed::from_un(s.command_un));
+        (after_n - before_n).abs() / (1e3 * f64::from(apart) / servo.servo_hz)
+    });
+    let steepest_n_per_ms = steepest_n_per_ms.fold(0.0, f64::max);
+    let last_n = all.last().map_or(0.0, |s| fixed::from_un(s.command_un));
+    let seen = format!(
+        "{took_ms:.0} ms of {:.0} ms; at most {steepest_n_per_ms:.2} N/ms; the last sample {last_n:.3} N",
+        1e3 * fade_s
+    );
+    if outcome.state != DeviceState::Loaded || outcome.fault != Fault::None {
+        return fail(format!("{seen}; then {}, {}", outcome.state, outcome.fault));
+    }
+    let allowed_ms = 1.0 + 1e3 / servo.servo_hz + CLOCK_RESOLUTION_MS;
+    // What the hand causes changes no faster than the slew limit, either.
+    let steep = steepest_n_per_ms > 2e-3 * told.slew_n_s + ROUNDING_N;
+    if (took_ms - 1e3 * fade_s).abs() > allowed_ms || steep || last_n.abs() > LAST_N {
         return fail(seen);
     }
     Ok(seen)

@@ -177,7 +177,10 @@ impl Host {
 
     /// Asks for the outcome of a playback that has ended by itself or by STOP.
     fn ask_outcome(&mut self, at: Duration) {
-        if matches!(self.stage, Stage::Playing { .. } | Stage::Stopping { .. }) {
+        if matches!(
+            self.stage,
+            Stage::Playing { .. } | Stage::Fading { .. } | Stage::Stopping { .. }
+        ) {
             self.stage = Stage::AwaitingOutcome;
             self.queue.clear();
             self.send(Request::State, at);
@@ -190,6 +193,7 @@ impl Host {
             Stage::Loaded { .. }
                 | Stage::Starting
                 | Stage::Playing { .. }
+                | Stage::Fading { .. }
                 | Stage::Stopping { .. }
                 | Stage::AwaitingOutcome
         );
@@ -245,6 +249,8 @@ impl Host {
         };
         let samples_lost = u64::from(outcome.samples).saturating_sub(self.received);
         self.health.samples_lost += samples_lost.saturating_sub(self.lost);
+        let faded = self.faded(&outcome);
+        self.reports.extend(faded);
         self.reports.push(Report::Stopped(Playback {
             exploration_s,
             strokes: outcome.strokes,
@@ -272,6 +278,7 @@ impl Host {
         let since = match self.stage {
             Stage::Loaded { since }
             | Stage::Playing { since }
+            | Stage::Fading { since }
             | Stage::Stopping { since }
             | Stage::Loading { since } => since,
             _ => Duration::ZERO,
@@ -281,14 +288,19 @@ impl Host {
         }
         match (self.stage, pulse.state) {
             (_, DeviceState::Boot) => self.lose_device("it has restarted", at),
-            (Stage::Loaded { .. } | Stage::Playing { .. } | Stage::Stopping { .. }, state)
-                if state.latched() =>
-            {
+            (
+                Stage::Loaded { .. }
+                | Stage::Playing { .. }
+                | Stage::Fading { .. }
+                | Stage::Stopping { .. },
+                state,
+            ) if state.latched() => {
                 self.latched(pulse.fault, at);
             }
-            (Stage::Playing { .. } | Stage::Stopping { .. }, DeviceState::Loaded) => {
-                self.ask_outcome(at)
-            }
+            (
+                Stage::Playing { .. } | Stage::Fading { .. } | Stage::Stopping { .. },
+                DeviceState::Loaded,
+            ) => self.ask_outcome(at),
             _ => {}
         }
     }
@@ -298,6 +310,7 @@ impl Host {
             self.stage,
             Stage::Starting
                 | Stage::Playing { .. }
+                | Stage::Fading { .. }
                 | Stage::Stopping { .. }
                 | Stage::AwaitingOutcome
         );

@@ -22,6 +22,8 @@ pub(super) enum Stage {
     Starting,
     /// Playing.
     Playing { since: Duration },
+    /// FADE has been sent: it plays until the force is zero.
+    Fading { since: Duration },
     /// STOP has been sent, or the end of the playback has been reported.
     Stopping { since: Duration },
     /// The playback has ended and STATE asks for its outcome.
@@ -38,7 +40,7 @@ impl Stage {
             Self::Loaded { .. } => "a table is loaded",
             Self::Starting => "it is starting",
             Self::Playing { .. } => "it is playing",
-            Self::Stopping { .. } | Self::AwaitingOutcome => "it is stopping",
+            Self::Fading { .. } | Self::Stopping { .. } | Self::AwaitingOutcome => "it is stopping",
         }
     }
 
@@ -50,6 +52,7 @@ impl Stage {
                 | Self::Loaded { .. }
                 | Self::Starting
                 | Self::Playing { .. }
+                | Self::Fading { .. }
                 | Self::Stopping { .. }
                 // The table stays loaded. If STATE or its answer is lost on the line, it is
                 // asked for again, and the device must not go limp before.

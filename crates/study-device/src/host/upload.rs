@@ -227,6 +227,7 @@ pub(super) fn describe(request: &Request) -> &'static str {
         }
         Request::Play(_) => "the start",
         Request::Stop(_) => "the stop",
+        Request::Fade(_) => "the fall of the force",
         Request::Limp => "the command LIMP",
         Request::Heartbeat(_) => "a heartbeat",
         Request::Rearm => "to re-arm",

@@ -167,6 +167,9 @@ pub struct Fidelity {
     /// Time of the samples over time of the host.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time_ratio: Option<f64>,
+    /// From when the force fell to the end of the playback, in the time of its samples, s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub faded_from_s: Option<f64>,
     /// Slope of the reported speed on the change of the reported position.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub speed_gain: Option<f64>,

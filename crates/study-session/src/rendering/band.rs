@@ -110,7 +110,8 @@ fn sides(played: &Played<'_>, samples: &[Sample]) -> Option<[Vec<Predicted>; 2]>
             law: Law::Table { table, rule },
             ..played.what
         };
-        predicted(&what, played.stepped(), samples, |i| a_m_s2[i])
+        let fades = played.faded_from_s;
+        predicted(&what, played.stepped(), fades, samples, |i| a_m_s2[i])
     };
     Some([side(table.positive), side(table.negative)])
 }

@@ -34,7 +34,8 @@ pub(super) fn with_doubt(played: &Played<'_>, samples: &[Sample]) -> Vec<Predict
     let (what, servo) = (&played.what, played.servo);
     let stepped = played.stepped();
     let a_m_s2 = accelerations(samples, played.numbered);
-    let mut forces = predicted(what, stepped, samples, |i| a_m_s2[i]);
+    let fades = played.faded_from_s;
+    let mut forces = predicted(what, stepped, fades, samples, |i| a_m_s2[i]);
     // The largest acceleration in that band within half a step.
     let band = std::f64::consts::TAU * servo.acceleration_hz;
     let half_mm = 0.5 * step_mm(samples);
@@ -51,12 +52,12 @@ pub(super) fn with_doubt(played: &Played<'_>, samples: &[Sample]) -> Vec<Predict
             }
         }
     };
-    let mut others = vec![predicted(what, stepped, samples, |i| {
+    let mut others = vec![predicted(what, stepped, fades, samples, |i| {
         a_m_s2[i] + more_m_s2(i)
     })];
     // At a limit of the force only one side shows.
     if forces.iter().any(|p| p.after_gap) {
-        others.push(predicted(what, stepped, samples, |i| {
+        others.push(predicted(what, stepped, fades, samples, |i| {
             a_m_s2[i] - more_m_s2(i)
         }));
     }
@@ -203,7 +204,7 @@ pub(super) fn by_sign(played: &Played<'_>) -> bool {
     )
 }
 
-/// Which samples are compared: after the ramp, where the motion before is complete, where
+/// Which samples are compared: after the ramp and before the force falls, where the motion before is complete, where
 /// the table's force is below its limit and its direction is known, with the rule sign in
 /// motion.
 pub(super) fn comparable(
@@ -219,7 +220,8 @@ pub(super) fn comparable(
         .map(|((s, p), known)| {
             let moves = s.v_mm_s.abs() > REST_MM_S;
             let free = p.force_n.abs() < limit_n - ROUNDING_N;
-            s.t_s >= from_s && p.settled && free && *known && (!by_sign || moves)
+            let whole = s.t_s >= from_s && played.is_whole(s);
+            whole && p.settled && free && *known && (!by_sign || moves)
         })
         .collect()
 }

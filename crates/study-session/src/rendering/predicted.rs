@@ -51,10 +51,12 @@ impl Predicted {
 /// The force at each sample. The samples are finite and in the order of time.
 ///
 /// Between two samples the motion is interpolated, so that the servo runs at its own
-/// rate. `acceleration_m_s2` is that of a sample.
+/// rate. `acceleration_m_s2` is that of a sample. From `faded_from_s` on, if it is known, the force
+/// falls.
 pub(super) fn predicted(
     what: &Rendering<'_>,
     settings: ServoSettings,
+    faded_from_s: Option<f64>,
     samples: &[Sample],
     acceleration_m_s2: impl Fn(usize) -> f64,
 ) -> Vec<Predicted> {
@@ -107,6 +109,11 @@ pub(super) fn predicted(
         for step in 1..=steps {
             let part = f64::from(step) / f64::from(steps);
             let between = |a: f64, b: f64| a + part * (b - a);
+            // It fell from a servo period on, whose time is rounded.
+            let falls_s = between(from_s, sample.t_s) + 0.5 / hz;
+            if faded_from_s.is_some_and(|begins_s| falls_s >= begins_s) {
+                servo.fade();
+            }
             force_n = servo.step(
                 what,
                 Motion {

@@ -56,7 +56,8 @@ pub(super) fn nearest<'a>(
     };
     let a_m_s2 = accelerations(samples, played.numbered);
     let score = |what: &servo::Rendering<'_>| {
-        let forces = predicted(what, settings, samples, |i| a_m_s2[i]);
+        let fades = played.faded_from_s;
+        let forces = predicted(what, settings, fades, samples, |i| a_m_s2[i]);
         let pairs = (samples.iter().zip(&forces).zip(keep)).filter(|(_, keep)| **keep);
         let moments = Moments::of(pairs.map(|((s, p), _)| (p.force_n, s.force_command_n)));
         let far = moments.residual()? + moments.bias()?.powi(2);

@@ -62,7 +62,7 @@ pub(super) fn stated(
     let from_s = played.servo.ramp_s.max(LONGEST_RAMP_S) + AFTER_RAMP_S;
     let beyond: Vec<Option<f64>> = (samples.iter().zip(&bands))
         .map(|(s, band)| {
-            let counts = band.judged && s.t_s >= from_s;
+            let counts = band.judged && s.t_s >= from_s && played.is_whole(s);
             counts.then(|| band.beyond_n(s.force_command_n))
         })
         .collect();

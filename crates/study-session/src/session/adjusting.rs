@@ -1,7 +1,8 @@
 //! Trials of adjustment: the participant changes the level that is felt, one step of its ladder at a time.
 //!
-//! A device plays one table. A change is therefore a stop, a load and a start: the force is off at once, as at every stop,
-//! and comes up again with the device's own ramp. What comes next is in the journal before the stop is requested.
+//! A device plays one table. A change is therefore a stop, a load and a start. The force falls before the stop, on a device that
+//! can do so, and comes up again with the device's own ramp, so that nobody feels a step. What comes next is in the journal before
+//! the stop is requested.
 
 use super::Session;
 use super::phase::{Confirmed, Phase};
@@ -48,7 +49,7 @@ impl Session {
         });
         if let Some(to) = turned {
             self.feel_next(to, turn == Turn::Standard, at);
-            self.request_stop(false, false, at);
+            self.request_fade(at);
         }
     }
 
@@ -76,11 +77,12 @@ impl Session {
         if let Some(level) = level.filter(|_| at_standard && is_last) {
             self.feel_next(level, false, at);
         }
+        if at_standard {
+            return self.request_fade(at);
+        }
         self.request_stop(false, false, at);
         let by = self.confirmed();
-        if let Phase::Stopping { confirmed, .. } = &mut self.phase
-            && !at_standard
-        {
+        if let Phase::Stopping { confirmed, .. } = &mut self.phase {
             *confirmed = Some(by);
         }
     }

@@ -189,6 +189,9 @@ pub enum Effect {
     Start,
     /// Stop playing; the device confirms.
     Stop,
+    /// Stop playing without a step of the force, as far as the device can; it confirms as after
+    /// [`Effect::Stop`].
+    Fade,
     /// Make the device limp at once. Also cancels a load: no [`Input::DeviceLoaded`]
     /// for it may follow.
     Limp,

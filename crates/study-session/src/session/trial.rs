@@ -420,6 +420,17 @@ impl Session {
 
     pub(super) fn request_stop(&mut self, aborted: bool, pause: bool, at: Moment) {
         self.out.push(Effect::Stop);
+        self.await_stop(aborted, pause, at);
+    }
+
+    /// Requests the end of what is felt, without a step of its force where the device can do so.
+    /// A stop meanwhile makes the device limp at once, as during every stop.
+    pub(super) fn request_fade(&mut self, at: Moment) {
+        self.out.push(Effect::Fade);
+        self.await_stop(false, false, at);
+    }
+
+    fn await_stop(&mut self, aborted: bool, pause: bool, at: Moment) {
         self.phase = Phase::Stopping {
             since: at,
             aborted,

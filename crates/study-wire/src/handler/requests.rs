@@ -5,9 +5,9 @@ use super::table::{Refused, require};
 use super::{Alive, Handler, LastRequest, Out};
 use crate::frame::crc32;
 use crate::message::{
-    Constants, DeviceState, ELEMENTS_MINOR, EventKind, Fault, Features, Header, Heartbeat, Hello,
-    Identity, Loaded, MECHANISM_MINOR, MINOR, Outcome, Play, Pulse, Record, Refusal, Reply,
-    Request, Stop, VERSION, WireError, kind,
+    Constants, DeviceState, ELEMENTS_MINOR, EventKind, FADE_MINOR, Fault, Features, Header,
+    Heartbeat, Hello, Identity, Loaded, MECHANISM_MINOR, MINOR, Outcome, Play, Pulse, Record,
+    Refusal, Reply, Request, Stop, VERSION, WireError, kind,
 };
 use crate::real::Real;
 use crate::servo::{Servo, ServoSettings};
@@ -39,6 +39,7 @@ impl<const NODES: usize, const POINTS: usize, R: Real> Handler<NODES, POINTS, R>
             let features = self.profile.features;
             let refused = match request {
                 Request::ElementsBegin(_) => !features.elements,
+                Request::Fade(_) => !features.fade,
                 _ => request.minor() >= MECHANISM_MINOR && !features.mechanism,
             };
             match refused || request.minor() > self.minor {
@@ -173,6 +174,7 @@ impl<const NODES: usize, const POINTS: usize, R: Real> Handler<NODES, POINTS, R>
             Request::Play(play) => self.start_playback(*play, now_ms),
             Request::Record(record) => self.start_recording(*record, now_ms),
             Request::Stop(stop) => self.stop(*stop),
+            Request::Fade(fade) => self.fade(*fade),
             Request::Rearm => self.rearm(),
             // These are handled in `handle` and `handle_unsequenced`.
             Request::Hello(_) | Request::Limp | Request::Heartbeat(_) | Request::State => {
@@ -282,12 +284,28 @@ impl<const NODES: usize, const POINTS: usize, R: Real> Handler<NODES, POINTS, R>
         self.queue_event(EventKind::Started, now_ms);
     }
 
-    fn stop(&mut self, stop: Stop) -> Answer {
+    fn is_current(&self, stop: Stop) -> Answer {
         let current = stop.playback != 0 && stop.playback == self.run.playback;
-        require(current, Refusal::OtherPlayback, self.run.playback)?;
+        require(current, Refusal::OtherPlayback, self.run.playback)
+    }
+
+    fn stop(&mut self, stop: Stop) -> Answer {
+        self.is_current(stop)?;
         // The playback may have ended by itself in the meantime.
         if self.state.applies_force() {
             self.end();
+        }
+        Ok(())
+    }
+
+    /// Lets the force of a playback fall. It ends as soon as the force is zero, and at once by
+    /// all that ends it otherwise.
+    fn fade(&mut self, fade: Stop) -> Answer {
+        self.is_current(fade)?;
+        // The position of a probe is controlled, and not its force.
+        require(self.loaded != Loaded::Path, Refusal::WrongState, 0)?;
+        if self.state.applies_force() {
+            self.servo.fade();
         }
         Ok(())
     }
@@ -354,6 +372,7 @@ impl<const NODES: usize, const POINTS: usize, R: Real> Handler<NODES, POINTS, R>
             features: Features {
                 mechanism: self.profile.features.mechanism && self.minor >= MECHANISM_MINOR,
                 elements: self.profile.features.elements && self.minor >= ELEMENTS_MINOR,
+                fade: self.profile.features.fade && self.minor >= FADE_MINOR,
                 ..self.profile.features
             },
             commit_ms: COMMIT_MS,

@@ -47,6 +47,8 @@ pub struct Features {
     pub mechanism: bool,
     /// It plays elements, from minor version 2 on.
     pub elements: bool,
+    /// It lets the force fall before it ends a playback, from minor version 3 on.
+    pub fade: bool,
 }
 
 /// Text of a device: UTF-8, padded with zeros. It is untrusted input.
@@ -233,7 +235,8 @@ impl Field for Features {
     fn write(&self, out: &mut Writer) {
         let bits = u32::from(self.acceleration_from_speed)
             | u32::from(self.mechanism) << 1
-            | u32::from(self.elements) << 2;
+            | u32::from(self.elements) << 2
+            | u32::from(self.fade) << 3;
         bits.write(out);
     }
 
@@ -243,6 +246,7 @@ impl Field for Features {
             acceleration_from_speed: bits & 1 != 0,
             mechanism: bits & 2 != 0,
             elements: bits & 4 != 0,
+            fade: bits & 8 != 0,
         })
     }
 }

@@ -380,3 +380,110 @@ fn ten_thousand_changes_of_table_come_up_from_nothing() {
     // Of a period of 0.25 ms; where both rise, the ramp adds less than a thousandth.
     assert!((0.4..=0.5 * 1.001).contains(&fastest_n), "{fastest_n}");
 }
+
+/// A constant force of the damper at a constant speed, after the ramp.
+fn at_full_force(settings: ServoSettings, what: &Rendering<'_>) -> (Servo, f64) {
+    let mut servo = Servo::new(settings);
+    servo.start();
+    let mut force_n = 0.0;
+    for _ in 0..4000 {
+        force_n = servo.step(what, motion(15.0, 200.0));
+    }
+    (servo, force_n)
+}
+
+#[test]
+fn a_force_falls_by_half_a_cosine_over_the_time_of_the_ramp() {
+    let what = damper(&[0.05; 2]);
+    let (mut servo, whole_n) = at_full_force(bare(), &what);
+    assert!((whole_n - 10.0).abs() < 1e-9);
+    assert_eq!(bare().fade_periods(), 1600);
+    servo.fade();
+    assert!(!servo.faded());
+    for period in 1..=1600 {
+        if period == 700 {
+            servo.fade();
+        }
+        let force_n = servo.step(&what, motion(15.0, 200.0));
+        let part = f64::from(period) / 1600.0;
+        let expected_n = 5.0 + 5.0 * libm::cos(core::f64::consts::PI * part);
+        assert!((force_n - expected_n).abs() < 1e-9, "{period}: {force_n}");
+        assert_eq!(servo.faded(), period == 1600, "{period}");
+    }
+    assert_eq!(servo.held_n(), 0.0);
+    assert_eq!(servo.step(&what, motion(15.0, 200.0)), 0.0);
+    servo.start();
+    assert!(!servo.faded());
+}
+
+/// 400 N within 0.1 s would pass 2 N/ms, which it may not: π/2 · 400 N over 2000 N/s.
+#[test]
+fn a_large_force_falls_no_faster_than_the_slew_limit() {
+    let settings = ServoSettings {
+        force_n: 400.0,
+        ramp_s: 0.1,
+        ..bare()
+    };
+    let what = damper(&[2.0; 2]);
+    let (mut servo, whole_n) = at_full_force(settings, &what);
+    assert!((whole_n - 400.0).abs() < 1e-9);
+    let steepest_s = core::f64::consts::FRAC_PI_2 * 400.0 / 2000.0;
+    assert_eq!(
+        settings.fade_periods(),
+        libm::ceil(4000.0 * steepest_s) as u32
+    );
+    servo.fade();
+    let (mut last_n, mut largest_n) = (whole_n, 0.0_f64);
+    while !servo.faded() {
+        let force_n = servo.step(&what, motion(15.0, 200.0));
+        largest_n = largest_n.max((force_n - last_n).abs());
+        last_n = force_n;
+    }
+    assert!(largest_n <= 0.5 && largest_n > 0.499, "{largest_n}");
+    for force_n in [f64::NAN, f64::INFINITY] {
+        let invalid = ServoSettings { force_n, ..bare() };
+        assert_eq!(invalid.fade_periods(), 1600);
+    }
+}
+
+/// A force whose size falls gives back no more than the springs held when it began to fall: of a
+/// passive table λ(t) S(x) with λ falling and the potential V(x) ≥ 0 of S the hand puts in at least
+/// the change of λ V.
+#[test]
+fn a_fall_supplies_no_more_than_the_springs_hold() {
+    const SPRING: [f64; 2] = [0.2; 2];
+    const OFFSET: [f64; 2] = [-3.0; 2];
+    let branch = BranchView {
+        m_kg: &NONE,
+        b_n_s_per_mm: &NONE,
+        k_n_per_mm: &SPRING,
+        f0_n: &OFFSET,
+    };
+    let mut what = damper(&NONE);
+    (table(&mut what).positive, table(&mut what).negative) = (branch, branch);
+    let mut least_j = f64::INFINITY;
+    for phase in 0..40 {
+        for cycles in [0.3, 1.0, 2.5, 5.0] {
+            let mut servo = Servo::new(bare());
+            servo.start();
+            let at = |period: i32| {
+                let turns = cycles * f64::from(period) / 1600.0 + f64::from(phase) / 40.0;
+                let turn = core::f64::consts::TAU * turns;
+                let speed = 4000.0 * 12.0 * core::f64::consts::TAU * cycles / 1600.0;
+                motion(15.0 + 12.0 * libm::sin(turn), speed * libm::cos(turn))
+            };
+            for period in -3200..0 {
+                servo.step(&what, at(period));
+            }
+            let before_j = servo.tally().energy_j;
+            let held_j = 0.5 * 0.2e-3 * (at(0).x_mm - 15.0) * (at(0).x_mm - 15.0);
+            servo.fade();
+            for period in 0..1600 {
+                servo.step(&what, at(period));
+            }
+            assert!(servo.faded() && servo.state() == ServoState::Playing);
+            least_j = least_j.min(servo.tally().energy_j - before_j + held_j);
+        }
+    }
+    assert!(least_j > -1e-4, "{least_j}");
+}

@@ -340,6 +340,7 @@ fn a_constant_force_that_is_added_is_the_rms_difference_from_the_table() {
             samples,
             numbered: true,
             lost: 0,
+            faded_from_s: None,
             time_ratio: None,
             host_late_s: None,
             others: &[],
@@ -361,4 +362,87 @@ fn a_constant_force_that_is_added_is_the_rms_difference_from_the_table() {
     let few: Vec<Sample> = right.iter().step_by(10).copied().collect();
     assert_eq!(of(&few).rms_difference_n, None);
     assert!(of(&[]).force_n.is_empty());
+}
+
+/// When the force of [`fading`] falls, s: over 0.4 s, to the end of five seconds.
+const FALLS_S: f64 = 4.6;
+
+/// As [`right`], with a force that falls to the end.
+fn fading() -> Vec<Sample> {
+    let periods = f64::from(servo().fade_periods());
+    let fallen = |s: &Sample| ((s.t_s - FALLS_S) * HZ + 1.0) / periods;
+    forced(&right(), |s| match s.t_s < FALLS_S - 0.5 / HZ {
+        true => s.force_command_n,
+        false => {
+            let part = fallen(s).min(1.0);
+            s.force_command_n * (0.5 + 0.5 * (std::f64::consts::PI * part).cos())
+        }
+    })
+}
+
+#[test]
+fn a_force_that_falls_before_the_end_is_judged_as_such() {
+    let told = |played: &mut Played<'_>| played.faded_from_s = Some(FALLS_S);
+    let found = verdict(&fading(), told, |_| ());
+    assert_eq!(found.verdict, Verdict::Ok, "{found:?}");
+    assert_eq!(found.faded_from_s, Some(FALLS_S));
+    near(found.rendered_error_n, 0.0, 0.03);
+    near(found.judged_share, 1.0, 0.05);
+    // A fall that nobody asked for, and one that did not come.
+    let found = verdict_of(&fading());
+    assert_eq!(found.verdict, Verdict::Flag, "{found:?}");
+    let found = verdict(&right(), told, |_| ());
+    assert!(found.defects.contains(&Defect::Error), "{found:?}");
+    // Twice as fast as it should be: zero after half of the time.
+    let fast = forced(&fading(), |s| match s.t_s < FALLS_S + 0.2 {
+        true => s.force_command_n,
+        false => 0.0,
+    });
+    let found = verdict(&fast, told, |_| ());
+    assert!(found.defects.contains(&Defect::Error), "{found:?}");
+}
+
+/// The fall counts for what is told of the constants of the device as little as its ramp.
+#[test]
+fn a_fall_is_not_compared_with_other_constants() {
+    let slow = |own: &mut ServoSettings| own.ramp_s = 0.8;
+    let mut settings = servo();
+    slow(&mut settings);
+    let from_s = 5.0 - f64::from(settings.fade_periods()) / HZ;
+    near(Some(from_s), 4.2, 1e-9);
+    let (table, w) = (table(), std::f64::consts::TAU * STROKES_HZ);
+    let mut device = Servo::new(settings);
+    device.start();
+    let mut samples = Vec::new();
+    for tick in 0..(5.0 * HZ) as u32 {
+        let t_s = f64::from(tick) / HZ;
+        let motion = Motion {
+            x_mm: CENTER_MM - AMPLITUDE_MM * (w * t_s).cos(),
+            v_mm_s: AMPLITUDE_MM * w * (w * t_s).sin(),
+            a_m_s2: 1e-3 * AMPLITUDE_MM * w * w * (w * t_s).cos(),
+        };
+        if t_s + 0.5 / HZ >= from_s {
+            device.fade();
+        }
+        let force_command_n = device.step(&table.what(), motion);
+        if tick % 4 == 0 {
+            samples.push(Sample {
+                t_s,
+                x_mm: motion.x_mm,
+                v_mm_s: motion.v_mm_s,
+                force_command_n,
+                force_measured_n: None,
+            });
+        }
+    }
+    assert!(device.faded());
+    let found = verdict(
+        &samples,
+        |played| {
+            slow(&mut played.servo);
+            played.faded_from_s = Some(from_s);
+        },
+        |_| (),
+    );
+    assert_eq!(found.verdict, Verdict::Ok, "{found:?}");
 }
