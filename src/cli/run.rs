@@ -218,7 +218,8 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let within_h = protocol.session.resume_within_h;
     if let Some(session) = people::interrupted(&known, &rig, within_h, |s| study.is_open(s)) {
         let goes_on = people::goes_on(&session.history, &protocol);
-        roster.interrupted(session.participant.clone(), goes_on);
+        let left = people::left(&session.history, at.wall);
+        roster.interrupted(session.participant.clone(), left, goes_on);
     }
     let setup = Setup {
         protocol: protocol.clone(),

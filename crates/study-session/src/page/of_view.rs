@@ -488,7 +488,13 @@ fn read_by_experimenter(view: &View, what: &'static str) -> Option<&'static str>
     (view.entry == Entry::Experimenter).then_some(what)
 }
 
-fn ago(gap_h: f64) -> String {
+/// A time in h in words, such as "20 minutes"; "some time" if it is negative or not finite.
+///
+/// ```
+/// # use study_session::page::ago;
+/// assert_eq!((ago(1.0 / 3.0), ago(-1.0)), ("20 minutes".into(), "some time".into()));
+/// ```
+pub fn ago(gap_h: f64) -> String {
     if !gap_h.is_finite() || gap_h < 0.0 {
         return "some time".to_owned();
     }
