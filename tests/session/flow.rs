@@ -7,6 +7,7 @@ mod agreement;
 mod between;
 mod blinding;
 mod consent;
+mod debriefing;
 mod device;
 mod exposure;
 mod forms;

@@ -236,6 +236,7 @@ pub(super) fn words(event: &Event, revealed: bool) -> String {
             format!("the {} remarks: {}", by.as_str(), Untrusted(text))
         }
         Event::InstructionsRead => "the instructions were read".to_owned(),
+        Event::Debriefed => "what the study was about was shown".to_owned(),
         Event::Paused => "a pause begins".to_owned(),
         Event::Unpaused { paused_s } => format!("the pause ends after {paused_s:.1} s"),
         Event::BreakStarted { .. } => "a break begins".to_owned(),

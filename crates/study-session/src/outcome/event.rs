@@ -493,6 +493,8 @@ pub enum Event {
     },
     /// The instructions were read.
     InstructionsRead,
+    /// What the study was about was shown, and left. Since `study-protocol/3`.
+    Debriefed,
     /// A pause began.
     Paused,
     /// The pause ended.

@@ -54,6 +54,8 @@ pub struct History {
     pub answers: Vec<GivenAnswer>,
     /// Whether the instructions were read.
     pub instructions_read: bool,
+    /// Whether what the study was about was shown.
+    pub debriefed: bool,
     trials: BTreeMap<u32, TrialHistory>,
     /// The trial whose last attempt is under way.
     open: Option<u32>,
@@ -325,6 +327,7 @@ impl History {
                 trial.remarks.push(text.clone());
             }
             Event::InstructionsRead => self.instructions_read = true,
+            Event::Debriefed => self.debriefed = true,
             Event::BreakStarted { after } => {
                 self.breaks.insert(*after);
                 self.open_break = Some(at);

@@ -52,6 +52,10 @@ pub fn page(view: &View) -> Page {
                     page.instruction = read_by_experimenter(view, "Read out");
                 }
                 MessageKind::Practice => page.title = words.get(Phrase::Practice).to_owned(),
+                MessageKind::Debriefing => {
+                    page.instruction = read_by_experimenter(view, "Read out");
+                    page.title = words.get(Phrase::Debriefing).to_owned();
+                }
                 MessageKind::PracticeOver | MessageKind::Feedback => {}
             }
             page.text.clone_from(text);

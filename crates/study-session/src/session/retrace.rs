@@ -178,6 +178,7 @@ impl Retrace<'_> {
                 self.take_and_go_on();
             }
             Event::InstructionsRead
+            | Event::Debriefed
             | Event::BreakStarted { .. }
             | Event::TrackEnded { .. }
             | Event::PracticeEnded { .. }

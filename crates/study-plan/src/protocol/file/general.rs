@@ -1,10 +1,12 @@
-//! `[study]`, `[text]`, `[consent]`, `[session]` and `[trial]`.
+//! `[study]`, `[text]`, `[consent]`, `[debriefing]`, `[session]` and `[trial]`.
 
 use super::parts::{EXPOSURE, exposure};
 use crate::protocol::keys::{Id, Key, Kind, Words as _, keys};
 use crate::protocol::phrases::{Phrase, placeholders};
 use crate::protocol::section::Section;
-use crate::protocol::{Consent, Entry, ScaleDirection, SessionRules, Study, Text, TrialRules};
+use crate::protocol::{
+    Consent, Debriefing, Entry, ScaleDirection, SessionRules, Study, Text, TrialRules,
+};
 use std::collections::BTreeMap;
 use study_base::diagnostic::{Fault, did_you_mean};
 use study_base::text::Untrusted;
@@ -65,6 +67,13 @@ pub(super) const CONSENT: &[Key] = keys! {
     /// Whether the participant types initials in place of a signature. Only the copy has them: no journal, table or
     /// export. Needs the format `study-protocol/3`.
     "initials": Kind::Flag, "true", default("false");
+};
+
+pub(super) const DEBRIEFING: &[Key] = keys! {
+    /// The text, shown in full.
+    "text": Kind::Text, r#""You felt models of one switch. We ask which details make it feel real.""#;
+    /// A file with the text, plain text in UTF-8. With `text` as well, it is shown below that.
+    "file": Kind::Path, r#""debriefing.txt""#;
 };
 
 pub(super) const SESSION: &[Key] = keys! {
@@ -171,6 +180,18 @@ pub(super) fn consent(mut section: Section<'_, '_>) -> Option<Consent> {
         text: None,
         initials: initials?,
     })
+}
+
+pub(super) fn debriefing(mut section: Section<'_, '_>) -> Option<Debriefing> {
+    if section.value("text").is_none() && section.value("file").is_none() {
+        let fault = Fault::error("[debriefing] is empty");
+        section.fault_at(
+            "text",
+            fault.hint("write `text`, or name a `file` with it, or leave the section out"),
+        );
+    }
+    let (text, file) = (section.text("text"), section.path_of("file"));
+    (text.is_some() || file.is_some()).then_some(Debriefing { file, text })
 }
 
 pub(super) fn session(mut section: Section<'_, '_>) -> Option<SessionRules> {
