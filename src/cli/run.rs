@@ -253,8 +253,10 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let resume = resume_command(args, &participant);
     // While the terminal is open, a signal does not end the program.
     let failure = ended.unsaved.map(|unsaved| {
-        let kept = unsaved::keep(&unsaved, &participant, &folder, &unsaved::places());
-        unsaved::failure(&unsaved, &kept, &folder, &resume)
+        let places = unsaved::places();
+        let kept = unsaved::keep(&unsaved, &participant, &folder, &places);
+        let copy = unsaved::keep_copy(&unsaved, &participant, &folder, &places);
+        unsaved::failure(&unsaved, &kept, copy.as_ref(), &folder, &resume)
     });
     drop(operator);
     for notice in notices {

@@ -12,6 +12,7 @@ mod device;
 mod exposure;
 mod forms;
 mod identification;
+mod initials;
 mod interpreters;
 mod part_rig;
 mod parts;
