@@ -14,6 +14,7 @@ mod forms;
 mod identification;
 mod initials;
 mod interpreters;
+mod late_forms;
 mod part_rig;
 mod parts;
 mod pauses;

@@ -32,6 +32,7 @@ const OPEN: &[&str] = &[
     "group",
     "interval",
     "lag_ms",
+    "late",
     "ok",
     "operator",
     "participant",
@@ -223,6 +224,12 @@ pub(super) fn words(event: &Event, revealed: bool) -> String {
         } => {
             let paused = paused_s.map_or(String::new(), |s| format!(", after pauses of {s:.1} s"));
             format!("answered in {response_s:.1} s{paused}")
+        }
+        Event::FormDelayed { paused_s, late, .. } => {
+            let how_long =
+                paused_s.map_or("of unknown length".to_owned(), |s| format!("of {s:.1} s"));
+            let late = if *late { ", longer than allowed" } else { "" };
+            format!("the questionnaires are answered after a pause {how_long}{late}")
         }
         Event::TrialClosed { .. } => "it failed too often and does not come again".to_owned(),
         Event::TrackEnded { track, .. } if revealed => format!("the track {track} has ended"),

@@ -462,6 +462,18 @@ pub enum Event {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         paused_s: Option<f64>,
     },
+    /// The questionnaires between the trials that follow this attempt are answered after a pause: the event before these
+    /// answers, with the pauses since the answers before. Since `study-protocol/3`.
+    FormDelayed {
+        trial: u32,
+        attempt: u32,
+        /// How long, s; `None` if nobody knows, because the clock went back.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        paused_s: Option<f64>,
+        /// Whether all pauses since the trial was answered are longer than the protocol allows between feeling and answering.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        late: bool,
+    },
     /// The trial was closed after `max_attempts` failures.
     TrialClosed {
         trial: u32,

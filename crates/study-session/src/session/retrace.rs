@@ -187,6 +187,11 @@ impl Retrace<'_> {
                     self.take_and_go_on();
                 }
             }
+            Event::FormDelayed { .. } => {
+                if self.lead(true, at) {
+                    self.take();
+                }
+            }
             Event::BreakEnded { .. } => {
                 self.lead(false, at);
                 self.take_and_go_on();

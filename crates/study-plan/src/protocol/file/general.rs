@@ -86,7 +86,8 @@ pub(super) const SESSION: &[Key] = keys! {
     /// The longest pause between feeling and answering, or between two intervals of a trial: the
     /// program was left or paused, waited for the device or the disk, or stood still, as on a
     /// suspended computer. After a longer one the trial is felt again, unless a question of it is
-    /// answered already.
+    /// answered already. Questionnaires between the trials are answered all the same, and marked: `questionnaire_late` of
+    /// ratings.csv and a warning of the analysis.
     "longest_pause_s": Kind::not_negative("s"), "120", default("60");
 };
 

@@ -83,6 +83,8 @@ pub struct Attempt {
     pub(super) rating: Option<(Moment, Moment)>,
     /// Its completion.
     pub done: Option<Completion>,
+    /// The pauses before the answers to the questionnaires after it, if there were any.
+    pub delay: Option<FormDelay>,
     /// Failed or sent back: its answers do not count.
     pub void: bool,
 }
@@ -149,6 +151,25 @@ pub struct Completion {
     pub paused_s: Option<f64>,
     /// Number of the trial on the screen, from 1.
     pub number: u32,
+}
+
+/// Pauses between the answer to a trial and those to the questionnaires after it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FormDelay {
+    /// Their sum, s; `None` if one of them has no known length.
+    pub paused_s: Option<f64>,
+    /// Whether it is more than the protocol allows between feeling and answering.
+    pub late: bool,
+}
+
+impl FormDelay {
+    /// With another pause.
+    pub(super) fn and(self, next: Self) -> Self {
+        Self {
+            paused_s: self.paused_s.zip(next.paused_s).map(|(a, b)| a + b),
+            late: self.late || next.late,
+        }
+    }
 }
 
 impl Ended {
@@ -271,6 +292,7 @@ impl Attempt {
             rated_earlier_s: 0.0,
             rating: None,
             done: None,
+            delay: None,
             void: false,
         }
     }
