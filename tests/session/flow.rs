@@ -10,6 +10,7 @@ mod consent;
 mod debriefing;
 mod device;
 mod exposure;
+mod failed_steps;
 mod forms;
 mod identification;
 mod initials;

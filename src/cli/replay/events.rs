@@ -198,6 +198,16 @@ pub(super) fn words(event: &Event, revealed: bool) -> String {
         Event::Adjusted { to, .. } if revealed => format!("{to} comes next"),
         // A step away, or after the standard the same.
         Event::Adjusted { .. } => "the next level comes, or the same again".to_owned(),
+        Event::StepFailed {
+            failure, detail, ..
+        } => {
+            let detail = match revealed {
+                true => format!(": {}", Untrusted(detail)),
+                false => String::new(),
+            };
+            let why = failure.as_str();
+            format!("the step failed, {why}{detail}; the level before is felt again")
+        }
         Event::Replayed { .. } => "it is felt again before the answer".to_owned(),
         Event::TelemetryLost { reason, .. } => {
             format!(

@@ -422,6 +422,15 @@ pub enum Event {
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         standard: bool,
     },
+    /// What came next in a trial of adjustment could not be presented, or was not what it should be: the level before is felt
+    /// again on request, and nothing that was set so far is lost. Since `study-protocol/3`.
+    StepFailed {
+        trial: u32,
+        attempt: u32,
+        failure: Failure,
+        /// The device's message or the reason.
+        detail: String,
+    },
     /// All intervals of the attempt are felt again before it is answered.
     Replayed { trial: u32, attempt: u32 },
     /// The telemetry of the attempt could not be saved, or only in part.

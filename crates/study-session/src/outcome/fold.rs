@@ -278,6 +278,16 @@ impl History {
                     attempt.adjusted(to, *standard);
                 }
             }
+            Event::StepFailed {
+                trial,
+                attempt,
+                failure,
+                ..
+            } => {
+                if let Some(attempt) = self.attempt_mut(*trial, *attempt) {
+                    attempt.step_failed(*failure);
+                }
+            }
             Event::Replayed { trial, attempt } => {
                 if let Some(attempt) = self.attempt_mut(*trial, *attempt) {
                     attempt.replays += 1;

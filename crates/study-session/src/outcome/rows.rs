@@ -206,7 +206,7 @@ impl AttemptEvent {
             Event::AttemptStarted { .. } => Self::Attempt,
             Event::Answered { .. } => Self::Answer,
             Event::Corrected { .. } | Event::IdCorrected { .. } => Self::Correction,
-            Event::AttemptFailed { .. } => Self::Failure,
+            Event::AttemptFailed { .. } | Event::StepFailed { .. } => Self::Failure,
             Event::TrialClosed { .. } => Self::Closed,
             Event::Remark { .. } => Self::Remark,
             Event::Reopened { .. } => Self::Resume,

@@ -109,8 +109,11 @@ impl Session {
                 }
             }
             phase if phase.preparing() => {
-                self.fail(Failure::Stopped, "the journal could not be written", at);
-                self.proceed(at);
+                let what = "the journal could not be written";
+                if !self.step_failed(Failure::Stopped, what, at) {
+                    self.fail(Failure::Stopped, what, at);
+                    self.proceed(at);
+                }
             }
             Phase::Playing { .. } => {
                 self.phase = Phase::Stopping {

@@ -66,6 +66,8 @@ pub struct Attempt {
     pub level: Option<TrackLevel>,
     /// Of a trial of adjustment: the intervals with the standard.
     pub(super) standards: Option<Vec<u32>>,
+    /// What the device failed at in steps that were repeated, one for each failure.
+    pub(super) failed_steps: Vec<ModelId>,
     /// Its presentations so far, in order. Each begins with its confirmed start.
     pub presentations: Vec<Presentation>,
     /// How often its intervals were felt again.
@@ -268,12 +270,17 @@ impl Attempt {
             }),
         }
         if interval >= self.intervals() {
-            let all = self.presentations.iter().filter_map(|p| p.ended);
-            let sum = all.map(|(_, ended)| ended).reduce(Ended::and);
-            let several = interval > 1 || self.replays > 0;
-            self.ended = sum.filter(|_| several).or(Some(ended));
-            self.rating = Some((at, at));
+            self.end(interval, ended, at);
         }
+    }
+
+    /// The last interval has ended: with the sums over all.
+    pub(super) fn end(&mut self, interval: u32, ended: Ended, at: Moment) {
+        let all = self.presentations.iter().filter_map(|p| p.ended);
+        let sum = all.map(|(_, ended)| ended).reduce(Ended::and);
+        let several = interval > 1 || self.replays > 0;
+        self.ended = sum.filter(|_| several).or(Some(ended));
+        self.rating = Some((at, at));
     }
 
     pub(super) fn new(number: u32, sitting: &Sitting, start: Option<AttemptStart>) -> Self {
@@ -284,6 +291,7 @@ impl Attempt {
             models: Vec::new(),
             level: None,
             standards: None,
+            failed_steps: Vec::new(),
             presentations: Vec::new(),
             replays: 0,
             ended: None,
