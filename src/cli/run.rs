@@ -218,7 +218,8 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let within_h = protocol.session.resume_within_h;
     if let Some(session) = people::interrupted(&known, &rig, within_h, |s| study.is_open(s)) {
         let goes_on = people::goes_on(&session.history, &protocol);
-        roster.interrupted(session.participant.clone(), goes_on);
+        let left = people::left(&session.history, at.wall);
+        roster.interrupted(session.participant.clone(), left, goes_on);
     }
     let setup = Setup {
         protocol: protocol.clone(),
@@ -252,8 +253,10 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let resume = resume_command(args, &participant);
     // While the terminal is open, a signal does not end the program.
     let failure = ended.unsaved.map(|unsaved| {
-        let kept = unsaved::keep(&unsaved, &participant, &folder, &unsaved::places());
-        unsaved::failure(&unsaved, &kept, &folder, &resume)
+        let places = unsaved::places();
+        let kept = unsaved::keep(&unsaved, &participant, &folder, &places);
+        let copy = unsaved::keep_copy(&unsaved, &participant, &folder, &places);
+        unsaved::failure(&unsaved, &kept, copy.as_ref(), &folder, &resume)
     });
     drop(operator);
     for notice in notices {

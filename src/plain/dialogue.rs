@@ -163,12 +163,11 @@ impl Dialogue {
 
     fn who(&self, page: &mut Page, participant: &str, operator: &str, roster: Option<&Roster>) {
         page.lines = vec!["Who takes part?".to_owned()];
-        if let Some((_, sentences)) = roster.and_then(Roster::unfinished)
+        if let Some(sentences) = roster.and_then(Roster::unfinished)
             && participant.is_empty()
         {
             page.lines.push(sentences.join(" "));
         }
-        let proposed = preset(participant, roster);
         let known = |preset: &str, word: &str| match preset {
             "" => format!("Type {word}, then press Enter."),
             preset => format!(
@@ -177,7 +176,7 @@ impl Dialogue {
             ),
         };
         page.prompt = match &self.participant {
-            None => known(&proposed, "the participant's pseudonym, such as P01"),
+            None => known(participant, "the participant's pseudonym, such as P01"),
             Some(id) => {
                 let who = roster.and_then(|roster| roster.who(id));
                 let who = who.map_or_else(String::new, |who| format!(" {}: {who}.", Untrusted(id)));
@@ -361,11 +360,8 @@ impl Dialogue {
                 participant,
                 operator,
                 claiming: false,
-                roster,
-            } => {
-                let participant = preset(participant, roster.as_deref());
-                self.identify(line.trim(), &participant, operator)
-            }
+                ..
+            } => self.identify(line.trim(), participant, operator),
             Screen::ResumeChoice { restart, .. } => match key.as_str() {
                 "b" if *restart => Ok(vec![Input::Resume(Choice::RestartBlock)]),
                 "c" => Ok(vec![Input::Resume(Choice::Continue)]),
@@ -530,15 +526,6 @@ impl Dialogue {
                 }])
             }
         }
-    }
-}
-
-/// The participant's id that Enter alone gives: the one of the command line, or that of whoever
-/// has not finished.
-fn preset(participant: &str, roster: Option<&Roster>) -> String {
-    match (participant, roster.and_then(Roster::unfinished)) {
-        ("", Some((unfinished, _))) => unfinished.to_string(),
-        _ => participant.to_owned(),
     }
 }
 

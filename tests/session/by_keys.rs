@@ -55,9 +55,8 @@ fn eventful(protocol: &Path, id: &str, trials: usize) {
     );
 
     let mut terminal = start(folder.path(), protocol);
-    terminal.wait_for(&format!(
-        "P01 has not finished: Enter goes on with trial 3 of {trials}."
-    ));
+    terminal.wait_for("P01 was interrupted at ");
+    terminal.wait_for(&format!("Type P01 to go on with trial 3 of {trials},"));
     terminal.keys("P01");
     terminal.wait_for(&format!("unfinished, 2 of {trials} trials saved"));
     terminal.keys("\r");

@@ -11,7 +11,7 @@ use std::time::Duration;
 use study::runner::clock::VirtualClock;
 use study::runner::{Ended, Runner, Setup};
 use study_device::manual::Manual;
-use study_plan::protocol::{Answer, DeviceKind};
+use study_plan::protocol::{Answer, Consent, DeviceKind};
 use study_session::outcome::Event;
 use study_session::session::{Config, Ending, Input, Screen, View};
 use study_session::store::{SeatKind, StudyFolder};
@@ -23,6 +23,8 @@ struct Operator {
     retried: bool,
     /// The numbers of ratings entered.
     rated: i64,
+    /// Whether initials were typed.
+    signed: bool,
 }
 
 impl Operator {
@@ -40,14 +42,20 @@ impl Operator {
             | Screen::Playing { .. }
             | Screen::End { .. } => vec![Input::Advance],
             Screen::Stopped { .. } => vec![Input::RateStopped],
+            Screen::Consent { .. } => vec![Input::Consent(true)],
             Screen::Form { questions, .. } => {
                 let mut answers = Vec::new();
                 for question in questions {
-                    let answer = if question.id.as_str() == "realism" {
-                        self.rated += 1;
-                        Answer::Rating(self.rated)
-                    } else {
-                        Answer::Text(format!("about {}", self.rated))
+                    let answer = match question.id.as_str() {
+                        "realism" => {
+                            self.rated += 1;
+                            Answer::Rating(self.rated)
+                        }
+                        "initials" => {
+                            self.signed = true;
+                            Answer::Text("QXJ".to_owned())
+                        }
+                        _ => Answer::Text(format!("about {}", self.rated)),
                     };
                     answers.push((question.id.clone(), answer));
                 }
@@ -62,6 +70,10 @@ struct Session {
     ended: Ended,
     /// Ratings entered.
     rated: i64,
+    /// Whether initials were typed.
+    signed: bool,
+    /// The participant's copy of the consent document that is on the disk.
+    copy: Option<String>,
     /// The last view, and the most trials that a view has shown as saved.
     last: View,
     saved: u32,
@@ -70,7 +82,10 @@ struct Session {
 }
 
 fn session(from: usize, leave: &Input) -> Option<Session> {
-    let mut kept = Kept::new();
+    session_of(Kept::new(), from, leave)
+}
+
+fn session_of(mut kept: Kept, from: usize, leave: &Input) -> Option<Session> {
     kept.protocol.device.kind = DeviceKind::Manual;
     let disk = MemoryDisk::new();
     disk.plan(from, Fault::From(ErrorKind::Other));
@@ -108,6 +123,7 @@ fn session(from: usize, leave: &Input) -> Option<Session> {
         leave: leave.clone(),
         retried: false,
         rated: 0,
+        signed: false,
     };
     let mut last = runner.view();
     let mut saved = 0;
@@ -120,12 +136,18 @@ fn session(from: usize, leave: &Input) -> Option<Session> {
         }
         if let Some(ended) = runner.step(operator.turn(&view)) {
             drop(runner);
-            let found = StudyFolder::open_on(Arc::new(disk.after(Crash::OnlySynced)), &path);
+            let after = disk.after(Crash::OnlySynced);
+            let files = after.files();
+            let copy = files.iter().find(|(path, _)| path.ends_with("consent.txt"));
+            let copy = copy.map(|(_, bytes)| String::from_utf8(bytes.clone()).unwrap());
+            let found = StudyFolder::open_on(Arc::new(after), &path);
             let sessions = found.unwrap().sessions().unwrap();
             let entries = sessions.into_iter().flat_map(|s| s.entries);
             return Some(Session {
                 ended,
                 rated: operator.rated,
+                signed: operator.signed,
+                copy,
                 last,
                 saved,
                 on_disk: entries.map(|e| e.event).collect(),
@@ -192,4 +214,56 @@ fn nothing_is_lost_without_being_named_whenever_the_disk_dies() {
         }
     }
     assert!(unsaved_answers > 0, "nothing was tested");
+}
+
+/// A study whose participants read a text and type initials.
+fn signed() -> Kept {
+    let mut kept = Kept::new();
+    kept.protocol.consent = Some(Consent {
+        document: "Information".to_owned(),
+        version: "2".to_owned(),
+        file: None,
+        text: Some("You turn a switch.".to_owned()),
+        initials: true,
+    });
+    kept
+}
+
+/// What was signed is on the disk before the journal says so; until then it is kept by the session, and its end names it.
+#[test]
+fn no_copy_of_a_consent_is_lost_whenever_the_disk_dies() {
+    let is_copy =
+        |copy: &str| copy.starts_with("Information, version 2") && copy.ends_with("\nQXJ\n");
+    let agreed = |e: &Event| matches!(e, Event::Consented { accepted: true, .. });
+    let whole = session_of(signed(), usize::MAX, &Input::Quit).unwrap();
+    assert_eq!(whole.ended.ending, Ending::Finished);
+    assert!(is_copy(whole.copy.as_ref().unwrap()));
+    let mut kept = 0;
+    for leave in [Input::Quit, Input::Abort("SIGTERM".to_owned())] {
+        for from in 0..whole.calls {
+            let Some(session) = session_of(signed(), from, &leave) else {
+                continue;
+            };
+            let in_journal = session.on_disk.iter().any(agreed);
+            assert!(!in_journal || session.copy.is_some(), "call {from}");
+            let unsaved = session.ended.unsaved.as_ref();
+            let Some(copy) = unsaved.and_then(|unsaved| unsaved.copy.as_ref()) else {
+                assert!(!session.signed || in_journal, "call {from}: it is lost");
+                continue;
+            };
+            kept += 1;
+            assert!(is_copy(copy), "call {from}: {copy}");
+            let named = |names: &[String]| {
+                let own = |name: &String| name == "the participant's copy of the consent";
+                names.iter().any(own)
+            };
+            let unsaved = unsaved.unwrap();
+            assert!(named(&unsaved.what), "call {from}: {:?}", unsaved.what);
+            assert!(named(&session.last.unsaved), "call {from}: on the screen");
+            // The signature is in nothing but the copy.
+            let shown = format!("{:?} {:?} {:?}", unsaved.what, unsaved.events, session.last);
+            assert!(!shown.contains("QXJ"), "call {from}: {shown}");
+        }
+    }
+    assert!(kept > 0, "nothing was tested");
 }

@@ -12,6 +12,7 @@ mod channels;
 mod checked;
 mod commission;
 mod consent_page;
+mod debriefing_page;
 #[path = "../support/designs.rs"]
 mod designs;
 mod devices;

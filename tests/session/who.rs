@@ -50,7 +50,8 @@ fn after_an_interruption(participant: &str) -> View {
     let id = ParticipantId::new("P03").unwrap();
     let row = History::default().participant_row(&id, 1);
     let mut roster = Roster::new(&[row], Newcomer::Row(4));
-    roster.interrupted(id, "with trial 12 of 40".to_owned());
+    let left = "at 14:05, 20 minutes ago".to_owned();
+    roster.interrupted(id, left, "with trial 12 of 40".to_owned());
     view(Screen::Who {
         participant: participant.to_owned(),
         operator: "lw".to_owned(),
@@ -66,11 +67,12 @@ fn identified(participant: &str) -> Input {
     }
 }
 
-const UNFINISHED: &str = "P03 has not finished: Enter goes on with trial 12 of 40.";
-const ANOTHER: &str = "Type another id to start somebody else.";
+const UNFINISHED: &str = "P03 was interrupted at 14:05, 20 minutes ago.";
+const DELIBERATE: &str = "Type P03 to go on with trial 12 of 40, or another id for somebody else.";
 
+/// No number of Enters, and no arrow, goes on with the session of whoever has not finished.
 #[test]
-fn who_has_not_finished_is_proposed_with_the_trial_that_comes() {
+fn only_a_typed_id_goes_on_with_an_unfinished_session() {
     let view = after_an_interruption("");
     let press = |surface: &mut Surface, code| {
         let key = Event::Key(KeyEvent::new(code, KeyModifiers::NONE));
@@ -79,37 +81,55 @@ fn who_has_not_finished_is_proposed_with_the_trial_that_comes() {
     let look = |surface: &mut Surface| picture(&drawn(surface, &view, 80, 24));
     let mut surface = Surface::new(ColorDepth::None);
     let first = look(&mut surface);
-    for words in [UNFINISHED, ANOTHER, "→ or Enter: P03"] {
+    for words in [UNFINISHED, DELIBERATE] {
         assert!(first.contains(words), "{words}\n{first}");
     }
-    assert_eq!(press(&mut surface, KeyCode::Enter), []);
-    let taken = look(&mut surface);
-    assert!(
-        taken.contains("┃ P03") && !taken.contains(ANOTHER),
-        "{taken}"
-    );
-    assert_eq!(press(&mut surface, KeyCode::Enter), [identified("P03")]);
-
-    let mut surface = Surface::new(ColorDepth::None);
-    look(&mut surface);
-    for c in "P04".chars() {
-        press(&mut surface, KeyCode::Char(c));
+    assert!(!first.contains("or Enter"), "{first}");
+    for code in [KeyCode::Enter, KeyCode::Right, KeyCode::Tab, KeyCode::Tab] {
+        for _ in 0..5 {
+            assert_eq!(press(&mut surface, code), [], "{code:?}");
+            press(&mut surface, KeyCode::Enter);
+        }
     }
-    let other = look(&mut surface);
-    assert!(other.contains("new, row 4"), "{other}");
-    assert_eq!(press(&mut surface, KeyCode::Enter), [identified("P04")]);
+    let still = look(&mut surface);
+    assert!(still.contains(DELIBERATE), "{still}");
+    assert!(
+        still.contains("Type the participant's id first."),
+        "{still}"
+    );
+
+    for (id, who) in [("P03", "unfinished"), ("P04", "new, row 4")] {
+        let mut surface = Surface::new(ColorDepth::None);
+        look(&mut surface);
+        for c in id.chars() {
+            assert_eq!(press(&mut surface, KeyCode::Char(c)), []);
+        }
+        let typed = look(&mut surface);
+        assert!(
+            typed.contains(who) && !typed.contains(DELIBERATE),
+            "{typed}"
+        );
+        assert_eq!(press(&mut surface, KeyCode::Enter), [identified(id)]);
+    }
 }
 
 #[test]
-fn lines_propose_the_same() {
-    for (typed, id) in [("", "P03"), ("P04", "P04")] {
+fn in_lines_empty_lines_go_on_with_nobody_either() {
+    for id in ["P03", "P04"] {
         let view = after_an_interruption("");
         let mut dialogue = Dialogue::new(true, false);
         let said = dialogue.follow(&view).lines.join("\n");
-        for words in [UNFINISHED, ANOTHER, "Enter alone: P03."] {
+        for words in [UNFINISHED, DELIBERATE] {
             assert!(said.contains(words), "{words}\n{said}");
         }
-        assert_eq!(dialogue.line(typed, &view).0, []);
+        assert!(!said.contains("Enter alone"), "{said}");
+        for _ in 0..5 {
+            let (inputs, lines) = dialogue.line("", &view);
+            assert_eq!(inputs, []);
+            assert_eq!(lines, ["Type the participant's pseudonym first."]);
+            dialogue.follow(&view);
+        }
+        assert_eq!(dialogue.line(id, &view).0, []);
         let said = dialogue.follow(&view).lines.join("\n");
         assert!(!said.contains(UNFINISHED), "said once\n{said}");
         assert_eq!(dialogue.line("", &view).0, [identified(id)]);

@@ -4,12 +4,12 @@
 
 use crate::memory::{Crash, Fault, MemoryDisk};
 use crate::process::{Told, run, script, scripted};
-use crate::world::{Kept, at, protocol, real};
+use crate::world::{Kept, at, protocol, real, started};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use study_base::rng::Stream;
-use study_session::outcome::Event;
+use study_session::outcome::{Author, Event};
 use study_session::store::disk::Disk;
 use study_session::store::{Finding, StoreError, StudyFolder};
 
@@ -253,4 +253,74 @@ fn an_erasure_reaches_the_mirror_at_the_next_start() {
         .keys()
         .find(|path| path.to_string_lossy().contains("journal"));
     assert_eq!(journal, None);
+}
+
+/// The participant's copy of a consent, on one disk or both.
+fn consents(disks: &Disks) -> [bool; 2] {
+    [0, 1].map(|side: usize| {
+        let files = disks.0[side].files();
+        files.keys().any(|path| path.ends_with("consent.txt"))
+    })
+}
+
+/// Initials are on both disks; after a refusal they are on neither, also if a disk was away when it was recorded.
+#[test]
+fn a_copy_of_the_consent_is_on_both_disks_and_on_neither_after_a_refusal() {
+    for accepted in [true, false] {
+        let disks = Disks::new();
+        let (study, _) = disks.open().unwrap();
+        let mut claimed = study.claim(&real("P01")).unwrap();
+        let mut journal = claimed.folder.journal().unwrap();
+        let start = started("P01", claimed.session, claimed.seat);
+        journal.append(at(1), &start).unwrap();
+        claimed.folder.keep_consent("signed: QXJ").unwrap();
+        assert_eq!(consents(&disks), [true, true]);
+        disks.0[1].plan(0, Fault::From(ErrorKind::Other));
+        if !accepted {
+            claimed.folder.drop_consent().unwrap();
+        }
+        let consented = Event::Consented {
+            document: "Information".to_owned(),
+            version: "2".to_owned(),
+            accepted,
+            by: Author::Participant,
+        };
+        journal.append(at(2), &consented).unwrap();
+        drop((journal, claimed, study));
+        assert_eq!(consents(&disks), [accepted, true]);
+        let next = disks.after(Crash::Process);
+        drop(next.open().unwrap());
+        assert_eq!(consents(&next), [accepted, accepted]);
+        assert_eq!(next.differences(), []);
+    }
+}
+
+/// A disk that was away when it was signed gets the copy at the next start.
+#[test]
+fn a_disk_that_was_away_gets_the_copy_of_the_consent() {
+    for away in [0, 1] {
+        let disks = Disks::new();
+        let (study, _) = disks.open().unwrap();
+        let mut claimed = study.claim(&real("P01")).unwrap();
+        let mut journal = claimed.folder.journal().unwrap();
+        let start = started("P01", claimed.session, claimed.seat);
+        journal.append(at(1), &start).unwrap();
+        disks.0[away].plan(0, Fault::From(ErrorKind::Other));
+        claimed.folder.keep_consent("signed: QXJ").unwrap();
+        let consented = Event::Consented {
+            document: "Information".to_owned(),
+            version: "2".to_owned(),
+            accepted: true,
+            by: Author::Participant,
+        };
+        journal.append(at(2), &consented).unwrap();
+        drop((journal, claimed, study));
+        let mut there = [true; 2];
+        there[away] = false;
+        assert_eq!(consents(&disks), there);
+        let next = disks.after(Crash::Process);
+        drop(next.open().unwrap());
+        assert_eq!(consents(&next), [true, true]);
+        assert_eq!(next.differences(), []);
+    }
 }

@@ -23,6 +23,7 @@ pub(crate) fn design(models: usize, repetitions: u32, order: Order) -> Protocol 
         },
         text: Text::default(),
         consent: None,
+        debriefing: None,
         confirms: None,
         design: Design {
             participants: 10,

@@ -27,11 +27,11 @@ use study_plan::protocol::{DeviceKind, FileOrders, ModelEntry, Order, Protocol, 
 use study_session::store::disk::read_capped;
 use study_session::store::layout;
 
-mod consent;
 mod errors;
 mod families;
 mod frozen;
 mod join;
+mod prose;
 mod recordings;
 mod spaces;
 
@@ -41,10 +41,9 @@ pub use errors::ComponentErrors;
 pub use frozen::{FrozenError, changes, damage, frozen, frozen_version, frozen_versions};
 pub use recordings::{Deliveries, RecordingError, deliveries};
 
-/// Largest model file, orders file and text of a consent document that are read, bytes.
+/// Largest model file and orders file that are read, bytes.
 const MAX_MODEL_BYTES: usize = 16 * 1024 * 1024;
 const MAX_ORDERS_BYTES: usize = 64 * 1024 * 1024;
-const MAX_TEXT_BYTES: usize = 256 * 1024;
 /// Hint for a table that fails its certificate.
 const PERMIT: &str = "identify it with m, b >= 0, or permit it in [device]: uncertified = { play = true, force_n = ..., reason = \"...\" }";
 
@@ -292,9 +291,7 @@ fn open(path: &Path, purpose: Purpose<'_>) -> (Option<Loaded>, Vec<Findings>) {
         findings.sort();
         return (None, others.findings(findings));
     };
-    if let Some(consent) = &mut protocol.consent {
-        consent.text = others.consent.take();
-    }
+    others.texts.fill(&mut protocol);
     others.assign(&protocol);
     others.turn(protocol.device.lever_mm);
     join::vaf(&mut protocol, &others, &spans, &mut findings);
@@ -354,8 +351,8 @@ struct OtherFiles<'f> {
     /// In the order of the protocol.
     opened: Vec<Opened>,
     orders: Option<FileOrders>,
-    /// The text of the consent document.
-    consent: Option<String>,
+    /// What participants read.
+    texts: prose::Texts,
     /// Realization → index in `opened`.
     models: BTreeMap<ModelId, usize>,
     /// The same for the ends of families and for spaces.
@@ -378,7 +375,7 @@ impl<'f> OtherFiles<'f> {
             folder,
             opened: Vec::new(),
             orders: None,
-            consent: None,
+            texts: prose::Texts::default(),
             models: BTreeMap::new(),
             ends: BTreeMap::new(),
         }
@@ -387,13 +384,17 @@ impl<'f> OtherFiles<'f> {
     /// Reads a file that the protocol names, once. The returned fault concerns the
     /// protocol; the faults of the file itself are kept with the file.
     fn open(&mut self, name: &Named) -> Result<(), Fault> {
-        if self.opened.iter().any(|o| o.file == name.file) {
+        if let Some(opened) = self.opened.iter().find(|o| o.file == name.file) {
+            // One file may have two texts; its faults are known.
+            if let (Content::Text(which), Ok(text)) = (&name.content, text_of(&opened.bytes)) {
+                self.texts.read(*which, String::new(), text);
+            }
             return Ok(());
         }
         let (most, what) = match name.content {
             Content::Orders => (MAX_ORDERS_BYTES, "orders"),
             Content::Model => (MAX_MODEL_BYTES, "model"),
-            Content::Text => (MAX_TEXT_BYTES, "consent"),
+            Content::Text(which) => (prose::MAX_BYTES, prose::name(which)),
             Content::Bundle(_) => (archive::MAX_BYTES, "bundle"),
         };
         let path = self.folder.join(&name.file);
@@ -403,29 +404,27 @@ impl<'f> OtherFiles<'f> {
         })?;
         let model = match &name.content {
             Content::Bundle(address) => Some(model_of(&bytes, address.as_deref())?),
-            Content::Model | Content::Orders | Content::Text => None,
+            Content::Model | Content::Orders | Content::Text(_) => None,
         };
         let shown = path.display().to_string();
         let mut realization = None;
         let findings = match text_of(model.as_ref().unwrap_or(&bytes)) {
             Err(fault) => Findings::alone(shown, fault),
-            Ok(text) if name.content == Content::Orders => {
-                let (orders, findings) = file::parse_orders(&shown, text);
-                if !findings.has_errors() {
-                    self.orders = Some(orders);
+            Ok(text) => match name.content {
+                Content::Orders => {
+                    let (orders, findings) = file::parse_orders(&shown, text);
+                    if !findings.has_errors() {
+                        self.orders = Some(orders);
+                    }
+                    findings
                 }
-                findings
-            }
-            Ok(text) if name.content == Content::Text => {
-                let (text, findings) = consent::read(shown, text);
-                self.consent = Some(text);
-                findings
-            }
-            Ok(text) => {
-                let (read, findings) = study_haptics::model::file::parse(&shown, text);
-                realization = read;
-                findings
-            }
+                Content::Text(which) => self.texts.read(which, shown, text),
+                Content::Model | Content::Bundle(_) => {
+                    let (read, findings) = study_haptics::model::file::parse(&shown, text);
+                    realization = read;
+                    findings
+                }
+            },
         };
         self.opened.push(Opened {
             file: name.file.clone(),

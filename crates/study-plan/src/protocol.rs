@@ -96,6 +96,9 @@ pub struct Protocol {
     pub text: Text,
     /// `[consent]`
     pub consent: Option<Consent>,
+    /// `[debriefing]`
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub debriefing: Option<Debriefing>,
     /// `[confirms]`
     #[serde(skip_serializing_if = "Option::is_none")]
     pub confirms: Option<Confirms>,
@@ -235,6 +238,27 @@ pub struct Consent {
     /// Whether the participant types initials in place of a signature.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub initials: bool,
+}
+
+/// `[debriefing]`: what the participant reads at the end of a session.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Debriefing {
+    /// The file with the text, or with the rest of it, relative to the protocol. No fingerprint has the path of a file.
+    #[serde(skip)]
+    pub file: Option<String>,
+    /// The text: that of the protocol and, once it was read, that of the file below it. Fingerprints have its SHA-256.
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "hashed")]
+    pub text: Option<String>,
+}
+
+impl Debriefing {
+    /// Adds the text of the file.
+    pub fn add(&mut self, read: &str) {
+        self.text = Some(match &self.text {
+            Some(text) => format!("{}\n\n{read}", text.trim_end()),
+            None => read.to_owned(),
+        });
+    }
 }
 
 fn hashed<S: serde::Serializer>(text: &Option<String>, to: S) -> Result<S::Ok, S::Error> {

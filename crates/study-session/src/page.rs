@@ -14,7 +14,7 @@ mod of_view;
 mod question;
 pub mod reply;
 
-pub use of_view::{attending, page};
+pub use of_view::{ago, attending, page};
 pub use question::{Asked, Field};
 
 use crate::session::{Screen, View};

@@ -124,6 +124,9 @@ pub struct Session {
     overlaid_since: Option<Moment>,
     /// Pauses since the end of the last playback, s; infinite if nobody knows how long.
     away_s: f64,
+    /// Pauses since the last trial was answered, or the last questionnaire after one, s; infinite
+    /// if nobody knows how long.
+    apart_s: f64,
     out: Vec<Effect>,
 }
 
@@ -174,6 +177,7 @@ impl Session {
             clock: at,
             overlaid_since: None,
             away_s: 0.0,
+            apart_s: 0.0,
             out: Vec::new(),
         };
         if config.auto_identify {

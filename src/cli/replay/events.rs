@@ -32,6 +32,7 @@ const OPEN: &[&str] = &[
     "group",
     "interval",
     "lag_ms",
+    "late",
     "ok",
     "operator",
     "participant",
@@ -197,6 +198,16 @@ pub(super) fn words(event: &Event, revealed: bool) -> String {
         Event::Adjusted { to, .. } if revealed => format!("{to} comes next"),
         // A step away, or after the standard the same.
         Event::Adjusted { .. } => "the next level comes, or the same again".to_owned(),
+        Event::StepFailed {
+            failure, detail, ..
+        } => {
+            let detail = match revealed {
+                true => format!(": {}", Untrusted(detail)),
+                false => String::new(),
+            };
+            let why = failure.as_str();
+            format!("the step failed, {why}{detail}; the level before is felt again")
+        }
         Event::Replayed { .. } => "it is felt again before the answer".to_owned(),
         Event::TelemetryLost { reason, .. } => {
             format!(
@@ -224,6 +235,12 @@ pub(super) fn words(event: &Event, revealed: bool) -> String {
             let paused = paused_s.map_or(String::new(), |s| format!(", after pauses of {s:.1} s"));
             format!("answered in {response_s:.1} s{paused}")
         }
+        Event::FormDelayed { paused_s, late, .. } => {
+            let how_long =
+                paused_s.map_or("of unknown length".to_owned(), |s| format!("of {s:.1} s"));
+            let late = if *late { ", longer than allowed" } else { "" };
+            format!("the questionnaires are answered after a pause {how_long}{late}")
+        }
         Event::TrialClosed { .. } => "it failed too often and does not come again".to_owned(),
         Event::TrackEnded { track, .. } if revealed => format!("the track {track} has ended"),
         Event::TrackEnded { .. } => "a track has ended".to_owned(),
@@ -236,6 +253,7 @@ pub(super) fn words(event: &Event, revealed: bool) -> String {
             format!("the {} remarks: {}", by.as_str(), Untrusted(text))
         }
         Event::InstructionsRead => "the instructions were read".to_owned(),
+        Event::Debriefed => "what the study was about was shown".to_owned(),
         Event::Paused => "a pause begins".to_owned(),
         Event::Unpaused { paused_s } => format!("the pause ends after {paused_s:.1} s"),
         Event::BreakStarted { .. } => "a break begins".to_owned(),

@@ -83,6 +83,8 @@ fn trial_of(event: &Event) -> Option<u32> {
         | Event::TelemetryLost { trial, .. }
         | Event::AttemptFailed { trial, .. }
         | Event::TrialDone { trial, .. }
+        | Event::FormDelayed { trial, .. }
+        | Event::StepFailed { trial, .. }
         | Event::TrialClosed { trial, .. }
         | Event::Adjusted { trial, .. } => Some(*trial),
         Event::Remark { trial, .. } => *trial,

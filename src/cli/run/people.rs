@@ -6,6 +6,7 @@ use std::ops::RangeInclusive;
 use study_base::sort::SmallSort as _;
 use study_plan::protocol::Protocol;
 use study_session::outcome::fold::History;
+use study_session::page::ago;
 use study_session::session::Roster;
 use study_session::session::roster::Newcomer;
 use study_session::store::{Plan, SeatKind, SessionData, next_row, next_session, participants};
@@ -94,6 +95,16 @@ fn is_recent(last: DateTime<FixedOffset>, now: DateTime<FixedOffset>, within_h: 
     let gap_h = (now - last).as_seconds_f64() / 3600.0;
     let day = last.with_timezone(now.offset()).date_naive();
     gap_h <= within_h || day == now.date_naive()
+}
+
+/// When an unfinished session was left, such as "at 14:05, 20 minutes ago".
+pub(super) fn left(history: &History, now: DateTime<FixedOffset>) -> String {
+    let Some(last) = history.last_activity else {
+        return "some time ago".to_owned();
+    };
+    let last = last.wall.with_timezone(now.offset());
+    let gap_h = (now - last).as_seconds_f64() / 3600.0;
+    format!("at {}, {} ago", last.format("%H:%M"), ago(gap_h))
 }
 
 /// Where an unfinished session goes on, such as "with trial 12 of 40".
@@ -251,6 +262,25 @@ mod tests {
             let found = first(&sessions, rows(), now, "");
             assert_eq!(found.is_some(), goes_on, "{now}");
         }
+    }
+
+    #[test]
+    fn it_is_said_when_a_session_was_left() {
+        let sessions = unfinished();
+        let of = |now: &str| left(&sessions[1].history, time(now));
+        for (now, words) in [
+            ("2026-03-02T10:20:00+01:00", "at 10:00, 20 minutes ago"),
+            // In the time of the rig.
+            ("2026-03-02T12:00:00+02:00", "at 11:00, 1 hour ago"),
+            // The clock was set back.
+            ("2026-03-02T09:00:00+01:00", "at 10:00, some time ago"),
+        ] {
+            assert_eq!(of(now), words);
+        }
+        assert_eq!(
+            left(&History::default(), time("2026-03-02T12:00:00+02:00")),
+            "some time ago"
+        );
     }
 
     #[test]

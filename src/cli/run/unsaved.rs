@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use study_session::outcome::{Event, Moment};
 use study_session::session::Unsaved;
 use study_session::store::disk::{Disk as _, RealDisk};
-use study_session::store::plain;
+use study_session::store::{layout, plain};
 
 /// Why no place took the file.
 #[derive(Debug, thiserror::Error)]
@@ -59,11 +59,21 @@ pub(super) fn places() -> Vec<Place> {
     all.filter(|place| place.folder.is_absolute()).collect()
 }
 
-/// Where a copy of the events is.
+/// Where a copy is.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Kept {
     path: PathBuf,
     volatile: bool,
+}
+
+impl Kept {
+    fn words(&self) -> String {
+        let lost = match self.volatile {
+            true => " (in memory: copy it before the computer is turned off)",
+            false => "",
+        };
+        format!("{}{lost}", self.path.display())
+    }
 }
 
 /// Writes the events to a new file in the first of `places` that takes it, and returns
@@ -75,9 +85,28 @@ pub(super) fn keep(
     places: &[Place],
 ) -> Result<Kept, NoPlace> {
     let text = content(unsaved, participant, results);
+    let name = name(unsaved, participant, results);
+    take(places, (&name, "jsonl"), &text)
+}
+
+/// The same of the participant's copy of the consent document, in a file of its own: what was typed as a signature is in
+/// none with answers. `None` if it is on disk, or there is none.
+pub(super) fn keep_copy(
+    unsaved: &Unsaved,
+    participant: &str,
+    results: &Path,
+    places: &[Place],
+) -> Option<Result<Kept, NoPlace>> {
+    let copy = unsaved.copy.as_ref()?;
+    let name = format!("{}-consent", name(unsaved, participant, results));
+    Some(take(places, (&name, "txt"), copy))
+}
+
+/// Writes a text to a new file in the first of the places that takes it.
+fn take(places: &[Place], (name, extension): (&str, &str), text: &str) -> Result<Kept, NoPlace> {
     let mut refusals = Vec::new();
     for Place { folder, volatile } in places {
-        match write(folder, &name(unsaved, participant, results), &text) {
+        match write(folder, (name, extension), text) {
             Ok(path) => {
                 return Ok(Kept {
                     path,
@@ -114,14 +143,14 @@ fn content(unsaved: &Unsaved, participant: &str, results: &Path) -> String {
     all.flatten().map(|line| line + "\n").collect()
 }
 
-fn write(folder: &Path, name: &str, text: &str) -> std::io::Result<PathBuf> {
+fn write(folder: &Path, (name, extension): (&str, &str), text: &str) -> std::io::Result<PathBuf> {
     let disk = RealDisk;
     for number in 1.. {
         let suffix = match number {
             1 => String::new(),
             n => format!("-{n}"),
         };
-        let path = folder.join(format!("{name}{suffix}.jsonl"));
+        let path = folder.join(format!("{name}{suffix}.{extension}"));
         let mut file = match disk.create(&path) {
             Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => continue,
             created => created?,
@@ -138,6 +167,7 @@ fn write(folder: &Path, name: &str, text: &str) -> std::io::Result<PathBuf> {
 pub(super) fn failure(
     unsaved: &Unsaved,
     kept: &Result<Kept, NoPlace>,
+    copy: Option<&Result<Kept, NoPlace>>,
     folder: &Path,
     resume: &str,
 ) -> Failure {
@@ -152,16 +182,24 @@ pub(super) fn failure(
     );
     let next = "repair the disk, then resume the session and enter what is asked again";
     let hint = match kept {
-        Ok(Kept { path, volatile }) => {
-            let lost = match volatile {
-                true => " (in memory: copy it before the computer is turned off)",
-                false => "",
-            };
-            let path = path.display();
-            format!("a copy of what is not saved is in {path}{lost}; {next}: {resume}")
-        }
+        Ok(kept) => format!(
+            "a copy of what is not saved is in {}; {next}: {resume}",
+            kept.words()
+        ),
         Err(refusals) => format!(
             "no copy could be written ({refusals}): write down the lines above; {next}: {resume}"
+        ),
+    };
+    let hint = match copy {
+        None => hint,
+        Some(Ok(kept)) => format!(
+            "{hint}; the participant's copy of the consent document is in {}: keep it apart from the answers, and delete it \
+             once the folder of the session has its {}",
+            kept.words(),
+            layout::CONSENT
+        ),
+        Some(Err(refusals)) => format!(
+            "{hint}; the participant's copy of the consent document is lost ({refusals}): consent is asked again"
         ),
     };
     Failure::results(message).hint(hint)
@@ -179,6 +217,7 @@ mod tests {
             why: Some("no".to_owned()),
             what: vec!["remark: é\u{1b}".to_owned()],
             events: vec![(at, Event::InstructionsRead), (at, Event::Paused)],
+            copy: None,
         }
     }
 
@@ -208,7 +247,7 @@ mod tests {
             words.starts_with(&none.folder.display().to_string()),
             "{words}"
         );
-        let failure = failure(&unsaved(), &refused, results, "study run x");
+        let failure = failure(&unsaved(), &refused, None, results, "study run x");
         assert_eq!(failure.exit_code(), 4);
         let hint = failure.hint.unwrap();
         assert!(hint.contains("no copy could be written"), "{hint}");
@@ -229,7 +268,7 @@ mod tests {
                 Place::new(home.path().to_owned(), volatile),
             ];
             let kept = keep(&unsaved(), "P01", results, &places);
-            let hint = failure(&unsaved(), &kept, results, "study run x")
+            let hint = failure(&unsaved(), &kept, None, results, "study run x")
                 .hint
                 .unwrap();
             assert!(hint.contains("study-unsaved-x-P01-"), "{hint}");
@@ -241,14 +280,58 @@ mod tests {
         }
     }
 
+    /// What was typed as a signature is in no file with answers, and is not printed.
+    #[test]
+    fn the_copy_of_the_consent_document_is_kept_apart_or_said_to_be_lost() {
+        let home = tempfile::tempdir().unwrap();
+        let results = Path::new("results/x");
+        let signed = Unsaved {
+            copy: Some("Information\n\nQXJ\n".to_owned()),
+            ..unsaved()
+        };
+        assert!(keep_copy(&unsaved(), "P01", results, &places()).is_none());
+        let some = [Place::new(home.path().to_owned(), false)];
+        let none = [Place::new(home.path().join("none"), false)];
+        let kept = keep(&signed, "P01", results, &some);
+        let copy = keep_copy(&signed, "P01", results, &some).unwrap();
+        let path = |kept: &Result<Kept, NoPlace>| kept.as_ref().unwrap().path.clone();
+        let read = |path: PathBuf| std::fs::read_to_string(path).unwrap();
+        assert_eq!(read(path(&copy)), "Information\n\nQXJ\n");
+        assert!(!read(path(&kept)).contains("QXJ"));
+        let said = |copy: &Result<Kept, NoPlace>| {
+            let failure = failure(&signed, &kept, Some(copy), results, "study run x");
+            let hint = failure.hint.unwrap();
+            assert!(!format!("{} {hint}", failure.message).contains("QXJ"));
+            hint
+        };
+        let hint = said(&copy);
+        let name = path(&copy).display().to_string();
+        assert!(
+            name.ends_with("-consent.txt") && hint.contains(&name),
+            "{hint}"
+        );
+        let lost = keep_copy(&signed, "P01", results, &none).unwrap();
+        let hint = said(&lost);
+        assert!(hint.contains("consent document is lost"), "{hint}");
+        assert!(hint.contains("consent is asked again"), "{hint}");
+    }
+
     #[cfg(unix)]
     #[test]
     fn only_the_owner_can_read_the_copy() {
         use std::os::unix::fs::PermissionsExt as _;
         let home = tempfile::tempdir().unwrap();
         let places = [Place::new(home.path().to_owned(), false)];
-        let kept = keep(&unsaved(), "P01", Path::new("results/x"), &places).unwrap();
-        let mode = std::fs::metadata(kept.path).unwrap().permissions().mode();
-        assert_eq!(mode & 0o777, 0o600);
+        let signed = Unsaved {
+            copy: Some("QXJ".to_owned()),
+            ..unsaved()
+        };
+        let results = Path::new("results/x");
+        let kept = keep(&signed, "P01", results, &places).unwrap();
+        let copy = keep_copy(&signed, "P01", results, &places).unwrap();
+        for path in [kept.path, copy.unwrap().path] {
+            let mode = std::fs::metadata(path).unwrap().permissions().mode();
+            assert_eq!(mode & 0o777, 0o600);
+        }
     }
 }

@@ -29,7 +29,7 @@ pub struct WhoView<'a> {
 const WIDE: u16 = 56;
 /// Rows of the title and the two boxed fields with their lines.
 const ROWS: u16 = 10;
-/// Rows below the title that say who is proposed and why.
+/// Rows below the title that say who has not finished and how to go on.
 const PROPOSAL: u16 = 2;
 
 impl WhoView<'_> {
@@ -105,7 +105,7 @@ impl Widget for &WhoView<'_> {
         };
         let title = styled(title, self.theme.strong());
         center(buf, row(place, 0), &title);
-        if let Some((_, sentences)) = self.roster.and_then(Roster::unfinished)
+        if let Some(sentences) = self.roster.and_then(Roster::unfinished)
             && self.who.participant.is_blank()
         {
             // A long id may need more than the width of the fields.

@@ -316,10 +316,15 @@ fn hand_to_the_end(rig: &mut Rig) {
     assert_eq!(rig.ending, Some(Ending::Finished));
 }
 
-/// A session with a fault while a level plays, a stop, and a trial that is marked as bad.
+/// A session with a fault while a level is loaded and one while it plays, a stop, and a trial that is marked as bad.
 fn eventful(protocol: &Protocol) -> Rig {
     let mut rig = Rig::new(protocol.clone());
     while changes(&rig) < 4 {
+        hand(&mut rig);
+    }
+    rig.send(Input::DeviceFault("no bus".to_owned()));
+    assert_eq!(rig.count(|e| matches!(e, Event::StepFailed { .. })), 1);
+    while changes(&rig) < 7 || !matches!(rig.view().screen, Screen::Playing { .. }) {
         hand(&mut rig);
     }
     rig.send(Input::DeviceFault("no bus".to_owned()));

@@ -1,6 +1,6 @@
 //! Consent with its text, and initials in place of a signature.
 
-use super::rig::Rig;
+use super::rig::{Rig, StoreMood};
 use super::studies::rich;
 use study_plan::protocol::{Answer, Protocol};
 use study_session::outcome::{Event, FormId};
@@ -32,7 +32,7 @@ fn types(rig: &mut Rig, answer: Answer) {
         .send(Input::Answer(vec![(questions[0].id.clone(), answer)]));
 }
 
-fn copies(rig: &Rig) -> Vec<String> {
+pub(super) fn copies(rig: &Rig) -> Vec<String> {
     let copy = |effect: &Effect| match effect {
         Effect::KeepConsent(copy) => Some(copy.clone()),
         _ => None,
@@ -40,7 +40,7 @@ fn copies(rig: &Rig) -> Vec<String> {
     rig.effects.iter().filter_map(copy).collect()
 }
 
-fn decided(rig: &Rig) -> usize {
+pub(super) fn decided(rig: &Rig) -> usize {
     rig.count(|e| matches!(e, Event::Consented { .. }))
 }
 
@@ -131,4 +131,33 @@ fn a_text_without_initials_leaves_a_copy_and_no_text_leaves_none() {
     let mut rig = Rig::new(rich());
     rig.finish();
     assert!(copies(&rig).is_empty());
+}
+
+/// A copy that cannot be written is kept until it is, and the page names it; nothing shows what was typed.
+#[test]
+fn a_copy_that_is_not_on_disk_is_kept_and_named() {
+    let mut rig = Rig::new(signed());
+    rig.until("Consent").wait(1.0).send(Input::Consent(true));
+    assert!(rig.session.unsaved().is_none());
+    rig.store = StoreMood::Broken;
+    types(&mut rig, Answer::Text("QXJ".to_owned()));
+    let view = rig.view();
+    assert!(matches!(view.screen, Screen::SaveTrouble { .. }));
+    let name = "the participant's copy of the consent".to_owned();
+    assert!(view.unsaved.contains(&name), "{:?}", view.unsaved);
+    assert!(!format!("{view:?}").contains("QXJ"));
+    let unsaved = rig.session.unsaved().unwrap();
+    assert!(unsaved.copy.unwrap().ends_with("\nQXJ\n"));
+    assert!(unsaved.what.contains(&name));
+    assert!(!format!("{:?}", unsaved.events).contains("QXJ"));
+    rig.store = StoreMood::Prompt;
+    rig.send(Input::RetrySave);
+    assert!(rig.session.unsaved().is_none());
+    // What is not saved later does not concern it.
+    rig.until("Form");
+    rig.store = StoreMood::Broken;
+    rig.answer_page();
+    assert_eq!(rig.session.unsaved().unwrap().copy, None);
+    rig.finish();
+    rig.assert_whole();
 }

@@ -329,10 +329,8 @@ table! {
             ("fault", "the force was not that of the table, and the attempt failed"),
         ], "whether the force was that of the table; of several playbacks the worst")
             .empty("no playback ended, or it was not judged").optional(),
-        RenderedVaf: number(
-            "rendered_vaf",
-            "share of the variance of the table's force for the reported motion that the device commanded",
-        ).empty("not known, or the force did not vary").optional(),
+        RenderedVaf: number("rendered_vaf", "share of the variance of the table's force for the reported motion that the device commanded")
+            .empty("not known, or the force did not vary").optional(),
         DeliveredVaf: number("delivered_vaf", "VAF of what was delivered: of the table's force on the validation recording, with the gain and the delay of the playback")
             .empty("not judged, or there is no validation recording with the protocol").optional(),
         RenderedGain: number("rendered_gain", "slope of the commanded on the table's force")
@@ -343,10 +341,8 @@ table! {
             .unit("ms").empty("not known, or the two hardly correlate").optional(),
         RenderedErrorN: number("rendered_error_n", "largest difference of commanded and table's force that lasted 20 ms")
             .unit("N").empty("not known").optional(),
-        HostLateMs: number(
-            "host_late_ms",
-            "how late this computer's thread for the device was at most during the playback",
-        ).unit("ms").empty("not measured").optional(),
+        HostLateMs: number("host_late_ms", "how late this computer's thread for the device was at most during the playback")
+            .unit("ms").empty("not measured").optional(),
         InputChannel: INPUT_CHANNEL.empty("not answered, or not by a person"),
         FrontName: text("front_name", "program of `--front` that asked the participant, as it says")
             .empty("none: the program's own screen").optional().typed(Typed::Once),
@@ -366,6 +362,10 @@ table! {
             .unit("s").empty("there was none, or its length is not known").optional(),
         AnswerBeforeFeedback: text("answer_before_feedback", "answer of an identification before the right label was told, which is the one that is analyzed")
             .empty("the answer was not corrected after that").optional().with_parts(),
+        QuestionnairePausedS: number("questionnaire_paused_s", "pauses between the answer to the trial and those to the questionnaires after it")
+            .unit("s").empty("less than 1 s, of unknown length, or none was asked").optional(),
+        QuestionnaireLate: flag("questionnaire_late", "whether these pauses were longer than the protocol allows between feeling and answering (`longest_pause_s`): the questionnaires were answered from memory")
+            .empty("they were not, or none was asked").optional(),
     }
 }
 

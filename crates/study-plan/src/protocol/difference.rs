@@ -191,7 +191,7 @@ fn shortened(text: &str) -> String {
 mod tests {
     use super::*;
     use crate::protocol::fingerprint::parts;
-    use crate::protocol::{Consent, Order, Protocol, example};
+    use crate::protocol::{Consent, Debriefing, Order, Protocol, example};
     use std::collections::BTreeMap;
 
     fn changed(change: impl FnOnce(&mut Protocol)) -> Vec<String> {
@@ -291,5 +291,37 @@ mod tests {
         assert_eq!(found.len(), 1);
         assert!(!found[0].fixed);
         assert_eq!(found[0].key, "consent.text");
+    }
+
+    /// Nor does it matter whether the text is in the protocol or in a file.
+    #[test]
+    fn of_a_debriefing_the_text_counts_and_not_its_place() {
+        let shown = |file: Option<&str>, text: &str| {
+            let mut protocol = example::protocol(3, 2);
+            protocol.debriefing = Some(Debriefing {
+                file: file.map(str::to_owned),
+                text: Some(text.to_owned()),
+            });
+            parts(&protocol, &BTreeMap::new(), None)
+        };
+        let here = shown(None, "It was about friction.");
+        let moved = shown(Some("end.txt"), "It was about friction.");
+        assert!(changes(&here, &moved).is_empty());
+        let found = changes(&here, &shown(None, "It was about detents."));
+        assert_eq!(found.len(), 1);
+        assert!(!found[0].fixed);
+        assert_eq!(found[0].key, "debriefing.text");
+    }
+
+    #[test]
+    fn the_text_of_the_file_is_below_that_of_the_protocol() {
+        let mut own = Debriefing {
+            file: Some("end.txt".to_owned()),
+            text: None,
+        };
+        own.add("From the file.");
+        assert_eq!(own.text.as_deref(), Some("From the file."));
+        own.add("And more.");
+        assert_eq!(own.text.as_deref(), Some("From the file.\n\nAnd more."));
     }
 }

@@ -62,6 +62,9 @@ pub const ROOT: &[Key] = keys! {
     "text": Kind::Table(general::TEXT), "";
     /// The document that the participant agrees to before the session.
     "consent": Kind::Table(general::CONSENT), "";
+    /// What the participant reads at the end of each session, after all questions: what the study was about. The journal has
+    /// that it was shown. Needs the format `study-protocol/3`.
+    "debriefing": Kind::Table(general::DEBRIEFING), "";
     /// The search whose result this study confirms, on people who did not take part in it. `study new --from RESULTS
     /// --confirm` writes it. Needs the format `study-protocol/3`.
     "confirms": Kind::Table(confirms::CONFIRMS), "";
@@ -134,10 +137,11 @@ const FORMATS: &[Word] = &[
 const OF_FORMAT_2: [&str; 5] = ["parts", "families", "tracks", "groups", "sessions"];
 
 /// Keys that need [`FORMAT_3`], without the places in lists.
-pub const OF_FORMAT_3: [&str; 20] = [
+pub const OF_FORMAT_3: [&str; 21] = [
     "confirms",
     "consent.text",
     "consent.initials",
+    "debriefing",
     "design.order_version",
     "factors",
     "outcomes",
@@ -184,6 +188,15 @@ pub struct Named {
     pub content: Content,
 }
 
+/// A text of a file that participants read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Prose {
+    /// The consent document.
+    Consent,
+    /// What the study was about.
+    Debriefing,
+}
+
 /// What a file of a protocol contains.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Content {
@@ -191,8 +204,8 @@ pub enum Content {
     Model,
     /// Orders.
     Orders,
-    /// The text of the consent document.
-    Text,
+    /// A text that participants read.
+    Text(Prose),
     /// A bundle with a realization; with the SHA-256 that it has to have, if the protocol says it.
     Bundle(Option<String>),
 }
@@ -335,6 +348,7 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
     let study = root.section("study").and_then(general::study);
     let text = root.section("text").map(general::text);
     let consent = root.section("consent").and_then(general::consent);
+    let debriefing = root.section("debriefing").and_then(general::debriefing);
     let confirms = root.section("confirms").and_then(confirms::read);
     let raw = resolve::Raw {
         parts: parts::read(&mut root),
@@ -406,11 +420,24 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
     if outcomes::primary_of_part(&sections).is_none() {
         outcomes.extend(questionnaires.iter().filter_map(|q| q.outcome()));
     }
-    let document_text = consent.as_ref().and_then(|consent| consent.file.clone());
-    named.extend(document_text.map(|file| Named {
-        place: "consent.text".to_owned(),
-        file,
-        content: Content::Text,
+    let texts = [
+        (
+            "consent.text",
+            consent.as_ref().and_then(|own| own.file.clone()),
+            Prose::Consent,
+        ),
+        (
+            "debriefing.file",
+            debriefing.as_ref().and_then(|own| own.file.clone()),
+            Prose::Debriefing,
+        ),
+    ];
+    named.extend(texts.into_iter().filter_map(|(place, file, prose)| {
+        Some(Named {
+            place: place.to_owned(),
+            file: file?,
+            content: Content::Text(prose),
+        })
     }));
     if !broken {
         sections.agree(document);
@@ -446,6 +473,7 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
         study: study?,
         text: text?,
         consent,
+        debriefing,
         confirms,
         session: session?,
         trial: trial?,

@@ -15,7 +15,7 @@
 //!   scale and `required` of the questions after a trial and of the questionnaires between trials; the orders file; parts
 //!   without their texts, tracks, groups, repeated sessions, and families and spaces with the SHA-256 of their
 //!   files; of spaces also which points are certified; the search that is confirmed.
-//! * wording: title, authors and the like; all texts, prompts and labels; consent;
+//! * wording: title, authors and the like; all texts, prompts and labels; consent; debriefing;
 //!   questions asked once (setup, intake, outro); who types, and when a session
 //!   can be resumed.
 //! * analysis: `[analysis]`, `[[outcomes]]`, planned participants, VAF and covariates, `[device.rendering]`.
@@ -85,6 +85,7 @@ pub fn parts(
         study,
         text,
         consent,
+        debriefing,
         confirms,
         design,
         session,
@@ -223,6 +224,10 @@ pub fn parts(
         "intake": intake,
         "outro": outro,
     });
+    // Absent from the fingerprints of protocols without it.
+    if debriefing.is_some() {
+        wording["debriefing"] = json!(debriefing);
+    }
     if !parts.is_empty() {
         wording["parts"] = parts.iter().map(texts).collect();
     }

@@ -212,6 +212,7 @@ phrases! {
     FormSetup "form-setup" "set-up";
     FormIntake "form-intake" "intake";
     FormOutro "form-outro" "closing questions";
+    Debriefing "debriefing" "About this study";
     Remark "remark" "remark";
 }
 

@@ -312,6 +312,8 @@ row! {
         PausedS: paused_s,
         FeltAgainAfterS: felt_again_after_s,
         AnswerBeforeFeedback: answer_before_feedback,
+        QuestionnairePausedS: questionnaire_paused_s,
+        QuestionnaireLate: questionnaire_late,
         ..fidelity {
             Rendering: verdict,
             RenderedVaf: rendered_vaf,

@@ -422,6 +422,15 @@ pub enum Event {
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         standard: bool,
     },
+    /// What came next in a trial of adjustment could not be presented, or was not what it should be: the level before is felt
+    /// again on request, and nothing that was set so far is lost. Since `study-protocol/3`.
+    StepFailed {
+        trial: u32,
+        attempt: u32,
+        failure: Failure,
+        /// The device's message or the reason.
+        detail: String,
+    },
     /// All intervals of the attempt are felt again before it is answered.
     Replayed { trial: u32, attempt: u32 },
     /// The telemetry of the attempt could not be saved, or only in part.
@@ -462,6 +471,18 @@ pub enum Event {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         paused_s: Option<f64>,
     },
+    /// The questionnaires between the trials that follow this attempt are answered after a pause: the event before these
+    /// answers, with the pauses since the answers before. Since `study-protocol/3`.
+    FormDelayed {
+        trial: u32,
+        attempt: u32,
+        /// How long, s; `None` if nobody knows, because the clock went back.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        paused_s: Option<f64>,
+        /// Whether all pauses since the trial was answered are longer than the protocol allows between feeling and answering.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        late: bool,
+    },
     /// The trial was closed after `max_attempts` failures.
     TrialClosed {
         trial: u32,
@@ -493,6 +514,8 @@ pub enum Event {
     },
     /// The instructions were read.
     InstructionsRead,
+    /// What the study was about was shown, and left. Since `study-protocol/3`.
+    Debriefed,
     /// A pause began.
     Paused,
     /// The pause ended.

@@ -27,7 +27,7 @@ mod trial;
 
 pub use attempt_log::attempt_rows;
 pub use interval_log::interval_rows;
-pub use trial::{Attempt, AttemptStart, Completion, Ended, Presentation, Sitting};
+pub use trial::{Attempt, AttemptStart, Completion, Ended, FormDelay, Presentation, Sitting};
 
 use super::event::{Channel, Choice, Entry, Event, Failure, FormId, Moment, Start, State};
 use search::Failing;
@@ -54,6 +54,8 @@ pub struct History {
     pub answers: Vec<GivenAnswer>,
     /// Whether the instructions were read.
     pub instructions_read: bool,
+    /// Whether what the study was about was shown.
+    pub debriefed: bool,
     trials: BTreeMap<u32, TrialHistory>,
     /// The trial whose last attempt is under way.
     open: Option<u32>,
@@ -276,6 +278,16 @@ impl History {
                     attempt.adjusted(to, *standard);
                 }
             }
+            Event::StepFailed {
+                trial,
+                attempt,
+                failure,
+                ..
+            } => {
+                if let Some(attempt) = self.attempt_mut(*trial, *attempt) {
+                    attempt.step_failed(*failure);
+                }
+            }
             Event::Replayed { trial, attempt } => {
                 if let Some(attempt) = self.attempt_mut(*trial, *attempt) {
                     attempt.replays += 1;
@@ -312,6 +324,15 @@ impl History {
                 response_s,
                 paused_s,
             } => self.done(*trial, *attempt, (*response_s, *paused_s), at),
+            Event::FormDelayed {
+                trial,
+                attempt,
+                paused_s,
+                late,
+            } => {
+                let (paused_s, late) = (*paused_s, *late);
+                self.delayed((*trial, *attempt), FormDelay { paused_s, late });
+            }
             Event::TrialClosed { trial, .. } => {
                 self.trials.entry(*trial).or_default().given_up = true;
                 self.queue.retain(|t| t != trial);
@@ -325,6 +346,7 @@ impl History {
                 trial.remarks.push(text.clone());
             }
             Event::InstructionsRead => self.instructions_read = true,
+            Event::Debriefed => self.debriefed = true,
             Event::BreakStarted { after } => {
                 self.breaks.insert(*after);
                 self.open_break = Some(at);
@@ -423,6 +445,15 @@ impl History {
         }
         let attempts = &mut self.trials.get_mut(&trial)?.attempts;
         attempts.iter_mut().rfind(|a| a.number == attempt)
+    }
+
+    /// Adds a pause before the questionnaires after an attempt. One whose line is damaged is not begun by it.
+    fn delayed(&mut self, (trial, attempt): (u32, u32), pause: FormDelay) {
+        let attempts = self.trials.get_mut(&trial).map(|t| &mut t.attempts);
+        let own = attempts.and_then(|all| all.iter_mut().rfind(|a| a.number == attempt));
+        if let Some(own) = own {
+            own.delay = Some(own.delay.map_or(pause, |delay| delay.and(pause)));
+        }
     }
 
     fn open_mut(&mut self) -> Option<&mut Attempt> {

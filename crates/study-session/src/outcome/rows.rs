@@ -85,6 +85,8 @@ pub struct RatingRow {
     pub paused_s: Option<f64>,
     pub felt_again_after_s: Option<f64>,
     pub answer_before_feedback: Option<Answer>,
+    pub questionnaire_paused_s: Option<f64>,
+    pub questionnaire_late: Option<bool>,
 }
 
 impl RatingRow {
@@ -148,6 +150,8 @@ impl RatingRow {
             paused_s: None,
             felt_again_after_s: None,
             answer_before_feedback: None,
+            questionnaire_paused_s: None,
+            questionnaire_late: None,
         }
     }
 }
@@ -202,7 +206,7 @@ impl AttemptEvent {
             Event::AttemptStarted { .. } => Self::Attempt,
             Event::Answered { .. } => Self::Answer,
             Event::Corrected { .. } | Event::IdCorrected { .. } => Self::Correction,
-            Event::AttemptFailed { .. } => Self::Failure,
+            Event::AttemptFailed { .. } | Event::StepFailed { .. } => Self::Failure,
             Event::TrialClosed { .. } => Self::Closed,
             Event::Remark { .. } => Self::Remark,
             Event::Reopened { .. } => Self::Resume,

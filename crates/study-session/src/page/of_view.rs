@@ -52,6 +52,10 @@ pub fn page(view: &View) -> Page {
                     page.instruction = read_by_experimenter(view, "Read out");
                 }
                 MessageKind::Practice => page.title = words.get(Phrase::Practice).to_owned(),
+                MessageKind::Debriefing => {
+                    page.instruction = read_by_experimenter(view, "Read out");
+                    page.title = words.get(Phrase::Debriefing).to_owned();
+                }
                 MessageKind::PracticeOver | MessageKind::Feedback => {}
             }
             page.text.clone_from(text);
@@ -488,7 +492,13 @@ fn read_by_experimenter(view: &View, what: &'static str) -> Option<&'static str>
     (view.entry == Entry::Experimenter).then_some(what)
 }
 
-fn ago(gap_h: f64) -> String {
+/// A time in h in words, such as "20 minutes"; "some time" if it is negative or not finite.
+///
+/// ```
+/// # use study_session::page::ago;
+/// assert_eq!((ago(1.0 / 3.0), ago(-1.0)), ("20 minutes".into(), "some time".into()));
+/// ```
+pub fn ago(gap_h: f64) -> String {
     if !gap_h.is_finite() || gap_h < 0.0 {
         return "some time".to_owned();
     }

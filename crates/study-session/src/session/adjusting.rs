@@ -3,12 +3,15 @@
 //! A device plays one table. A change is therefore a stop, a load and a start. The force falls before the stop, on a device that
 //! can do so, and comes up again with the device's own ramp, so that nobody feels a step. What comes next is in the journal before
 //! the stop is requested.
+//!
+//! A device takes no table before the handle is at rest, and a playback may have a wrong force. Where it is known what was felt,
+//! that fails the step and not the setting.
 
 use super::Session;
 use super::phase::{Confirmed, Phase};
 use super::view::Adjusting;
 use crate::outcome::fold::Attempt;
-use crate::outcome::{Event, FormId, Moment};
+use crate::outcome::{Event, Failure, FormId, Moment};
 use study_base::text::{ModelId, QuestionId};
 use study_plan::protocol::{Adjustment, Answer, Trial, Turn};
 
@@ -117,14 +120,44 @@ impl Session {
     pub(super) fn can_settle(&self, attempt: &Attempt) -> bool {
         let last = attempt.presentations.last();
         attempt.ended.is_some()
+            && attempt.is_right()
             && !attempt.is_at_standard()
             && last.is_some_and(|last| self.suffices(last))
+    }
+
+    /// A step of the adjustment under way failed: what comes next was not presented, or what was felt last was not what it
+    /// should be. What was set so far stays, and the level before is felt again on request. Not if it is unknown what was
+    /// felt, or whether it has stopped, as once its start was requested, nor before the first level was felt, nor if the device
+    /// failed at the same level `max_attempts` times: the attempt then fails. Returns whether it goes on.
+    pub(super) fn step_failed(&mut self, failure: Failure, detail: &str, at: Moment) -> bool {
+        let Some(open) = self.history.open().filter(|_| self.adjusting().is_some()) else {
+            return false;
+        };
+        let (trial, attempt) = (open.trial.trial, open.attempt.number);
+        let most = self
+            .protocol
+            .design_of(open.trial.part.as_ref())
+            .max_attempts;
+        let again = !failure.counts() || open.attempt.repeated_steps(failure) + 1 < most;
+        let unknown = matches!(self.phase, Phase::Ready { .. });
+        if unknown || !again || !open.attempt.goes_on() {
+            return false;
+        }
+        let failed = Event::StepFailed {
+            trial,
+            attempt,
+            failure,
+            detail: detail.to_owned(),
+        };
+        self.record(failed, at);
+        self.phase = Phase::Stopped { since: at };
+        true
     }
 
     /// After a stop: feels the level, or the standard, again. Not if a change was under way, or if it is unknown whether what
     /// was felt has stopped; the trial then begins again.
     pub(super) fn feel_level_again(&mut self, at: Moment) -> bool {
-        let Some(open) = self.history.open().filter(|_| !self.device_lost) else {
+        let Some(open) = self.history.open() else {
             return false;
         };
         let attempt = open.attempt;
@@ -136,6 +169,11 @@ impl Session {
         let Some(last) = attempt.models.last().cloned() else {
             return false;
         };
+        if self.device_lost {
+            // What was set waits for it.
+            self.show_device_lost();
+            return true;
+        }
         self.feel_next(last, standard, at);
         self.load_interval(at);
         true

@@ -5,10 +5,14 @@
 //! After a longer pause than the protocol allows the trial is felt again, and so it is if the pause
 //! came between two of its intervals. Once a question of it is answered it is not: that answer was
 //! in time and must not be lost. The others then go on, and the trial records its pause.
+//!
+//! A questionnaire between the trials is about a condition, a block or a part, which is not felt
+//! again for it. Its answers are kept; the event before them and the row say how long the pause was, and
+//! whether it was too long.
 
 use super::phase::{CLOCK_STEP_S, Phase};
 use super::{Effect, Session};
-use crate::outcome::{Failure, FormId, Moment};
+use crate::outcome::{Event, Failure, FormId, Moment};
 use study_plan::protocol::phrases::Phrase;
 
 /// Least pause that a trial records, s.
@@ -17,6 +21,9 @@ const RECORDED_S: f64 = 1.0;
 impl Session {
     /// Notes a pause after what was felt, s. If it became too long, the trial comes again.
     pub(super) fn was_away(&mut self, seconds: f64, at: Moment) {
+        if self.history.open().is_none() {
+            self.apart_s += seconds.max(0.0);
+        }
         if !self.is_felt() {
             return;
         }
@@ -43,11 +50,28 @@ impl Session {
                 .filter_map(|given| given.answered_at);
             ended.map(|(at, _)| at).chain(answered).last()
         });
-        self.away_s = match last.map(|last| (at.wall - last.wall).as_seconds_f64()) {
-            None => 0.0,
-            Some(s) if s < -CLOCK_STEP_S => f64::INFINITY,
-            Some(s) => s.max(0.0),
+        self.away_s = since(last, at);
+        self.apart_s = since(self.answered_before(), at);
+    }
+
+    /// Records the pauses before an answer to a questionnaire between the trials, with which it is kept and marked.
+    pub(super) fn note_pause(&mut self, form: FormId, at: Moment) {
+        let FormId::After { trial, attempt } = form else {
+            return;
         };
+        if self.apart_s < RECORDED_S {
+            return;
+        }
+        let paused_s = std::mem::take(&mut self.apart_s);
+        let before = self.history.delay(trial, attempt);
+        let before_s = before.map_or(0.0, |delay| delay.paused_s.unwrap_or(f64::INFINITY));
+        let delayed = Event::FormDelayed {
+            trial,
+            attempt,
+            paused_s: Some(paused_s).filter(|s| s.is_finite()),
+            late: before_s + paused_s > self.protocol.session.longest_pause_s,
+        };
+        self.record(delayed, at);
     }
 
     /// Whether the trial under way was felt to its end.
@@ -119,7 +143,8 @@ impl Session {
     pub(super) fn did_not_run(&mut self, seconds: f64, at: Moment) {
         self.stood_still(seconds, at);
         // A pause, or a stopped trial, has this time in its own.
-        if self.in_form() && self.overlaid_since.is_none() {
+        let counts = self.in_form() || self.history.open().is_none();
+        if counts && self.overlaid_since.is_none() {
             self.was_away(seconds, at);
         }
     }
@@ -140,5 +165,14 @@ impl Session {
         if pause {
             self.start_pause(at);
         }
+    }
+}
+
+/// The time since a moment of another process, s, by the wall clock; infinite if that went back.
+fn since(last: Option<Moment>, at: Moment) -> f64 {
+    match last.map(|last| (at.wall - last.wall).as_seconds_f64()) {
+        None => 0.0,
+        Some(s) if s < -CLOCK_STEP_S => f64::INFINITY,
+        Some(s) => s.max(0.0),
     }
 }

@@ -35,6 +35,28 @@ impl Session {
         asked.into_iter().flat_map(|own| &own.questions).collect()
     }
 
+    /// When the last trial was answered, or the last questionnaire after one that goes on.
+    pub(super) fn answered_before(&self) -> Option<Moment> {
+        let given = self.history.answers.iter().rev();
+        let between = |form| matches!(form, FormId::After { .. });
+        let begun = given
+            .filter(|given| between(given.form))
+            .find(|given| given.answered_at.is_some())
+            .filter(|given| self.goes_on(given.form));
+        if let Some(given) = begun {
+            return given.answered_at;
+        }
+        let (_, done) = self.history.completion(self.history.last_done?)?;
+        Some(done.at)
+    }
+
+    /// Whether questions of a form are still to be answered.
+    fn goes_on(&self, form: FormId) -> bool {
+        let questions = self.questions(form);
+        let last = questions.last();
+        last.is_some_and(|last| self.history.answer(form, &last.id).is_none())
+    }
+
     fn form_after(&self, trial: u32) -> Option<FormId> {
         let (attempt, _) = self.history.completion(trial)?;
         Some(FormId::After { trial, attempt })

@@ -85,6 +85,7 @@ impl Session {
         };
         if accepted && (consent.text.is_some() || initials.is_some()) {
             let copy = self.copy_of(&consent, initials, at);
+            self.saves.copy = Some(copy.clone());
             self.out.push(Effect::KeepConsent(copy));
         }
         let consented = Event::Consented {

@@ -44,15 +44,31 @@ impl Session {
         self.set_problem(what, failure);
     }
 
-    /// Fails the attempt under way because of the device.
+    /// Fails the attempt under way because of the device, or its step alone where a level is set.
     pub(super) fn lose_attempt(&mut self, failure: Failure, what: &str, at: Moment) {
-        // Why a force is not played may tell which one it is. A program that presents something
-        // else says what it lacks, such as a player of sounds.
-        let hidden = self.presents_force();
-        let refused = failure == Failure::DeviceFault && self.phase.preparing() && hidden;
+        let shown = self.shown_loss(failure, what);
+        if !self.step_failed(failure, what, at) {
+            self.fail(failure, what, at);
+            self.proceed(at);
+        }
+        self.set_problem(&shown, failure);
+    }
+
+    /// Fails the attempt under way in any case: something may have been felt that is not known.
+    pub(super) fn lose_all(&mut self, failure: Failure, what: &str, at: Moment) {
+        let shown = self.shown_loss(failure, what);
         self.fail(failure, what, at);
         self.proceed(at);
-        self.set_problem(if refused { REFUSED } else { what }, failure);
+        self.set_problem(&shown, failure);
+    }
+
+    /// What is shown of a loss: why a force is not played may tell which one it is. A program that
+    /// presents something else says what it lacks, such as a player of sounds.
+    fn shown_loss(&self, failure: Failure, what: &str) -> String {
+        let hidden = self.presents_force();
+        let refused = failure == Failure::DeviceFault && self.phase.preparing() && hidden;
+        let shown = if refused { REFUSED } else { what };
+        shown.to_owned()
     }
 
     fn set_problem(&mut self, what: &str, failure: Failure) {

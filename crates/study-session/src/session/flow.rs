@@ -17,6 +17,7 @@ pub(super) enum Step {
     Setup,
     Intake,
     Outro,
+    Debriefing,
 }
 
 impl Step {
@@ -27,6 +28,7 @@ impl Step {
             MessageKind::Instructions => Some(Self::Instructions),
             MessageKind::Practice => Some(Self::Practice),
             MessageKind::PracticeOver => Some(Self::PracticeOver),
+            MessageKind::Debriefing => Some(Self::Debriefing),
             MessageKind::Part | MessageKind::Feedback => None,
         }
     }
@@ -135,8 +137,19 @@ impl Session {
         (due && more && !self.history.breaks.contains(&closed)).then_some(closed)
     }
 
+    /// Enters the closing questions or, after them, what the study was about; returns whether there was one of them.
     fn after_trials(&mut self, at: Moment) -> bool {
-        self.open_form(FormId::Outro, at)
+        if self.open_form(FormId::Outro, at) {
+            return true;
+        }
+        if self.protocol.debriefing.is_none() || self.history.debriefed {
+            return false;
+        }
+        if self.show_message(MessageKind::Debriefing) {
+            return true;
+        }
+        self.record(Event::Debriefed, at);
+        false
     }
 
     fn has_practice(&self) -> bool {
@@ -176,6 +189,7 @@ impl Session {
             MessageKind::PracticeOver => self
                 .has_practice()
                 .then(|| self.words.get(Phrase::PracticeEnd)),
+            MessageKind::Debriefing => self.protocol.debriefing.as_ref()?.text.as_deref(),
         }
     }
 

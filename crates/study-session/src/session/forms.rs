@@ -143,6 +143,12 @@ impl Session {
                 if form == FormId::Consent {
                     return self.sign(&answers, at);
                 }
+                let stays = |(question, answer): &(QuestionId, Answer)| {
+                    self.history.answer(form, question) == Some(answer)
+                };
+                if !answers.iter().all(stays) {
+                    self.note_pause(form, at);
+                }
                 for (question, answer) in answers {
                     self.enter(form, question, answer, at);
                 }
@@ -247,6 +253,7 @@ impl Session {
                 paused_s: self.paused_s(),
             };
             self.record(done, at);
+            self.apart_s = 0.0;
             self.feedback = self.told(trial);
         }
         self.phase = Phase::Saving;

@@ -10,18 +10,20 @@
 //! between two texts at which the program ended, the rating after a stop until it is answered, the
 //! request to mount a sample, a fault of device or disk between trials.
 
+mod looks;
+
 use super::forms::step_of;
 use super::phase::Phase;
-use super::project_view::can_advance;
 use super::saving::SaveState;
 use super::trial::PLAYED_AGAIN;
 use super::view::MessageKind;
 use super::{ClaimFacts, Config, Effect, Ending, Screen, Session, View};
 use crate::outcome::fold::History;
 use crate::outcome::{Entry, Event, Failure, FormId, Moment, STEP_BACK, Start, Verdict};
+use looks::{is_same, passes, reports_samples, timeless};
 use std::sync::Arc;
 use study_base::text::QuestionId;
-use study_plan::protocol::{Answer, DeviceKind, Protocol, Question};
+use study_plan::protocol::{Protocol, Question};
 
 /// Most texts and automatic events between two events of a journal.
 const MOST_BETWEEN: usize = 100;
@@ -132,6 +134,11 @@ impl Retrace<'_> {
                     self.automatic(|session| session.load_interval(at));
                 }
             }
+            Event::StepFailed { .. } => {
+                self.show(at);
+                self.take();
+                self.session.phase = Phase::Stopped { since: at };
+            }
             // A level is confirmed where it is felt, or on the page after a stop.
             Event::Answered { form, question, .. }
                 if self.session.set_in(*form) == Some(question) =>
@@ -178,12 +185,18 @@ impl Retrace<'_> {
                 self.take_and_go_on();
             }
             Event::InstructionsRead
+            | Event::Debriefed
             | Event::BreakStarted { .. }
             | Event::TrackEnded { .. }
             | Event::PracticeEnded { .. }
             | Event::Finished => {
                 if self.lead(true, at) {
                     self.take_and_go_on();
+                }
+            }
+            Event::FormDelayed { .. } => {
+                if self.lead(true, at) {
+                    self.take();
                 }
             }
             Event::BreakEnded { .. } => {
@@ -532,62 +545,4 @@ impl Retrace<'_> {
             _ => None,
         }
     }
-}
-
-/// Whether a device reports the samples of its playbacks, so that its strokes are counted.
-fn reports_samples(kind: DeviceKind, entries: &[Entry]) -> bool {
-    match kind {
-        DeviceKind::Simulated | DeviceKind::Serial => true,
-        DeviceKind::Manual => false,
-        DeviceKind::Process => entries.iter().any(|entry| {
-            matches!(&entry.event, Event::PlaybackEnded { playback, .. } if playback.samples > 0)
-        }),
-    }
-}
-
-/// Whether a page is too short to be read, or tells of what no journal has.
-fn passes(screen: &Screen) -> bool {
-    matches!(
-        screen,
-        Screen::Who { .. }
-            | Screen::Saving
-            | Screen::Stopping
-            | Screen::DeviceTrouble { .. }
-            | Screen::SaveTrouble { .. }
-    )
-}
-
-/// The view when all waiting on it is over.
-fn timeless(mut view: View) -> View {
-    match &mut view.screen {
-        Screen::Reference { wait_s, .. } | Screen::Break { wait_s, .. } => *wait_s = 0.0,
-        Screen::Playing {
-            since_s,
-            keep_exploring,
-            ..
-        } => (*since_s, *keep_exploring) = (0.0, false),
-        Screen::Paused { since_s } => *since_s = 0.0,
-        _ => {}
-    }
-    view.can_advance = can_advance(&view.screen);
-    view.line.elapsed_s = 0.0;
-    view
-}
-
-/// Whether two views are the same page.
-fn is_same(a: &View, b: &View) -> bool {
-    let all = |view: &View| {
-        let Screen::Form {
-            form, questions, ..
-        } = &view.screen
-        else {
-            return Vec::new();
-        };
-        let given = |q: &Question| view.given(*form, &q.id).cloned();
-        questions.iter().map(given).collect::<Vec<Option<Answer>>>()
-    };
-    a.screen == b.screen
-        && a.progress == b.progress
-        && (a.can_replay, a.can_go_back) == (b.can_replay, b.can_go_back)
-        && all(a) == all(b)
 }

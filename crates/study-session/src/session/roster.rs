@@ -14,11 +14,21 @@ pub struct Roster {
     again: BTreeMap<ParticipantId, String>,
     /// Those who began last, the latest first.
     recent: Vec<ParticipantId>,
-    /// Whose session was interrupted, and where it goes on.
-    interrupted: Option<(ParticipantId, String)>,
+    /// Whose session was interrupted.
+    interrupted: Option<Interrupted>,
     /// The search that the study confirms.
     search: Option<Confirms>,
     newcomer: Newcomer,
+}
+
+/// A session that was interrupted.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Interrupted {
+    participant: ParticipantId,
+    /// When, such as "at 14:05, 20 minutes ago".
+    left: String,
+    /// Where it goes on, such as "with trial 12 of 40".
+    goes_on: String,
 }
 
 /// How many of the last participants are shown.
@@ -76,27 +86,33 @@ impl Roster {
         self.again.insert(participant.clone(), words);
     }
 
-    /// Says whose session was interrupted, and where it goes on, such as "with trial 12 of 40":
-    /// this participant is proposed.
-    pub fn interrupted(&mut self, participant: ParticipantId, goes_on: String) {
-        self.interrupted = Some((participant, goes_on));
+    /// Says whose session was interrupted, when, such as "at 14:05, 20 minutes ago", and where it
+    /// goes on, such as "with trial 12 of 40".
+    pub fn interrupted(&mut self, participant: ParticipantId, left: String, goes_on: String) {
+        self.interrupted = Some(Interrupted {
+            participant,
+            left,
+            goes_on,
+        });
     }
 
-    /// The participant whose session was interrupted, with two sentences that say what is proposed.
-    pub fn unfinished(&self) -> Option<(&ParticipantId, [String; 2])> {
-        let (id, goes_on) = self.interrupted.as_ref()?;
-        let sentences = [
-            format!("{id} has not finished: Enter goes on {goes_on}."),
-            "Type another id to start somebody else.".to_owned(),
-        ];
-        Some((id, sentences))
+    /// Two sentences that say whose session was interrupted and how it goes on.
+    pub fn unfinished(&self) -> Option<[String; 2]> {
+        let own = self.interrupted.as_ref()?;
+        let (id, left, goes_on) = (&own.participant, &own.left, &own.goes_on);
+        Some([
+            format!("{id} was interrupted {left}."),
+            format!("Type {id} to go on {goes_on}, or another id for somebody else."),
+        ])
     }
 
-    /// The id that Enter alone takes: that of an interrupted session, or else one for the next
-    /// participant.
+    /// The id that Enter alone takes: one for the next participant. Not while somebody has not finished: an Enter that is
+    /// pressed once too often would go on with a session of somebody else, or start one beside it, so that an id is typed.
     pub fn proposed(&self) -> Option<ParticipantId> {
-        let unfinished = self.interrupted.as_ref().map(|(id, _)| id.clone());
-        unfinished.or_else(|| self.next_id())
+        match self.interrupted {
+            Some(_) => None,
+            None => self.next_id(),
+        }
     }
 
     /// Says which search the study confirms: who took part in it cannot take part here.

@@ -13,6 +13,9 @@ pub(super) struct SaveState {
     pub(super) saved: u64,
     /// The later events, in order: they are not known to be on disk.
     pub(super) unsaved: VecDeque<(Moment, Event)>,
+    /// The participant's copy of the consent document, until it and its event are known to be on disk. It may have what was
+    /// typed as a signature, and is never shown.
+    pub(super) copy: Option<String>,
     /// Trial → number of events sent when it was completed.
     pub(super) done: BTreeMap<u32, u64>,
     /// Why saving failed.
@@ -47,8 +50,14 @@ impl SaveState {
 
 impl Session {
     pub(super) fn saved(&mut self, count: u64, at: Moment) {
-        while self.saves.saved < count && self.saves.unsaved.pop_front().is_some() {
+        while self.saves.saved < count
+            && let Some((_, event)) = self.saves.unsaved.pop_front()
+        {
             self.saves.saved += 1;
+            // The copy is written before its event.
+            if matches!(event, Event::Consented { .. }) {
+                self.saves.copy = None;
+            }
         }
         if self.saves.all_saved() {
             self.saves.trouble = None;
@@ -100,8 +109,11 @@ impl Session {
                 }
             }
             phase if phase.preparing() => {
-                self.fail(Failure::Stopped, "the journal could not be written", at);
-                self.proceed(at);
+                let what = "the journal could not be written";
+                if !self.step_failed(Failure::Stopped, what, at) {
+                    self.fail(Failure::Stopped, what, at);
+                    self.proceed(at);
+                }
             }
             Phase::Playing { .. } => {
                 self.phase = Phase::Stopping {

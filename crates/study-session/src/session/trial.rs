@@ -161,7 +161,7 @@ impl Session {
             (Phase::Playing { .. }, _) => {}
             (Phase::Loading { .. } | Phase::Mounting { .. } | Phase::Gap { .. }, _) => {
                 self.out.push(Effect::Limp);
-                self.lose_attempt(Failure::DeviceFault, "the device started unasked", at);
+                self.lose_all(Failure::DeviceFault, "the device started unasked", at);
             }
             (Phase::Stopping { limped, .. }, _) => {
                 *limped = true;
@@ -235,8 +235,11 @@ impl Session {
     fn wrong_force(&mut self, found: &Fidelity, at: Moment) {
         self.out.push(Effect::Limp);
         let defects: Vec<&str> = found.defects.iter().map(|d| d.as_str()).collect();
-        self.fail(Failure::Rendering, &defects.join(", "), at);
-        self.proceed(at);
+        let defects = defects.join(", ");
+        if !self.step_failed(Failure::Rendering, &defects, at) {
+            self.fail(Failure::Rendering, &defects, at);
+            self.proceed(at);
+        }
         self.show_wrong_force();
     }
 
@@ -454,8 +457,11 @@ impl Session {
             }
             phase if phase.preparing() => {
                 self.out.push(Effect::Limp);
-                self.fail(Failure::Stopped, "stopped before it played", at);
-                self.proceed(at);
+                let what = "stopped before it played";
+                if !self.step_failed(Failure::Stopped, what, at) {
+                    self.fail(Failure::Stopped, what, at);
+                    self.proceed(at);
+                }
                 self.notify("stopped");
             }
             _ => self.out.push(Effect::Limp),

@@ -17,6 +17,9 @@ pub struct Unsaved {
     pub what: Vec<String>,
     /// The events with their times, in order.
     pub events: Vec<(Moment, Event)>,
+    /// The participant's copy of the consent document, if it is not known to be on disk, with what was typed as a
+    /// signature. It is kept apart from the events and never shown.
+    pub copy: Option<String>,
 }
 
 impl Session {
@@ -30,6 +33,7 @@ impl Session {
             why: self.saves.trouble.as_deref().map(|why| self.sanitized(why)),
             what: self.unsaved_names(),
             events: self.saves.unsaved.iter().cloned().collect(),
+            copy: self.saves.copy.clone(),
         })
     }
 
@@ -38,6 +42,8 @@ impl Session {
         let events = self.saves.unsaved.iter().map(|(_, event)| event);
         let mut names: Vec<String> = events.filter_map(|event| self.name(event)).collect();
         let others = self.saves.unsaved.len() - names.len();
+        let copy = self.saves.copy.iter();
+        names.extend(copy.map(|_| "the participant's copy of the consent".to_owned()));
         if others > 0 {
             let records = counted(others, "record", "records");
             names.push(format!("{records} of the course of the session"));

@@ -335,6 +335,8 @@ pub enum MessageKind {
     Part,
     /// Whether the answer was correct.
     Feedback,
+    /// What the study was about, after all questions.
+    Debriefing,
 }
 
 /// An earlier answer that can be corrected.

@@ -200,6 +200,8 @@ mod tests {
             paused_s: d.maybe(Draws::number),
             felt_again_after_s: d.maybe(Draws::number),
             answer_before_feedback: d.maybe(|d| Answer::Choice(vec![d.text()])),
+            questionnaire_paused_s: d.maybe(Draws::number),
+            questionnaire_late: d.maybe(Draws::flag),
         }
     }
 

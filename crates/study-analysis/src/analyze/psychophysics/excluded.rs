@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use study_base::text::{ModelId, ParticipantId};
 use study_plan::protocol::rules::{Answers, Force, Given, Realization, Trial, Trials};
 use study_plan::protocol::{Part, Protocol, Role};
-use study_session::outcome::RatingRow;
+use study_session::outcome::{RatingRow, Verdict};
 
 /// The trials of a part, with the realizations that got a number.
 pub(super) fn trials<'a>(
@@ -73,12 +73,20 @@ fn worst(row: &RatingRow) -> Option<Force> {
 }
 
 /// Strokes and force of a level that was set: levels on the way are felt for a moment, in which nothing has to be explored and
-/// little can be verified. A wrong force is one on the way, too.
+/// little can be verified. A wrong force is one on the way, too, unless the step was repeated because of it.
 fn of_a_setting(row: &RatingRow, intervals: &Intervals<'_>) -> (Option<u32>, Option<Force>) {
     let set = intervals.counted(row).last();
     let strokes = set.and_then(|set| set.strokes);
     let own = set.and_then(|set| set.fidelity.as_ref());
-    let force = match worst(row) {
+    let worst = match row.fidelity.as_ref().map(|worst| worst.verdict) {
+        Some(Verdict::Fault) => {
+            let felt = intervals.counted(row).iter();
+            let verdicts = felt.filter_map(|own| Some(own.fidelity.as_ref()?.verdict));
+            verdicts.filter(|verdict| *verdict != Verdict::Fault).max()
+        }
+        other => other,
+    };
+    let force = match worst.map(said) {
         Some(Force::Unverified) => own.map(|own| said(own.verdict)),
         other => other,
     };

@@ -59,6 +59,10 @@ struct Filled<'a> {
     answers: Vec<Option<f64>>,
     /// `None` if an item has no answer.
     score: Option<f64>,
+    /// Whether it was answered after longer pauses than the protocol allows.
+    late: bool,
+    /// Pauses before it, s, if their length is known.
+    paused_s: Option<f64>,
     pilot: bool,
     simulated: bool,
 }
@@ -89,6 +93,8 @@ fn filled<'a>(
             about: None,
             score: score(&answers),
             answers,
+            late: false,
+            paused_s: None,
             pilot: row.pilot,
             simulated: row.simulated,
         })
@@ -114,6 +120,8 @@ fn filled<'a>(
             about,
             score: score(&answers),
             answers,
+            late: row.questionnaire_late == Some(true),
+            paused_s: row.questionnaire_paused_s,
             pilot: row.pilot,
             simulated: row.simulated,
         })
@@ -204,7 +212,9 @@ fn one(study: &StudyData<'_>, own: &Questionnaire, sessions: &[ParticipantRow]) 
         findings,
         results,
         pairs: Vec::new(),
-        warnings: (incomplete > 0).then(warning).into_iter().collect(),
+        warnings: ((incomplete > 0).then(warning).into_iter())
+            .chain(from_memory(&filled, protocol.session.longest_pause_s))
+            .collect(),
         exclusions: Vec::new(),
         alpha,
         used: Vec::new(),
@@ -213,6 +223,27 @@ fn one(study: &StudyData<'_>, own: &Questionnaire, sessions: &[ParticipantRow]) 
             ..PartData::default()
         },
     }
+}
+
+/// That some questionnaires were answered after a longer pause than the protocol allows between feeling and answering. What
+/// they are about is not felt again for them, so that they count.
+fn from_memory(filled: &[Filled<'_>], longest_pause_s: f64) -> Option<Warning> {
+    let late: Vec<&Filled<'_>> = filled.iter().filter(|form| form.late).collect();
+    let longest = late
+        .iter()
+        .filter_map(|form| form.paused_s)
+        .reduce(f64::max);
+    let most = longest.map_or(String::new(), |s| format!(", at most {s:.0} s"));
+    let warning = || Warning {
+        code: "late-questionnaires",
+        text: format!(
+            "{} answered from memory, after pauses of more than {longest_pause_s} s{most}; {} counted, and marked in \
+             `questionnaire_late`",
+            counted(late.len(), "questionnaire was", "questionnaires were"),
+            if late.len() == 1 { "it is" } else { "they are" }
+        ),
+    };
+    (!late.is_empty()).then(warning)
 }
 
 /// The scores of each subscale of a questionnaire of the study's own, one mean for each participant.

@@ -1,10 +1,12 @@
-//! `[study]`, `[text]`, `[consent]`, `[session]` and `[trial]`.
+//! `[study]`, `[text]`, `[consent]`, `[debriefing]`, `[session]` and `[trial]`.
 
 use super::parts::{EXPOSURE, exposure};
 use crate::protocol::keys::{Id, Key, Kind, Words as _, keys};
 use crate::protocol::phrases::{Phrase, placeholders};
 use crate::protocol::section::Section;
-use crate::protocol::{Consent, Entry, ScaleDirection, SessionRules, Study, Text, TrialRules};
+use crate::protocol::{
+    Consent, Debriefing, Entry, ScaleDirection, SessionRules, Study, Text, TrialRules,
+};
 use std::collections::BTreeMap;
 use study_base::diagnostic::{Fault, did_you_mean};
 use study_base::text::Untrusted;
@@ -67,6 +69,13 @@ pub(super) const CONSENT: &[Key] = keys! {
     "initials": Kind::Flag, "true", default("false");
 };
 
+pub(super) const DEBRIEFING: &[Key] = keys! {
+    /// The text, shown in full.
+    "text": Kind::Text, r#""You felt models of one switch. We ask which details make it feel real.""#;
+    /// A file with the text, plain text in UTF-8. With `text` as well, it is shown below that.
+    "file": Kind::Path, r#""debriefing.txt""#;
+};
+
 pub(super) const SESSION: &[Key] = keys! {
     /// Who types the participant's answers. Each has screens of their own.
     "entry": Kind::Word(Entry::WORDS), r#""experimenter""#, default(r#""participant""#);
@@ -77,7 +86,8 @@ pub(super) const SESSION: &[Key] = keys! {
     /// The longest pause between feeling and answering, or between two intervals of a trial: the
     /// program was left or paused, waited for the device or the disk, or stood still, as on a
     /// suspended computer. After a longer one the trial is felt again, unless a question of it is
-    /// answered already.
+    /// answered already. Questionnaires between the trials are answered all the same, and marked: `questionnaire_late` of
+    /// ratings.csv and a warning of the analysis.
     "longest_pause_s": Kind::not_negative("s"), "120", default("60");
 };
 
@@ -171,6 +181,18 @@ pub(super) fn consent(mut section: Section<'_, '_>) -> Option<Consent> {
         text: None,
         initials: initials?,
     })
+}
+
+pub(super) fn debriefing(mut section: Section<'_, '_>) -> Option<Debriefing> {
+    if section.value("text").is_none() && section.value("file").is_none() {
+        let fault = Fault::error("[debriefing] is empty");
+        section.fault_at(
+            "text",
+            fault.hint("write `text`, or name a `file` with it, or leave the section out"),
+        );
+    }
+    let (text, file) = (section.text("text"), section.path_of("file"));
+    (text.is_some() || file.is_some()).then_some(Debriefing { file, text })
 }
 
 pub(super) fn session(mut section: Section<'_, '_>) -> Option<SessionRules> {

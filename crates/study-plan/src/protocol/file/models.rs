@@ -60,7 +60,7 @@ impl PartialModel {
     pub(super) fn key(&self) -> &'static str {
         match self.content {
             Content::Bundle(_) => "bundle",
-            Content::Model | Content::Orders | Content::Text => "file",
+            Content::Model | Content::Orders | Content::Text(_) => "file",
         }
     }
 

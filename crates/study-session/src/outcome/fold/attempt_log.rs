@@ -104,6 +104,16 @@ pub fn attempt_rows(
                     });
                 }
             }
+            Event::StepFailed {
+                trial,
+                attempt,
+                failure,
+                detail,
+            } => {
+                (row.trial, row.attempt) = (Some(*trial), Some(*attempt));
+                row.failure = Some(*failure);
+                row.text = format!("{detail} [the level before is felt again]");
+            }
             Event::TrialClosed { trial, attempt } => {
                 (row.trial, row.attempt) = (Some(*trial), Some(*attempt));
             }

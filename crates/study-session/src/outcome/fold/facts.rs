@@ -1,7 +1,7 @@
 //! What the history of a session tells.
 
 use super::trial::TrialHistory;
-use super::{Attempt, Completion, GivenAnswer, History, OpenAttempt};
+use super::{Attempt, Completion, FormDelay, GivenAnswer, History, OpenAttempt};
 use crate::outcome::event::{FormId, Moment, Start, State};
 use study_base::text::{ModelId, PartId, QuestionId};
 use study_plan::protocol::{Answer, Part, Trial};
@@ -131,6 +131,12 @@ impl History {
     pub fn completion(&self, trial: u32) -> Option<(u32, Completion)> {
         let attempt = self.trials.get(&trial)?.counted()?;
         Some((attempt.number, attempt.done?))
+    }
+
+    /// The pauses before the answers so far to the questionnaires after an attempt.
+    pub fn delay(&self, trial: u32, attempt: u32) -> Option<FormDelay> {
+        let attempts = &self.trials.get(&trial)?.attempts;
+        attempts.iter().find(|a| a.number == attempt)?.delay
     }
 
     /// Whether a trial is completed or given up.

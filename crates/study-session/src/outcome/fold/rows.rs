@@ -151,6 +151,8 @@ impl History {
             paused_s: done.and_then(|d| d.paused_s),
             felt_again_after_s: felt.again_after_s,
             answer_before_feedback: before_feedback,
+            questionnaire_paused_s: counted.and_then(|a| a.delay?.paused_s),
+            questionnaire_late: counted.and_then(|a| a.delay?.late.then_some(true)),
         }
     }
 

@@ -66,6 +66,8 @@ pub struct Attempt {
     pub level: Option<TrackLevel>,
     /// Of a trial of adjustment: the intervals with the standard.
     pub(super) standards: Option<Vec<u32>>,
+    /// What the device failed at in steps that were repeated, one for each failure.
+    pub(super) failed_steps: Vec<ModelId>,
     /// Its presentations so far, in order. Each begins with its confirmed start.
     pub presentations: Vec<Presentation>,
     /// How often its intervals were felt again.
@@ -83,6 +85,8 @@ pub struct Attempt {
     pub(super) rating: Option<(Moment, Moment)>,
     /// Its completion.
     pub done: Option<Completion>,
+    /// The pauses before the answers to the questionnaires after it, if there were any.
+    pub delay: Option<FormDelay>,
     /// Failed or sent back: its answers do not count.
     pub void: bool,
 }
@@ -149,6 +153,25 @@ pub struct Completion {
     pub paused_s: Option<f64>,
     /// Number of the trial on the screen, from 1.
     pub number: u32,
+}
+
+/// Pauses between the answer to a trial and those to the questionnaires after it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FormDelay {
+    /// Their sum, s; `None` if one of them has no known length.
+    pub paused_s: Option<f64>,
+    /// Whether it is more than the protocol allows between feeling and answering.
+    pub late: bool,
+}
+
+impl FormDelay {
+    /// With another pause.
+    pub(super) fn and(self, next: Self) -> Self {
+        Self {
+            paused_s: self.paused_s.zip(next.paused_s).map(|(a, b)| a + b),
+            late: self.late || next.late,
+        }
+    }
 }
 
 impl Ended {
@@ -247,12 +270,17 @@ impl Attempt {
             }),
         }
         if interval >= self.intervals() {
-            let all = self.presentations.iter().filter_map(|p| p.ended);
-            let sum = all.map(|(_, ended)| ended).reduce(Ended::and);
-            let several = interval > 1 || self.replays > 0;
-            self.ended = sum.filter(|_| several).or(Some(ended));
-            self.rating = Some((at, at));
+            self.end(interval, ended, at);
         }
+    }
+
+    /// The last interval has ended: with the sums over all.
+    pub(super) fn end(&mut self, interval: u32, ended: Ended, at: Moment) {
+        let all = self.presentations.iter().filter_map(|p| p.ended);
+        let sum = all.map(|(_, ended)| ended).reduce(Ended::and);
+        let several = interval > 1 || self.replays > 0;
+        self.ended = sum.filter(|_| several).or(Some(ended));
+        self.rating = Some((at, at));
     }
 
     pub(super) fn new(number: u32, sitting: &Sitting, start: Option<AttemptStart>) -> Self {
@@ -263,6 +291,7 @@ impl Attempt {
             models: Vec::new(),
             level: None,
             standards: None,
+            failed_steps: Vec::new(),
             presentations: Vec::new(),
             replays: 0,
             ended: None,
@@ -271,6 +300,7 @@ impl Attempt {
             rated_earlier_s: 0.0,
             rating: None,
             done: None,
+            delay: None,
             void: false,
         }
     }

@@ -132,6 +132,21 @@ impl Pair<'_> {
         }
     }
 
+    /// Removes a file on both sides; returns whether there was one.
+    fn remove(&self, name: &str) -> Result<bool, StoreError> {
+        let mut removed = false;
+        for side in [0, 1] {
+            let path = self.at(side).join(name);
+            match self.disk(side).remove_file(&path) {
+                Err(e) if e.kind() == ErrorKind::NotFound => continue,
+                gone => gone.at(&path)?,
+            }
+            self.disk(side).sync_folder(&self.at(side)).at(&path)?;
+            removed = true;
+        }
+        Ok(removed)
+    }
+
     fn differs(&self) -> StoreError {
         StoreError::MirrorDiffers {
             results: self.at(0),
@@ -268,10 +283,15 @@ impl Pair<'_> {
             (false, true) => 1,
             (false, false) => return Err(self.differs()),
         };
+        let decided = [&results, &mirror][lead].history.consent.as_ref();
+        let refused = decided.is_some_and(|decided| !decided.accepted);
         let mut files = 0;
         for folder in [self.clone(), self.inner(layout::TELEMETRY)] {
             for name in folder.names()? {
-                if name != layout::TELEMETRY {
+                // A copy from before a crash, whose participant then refused.
+                if refused && name == layout::CONSENT {
+                    files += usize::from(folder.remove(&name)?);
+                } else if name != layout::TELEMETRY {
                     files += usize::from(folder.copy_all(lead, &name)?);
                 }
             }

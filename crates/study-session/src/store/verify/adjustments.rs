@@ -175,12 +175,15 @@ impl Replay<'_> {
         skips.then_some("and what came before was not felt")
     }
 
-    /// What is wrong with an answer.
+    /// What is wrong with an answer: a level whose force was wrong is felt again before it can be confirmed.
     fn answer(&self, open: Option<&Attempt>, answer: &Answer) -> Option<&'static str> {
         let set = open.and_then(Attempt::set_to);
         let set = set.and_then(|set| self.protocol.level_of(set));
         if set.is_some_and(|set| *answer != Answer::Number(set)) {
             return Some("and another level was felt last");
+        }
+        if open.is_some_and(|open| !open.is_right()) {
+            return Some("and its force was wrong");
         }
         let felt = |open: &Attempt| open.interval().is_none() && !open.is_at_standard();
         let unfelt = self.whole && !open.is_some_and(felt);
