@@ -40,7 +40,10 @@ fn spaces() -> [Loaded; 2] {
             "src/cli/new/search.toml",
             "protocols/turn-signal-extended/models/static.toml",
             &[
-                ("detent = [0.4, 1.2]", "detent = [0.4, 2.4]"),
+                (
+                    "detent = [0.4, 1.2], friction = [0.0, 1.6]",
+                    "detent = [0.4, 2.4], friction = [0.0, 6.0]",
+                ),
                 ("grid = 9", "grid = 5"),
             ],
         ),
