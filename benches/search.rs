@@ -24,10 +24,11 @@ mod perceivers;
 #[path = "common/resumed.rs"]
 mod resumed;
 
-use perceivers::{DIMENSIONS, Kind, Person, WAYS, found, lattice};
+use perceivers::{DIMENSIONS, WAYS, found, lattice, person};
 use resumed::{Shard, rows};
 use std::collections::BTreeMap;
 use std::time::Instant;
+use study_analysis::power::Likes;
 use study_base::rng::Stream;
 use study_plan::procedure::search::Acquire;
 use study_plan::procedure::{Choose, Lattice, Search, SearchRule};
@@ -88,7 +89,7 @@ fn main() {
             let one = all.iter().find(|one| one.0 == name);
             let (_, w, m) = one.expect("it is one of them");
             let world = &worlds[*w];
-            let person = Person::new(world.kind, world.dimensions, i);
+            let person = person(world.likes, world.dimensions, i);
             found(WAYS[*m].0, &world.lattice, &person, i, &AFTER)
         });
         return table(&file);
@@ -103,14 +104,12 @@ const FLAT: &str = "flat";
 struct World {
     dimensions: usize,
     lattice: Lattice,
-    kind: Kind,
-    /// The word of the kind.
-    of_kind: &'static str,
+    likes: Likes,
 }
 
 impl World {
     fn name(&self, what: &str) -> String {
-        format!("{what} {} {}", self.dimensions, self.of_kind)
+        format!("{what} {} {}", self.dimensions, self.likes.as_str())
     }
 
     fn of_method(&self, method: &str) -> String {
@@ -119,7 +118,7 @@ impl World {
 
     /// The utility of every point.
     fn utilities(&self, number: u64) -> Vec<f64> {
-        let person = Person::new(self.kind, self.dimensions, number);
+        let person = person(self.likes, self.dimensions, number);
         let points = 0..self.lattice.len();
         points
             .map(|point| person.of_point(&self.lattice, point))
@@ -129,11 +128,10 @@ impl World {
 
 fn worlds() -> Vec<World> {
     let of = |dimensions: usize| {
-        Kind::ALL.map(|(kind, of_kind)| World {
+        Likes::ALL.map(|likes| World {
             dimensions,
             lattice: lattice(dimensions),
-            kind,
-            of_kind,
+            likes,
         })
     };
     DIMENSIONS.into_iter().flat_map(of).collect()
@@ -155,7 +153,7 @@ fn time() {
             },
             trials: 200,
         };
-        let person = Person::new(Kind::Peaked, lattice.steps().len(), 1);
+        let person = person(Likes::Peaked, lattice.steps().len(), 1);
         let mut stream = Stream::new(1, &["search", "time"]);
         let mut search = Search::new(&rule, &lattice, &mut stream).expect("a rule");
         let mut answered = Search::new(
@@ -223,7 +221,7 @@ fn table(file: &str) {
             println!(
                 "| {} | {} | {method} | {} | {} |",
                 world.dimensions,
-                world.of_kind,
+                world.likes.as_str(),
                 found.len(),
                 cells.join(" | ")
             );
@@ -266,7 +264,7 @@ fn compare(all: &Found, worlds: &[World]) {
             println!(
                 "| {} | {} | {answers} | {} | {} | {} | {} |",
                 world.dimensions,
-                world.of_kind,
+                world.likes.as_str(),
                 ratio(&both("five fixed points")),
                 less("EUBO"),
                 less(OTHERS[0]),

@@ -1,8 +1,9 @@
-//! Simulated perceivers of a space, and how a method finds what they like best.
+//! Lattices, simulated perceivers by number, and how a method finds what they like best.
 
+use study_analysis::power::{Likes, Perceiver};
 use study_base::rng::Stream;
 use study_plan::procedure::search::Acquire;
-use study_plan::procedure::{Choose, Lattice, Preferred, Search, SearchRule};
+use study_plan::procedure::{Choose, Lattice, Search, SearchRule};
 
 /// Axes of the spaces.
 pub(crate) const DIMENSIONS: [usize; 3] = [2, 3, 4];
@@ -13,101 +14,10 @@ pub(crate) fn lattice(dimensions: usize) -> Lattice {
     Lattice::new(vec![steps; dimensions], |_| true).expect("a lattice")
 }
 
-/// What somebody likes.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum Kind {
-    Peaked,
-    Ridge,
-    Camps,
-}
-
-impl Kind {
-    pub(crate) const ALL: [(Self, &'static str); 3] = [
-        (Self::Peaked, "peaked"),
-        (Self::Ridge, "ridge"),
-        (Self::Camps, "two camps"),
-    ];
-}
-
-/// A simulated perceiver. The best utility is about 4, the worst 0.
-pub(crate) struct Person {
-    kind: Kind,
-    /// The place that is liked best.
-    place: Vec<f64>,
-    /// The place that the other camp likes best.
-    other: Vec<f64>,
-    /// Of a ridge: the unit vector across it.
-    across: Vec<f64>,
-}
-
-impl Person {
-    pub(crate) fn new(kind: Kind, dimensions: usize, number: u64) -> Self {
-        let mut stream = Stream::new(number, &["search", "person"]);
-        let mut uniform = || -> Vec<f64> { (0..dimensions).map(|_| stream.unit()).collect() };
-        let (mut place, drawn) = (uniform(), uniform());
-        let mut other = place.clone();
-        if let Kind::Camps = kind {
-            let (own, others) = if number.is_multiple_of(2) {
-                (0.2, 0.8)
-            } else {
-                (0.8, 0.2)
-            };
-            let near = |center: f64, u: &f64| center + 0.2 * (u - 0.5);
-            place = drawn.iter().map(|u| near(own, u)).collect();
-            other = drawn.iter().map(|u| near(others, u)).collect();
-        }
-        let across: Vec<f64> = (0..dimensions).map(|_| stream.normal()).collect();
-        let length = across.iter().map(|x| x * x).sum::<f64>().sqrt();
-        Self {
-            kind,
-            place,
-            other,
-            across: across.iter().map(|x| x / length).collect(),
-        }
-    }
-
-    fn utility(&self, at: &[f64]) -> f64 {
-        let near = |place: &[f64]| {
-            let squares: f64 = at.iter().zip(place).map(|(a, b)| (a - b) * (a - b)).sum();
-            let width = 0.35 * (at.len() as f64 / 2.0).sqrt();
-            (-squares / (2.0 * width * width)).exp()
-        };
-        match self.kind {
-            Kind::Peaked => 4.0 * near(&self.place),
-            Kind::Ridge => {
-                let away = at.iter().zip(&self.place).zip(&self.across);
-                let distance: f64 = away.map(|((a, b), across)| (a - b) * across).sum();
-                4.0 * (-distance * distance / (2.0 * 0.2 * 0.2)).exp()
-            }
-            Kind::Camps => 4.0 * near(&self.place) + 2.5 * near(&self.other),
-        }
-    }
-
-    /// The utility of a point, in units of the noise of one impression.
-    pub(crate) fn of_point(&self, lattice: &Lattice, point: usize) -> f64 {
-        self.utility(&lattice.coordinates(point))
-    }
-
-    /// Of two points the one that feels better, with noise of each impression.
-    pub(crate) fn answer(
-        &self,
-        lattice: &Lattice,
-        [a, b]: [usize; 2],
-        stream: &mut Stream,
-    ) -> Preferred {
-        let mut felt = |point| self.of_point(lattice, point) + stream.normal();
-        let (preferred, other) = if felt(a) > felt(b) { (a, b) } else { (b, a) };
-        Preferred { preferred, other }
-    }
-
-    /// The utility of the best point minus that of a point.
-    pub(crate) fn regret(&self, lattice: &Lattice, point: usize) -> f64 {
-        let all = lattice
-            .certified()
-            .iter()
-            .map(|p| self.of_point(lattice, *p));
-        all.fold(f64::NEG_INFINITY, f64::max) - self.of_point(lattice, point)
-    }
+/// A perceiver, by number.
+pub(crate) fn person(likes: Likes, dimensions: usize, number: u64) -> Perceiver {
+    let mut stream = Stream::new(number, &["search", "person"]);
+    Perceiver::drawn(likes, dimensions, (number, 4.0), &mut stream)
 }
 
 /// How a point is found.
@@ -135,7 +45,7 @@ const fn model(acquire: Acquire) -> Way {
 pub(crate) fn found(
     way: Way,
     lattice: &Lattice,
-    person: &Person,
+    person: &Perceiver,
     number: u64,
     after: &[usize],
 ) -> Vec<f64> {
@@ -163,7 +73,7 @@ pub(crate) fn found(
 
 fn five_points(
     lattice: &Lattice,
-    person: &Person,
+    person: &Perceiver,
     noise: &mut Stream,
     after: &[usize],
 ) -> Vec<f64> {
