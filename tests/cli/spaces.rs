@@ -181,6 +181,10 @@ fn a_search_is_rehearsed_verified_and_explored() {
         said.contains("confirmed with participants who did not take part in it"),
         "{said}"
     );
+    let analysis = at.join("r/s/analysis");
+    assert!(analysis.join("figures/part-1-search.svg").is_file());
+    let page = fs::read_to_string(analysis.join("report.html")).unwrap();
+    assert!(page.contains("What a search found") && page.contains("too good on average"));
     confirmed(at, &rows("better-pairs.csv"));
     no_search(at);
 }
