@@ -18,17 +18,16 @@
 mod draws;
 #[path = "common/ranks.rs"]
 mod pictured;
+#[path = "common/resumed.rs"]
+mod resumed;
 #[path = "common/tracks.rs"]
 mod tracks;
 #[path = "common/weber.rs"]
 mod weber;
 
 use draws::Random;
-use rayon::prelude::*;
-use std::collections::{BTreeMap, BTreeSet};
-use std::fs::{OpenOptions, read_to_string};
-use std::io::Write as _;
-use std::sync::Mutex;
+use resumed::{Shard, rows};
+use std::collections::BTreeMap;
 use std::time::Instant;
 use study_base::rng::Stream;
 use study_stats::describe;
@@ -56,12 +55,8 @@ fn main() {
     let number = |name: &str| -> Option<u64> { value(name)?.parse().ok() };
     let file = value("--file").unwrap_or_else(|| "pooling.csv".to_owned());
     let only = value("--only").unwrap_or_default();
-    let shard = value("--shard").unwrap_or_else(|| "1/1".to_owned());
-    let shard = shard
-        .split_once('/')
-        .and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
-    let (own, shards): (u64, u64) = shard.expect("--shard takes I/N");
-    let mine = |i: &u64| i % shards == own - 1;
+    let shard = Shard::of(value("--shard").as_deref());
+    let mine = |i: &u64| shard.has(*i);
     if arguments.iter().any(|a| a == "--table") {
         return table(&file);
     }
@@ -99,34 +94,10 @@ fn main() {
     });
 }
 
-/// Runs what is not in the file, and appends the results as they come.
+/// Runs what is not in the file, and prints what is in it then.
 fn run(file: &str, jobs: Vec<(String, u64)>, one: impl Fn(&str, u64) -> Vec<f64> + Sync) {
-    let known: BTreeSet<(String, u64)> = rows(file).into_iter().map(|r| (r.0, r.1)).collect();
-    let left: Vec<(String, u64)> = jobs.into_iter().filter(|j| !known.contains(j)).collect();
-    let out = OpenOptions::new().create(true).append(true).open(file);
-    let out = Mutex::new(out.expect("the file can be written"));
-    left.par_iter().for_each(|(name, i)| {
-        let numbers: Vec<String> = one(name, *i).iter().map(|x| format!("{x:.6}")).collect();
-        let line = format!("{name},{i},{}\n", numbers.join(","));
-        let mut out = out.lock().expect("no thread panicked");
-        out.write_all(line.as_bytes())
-            .expect("the file can be written");
-    });
+    resumed::run(file, jobs, one);
     table(file);
-}
-
-/// Name, number and results of each line.
-fn rows(file: &str) -> Vec<(String, u64, Vec<f64>)> {
-    let text = read_to_string(file).unwrap_or_default();
-    let row = |line: &str| {
-        let mut fields = line.split(',');
-        let (name, i) = (fields.next()?.to_owned(), fields.next()?.parse().ok()?);
-        let numbers = fields
-            .map(|f| f.parse().ok())
-            .collect::<Option<Vec<f64>>>()?;
-        Some((name, i, numbers))
-    };
-    text.lines().filter_map(row).collect()
 }
 
 /// Participants whose tracks are simulated.

@@ -1,33 +1,140 @@
-//! How long the next pair of a search takes, and how much better than the best point the one it finds is not.
+//! How long the next pair of a search takes, how much better than what it finds the best point is, and what is claimed where
+//! nothing is better.
 //!
-//! `cargo bench --bench search` prints the time of the next pair over points and answers, one thread.
-//! `cargo bench --bench search -- --regret 60` simulates so many perceivers of each kind and prints the regret: the
-//! utility of the best point of the lattice minus that of the point that a method recommends, in units of the noise of one
-//! impression, mean ± standard error, after 20, 40 and 60 answers. The seed is fixed: the same number of perceivers
-//! prints the same tables for any number of threads.
+//! ```text
+//! cargo bench --bench search                                             # times of the next pair
+//! cargo bench --bench search -- --regret 200 --file regret.csv           # perceivers of each kind
+//! cargo bench --bench search -- --flat 2000 --file flat.csv              # searches of a flat space
+//! cargo bench --bench search -- --confirm 10000                          # confirmations of identical stimuli
+//! cargo bench --bench search -- --perceivers 200 --file perceivers.csv   # utilities, for docs/search-compare.py
+//! cargo bench --bench search -- --table --file regret.csv                # what is in a file
+//! ```
+//!
+//! Regret is the utility of the best point of the lattice minus that of the point that a method recommends, in units of the
+//! noise of one impression, after 20, 40 and 60 answers. A file has one line for each perceiver and method, or for ten searchers of a
+//! flat space. What is there is not simulated again, so that a run can be interrupted. `--shard 2/4` simulates every fourth
+//! perceiver, into a file of its own; `cat` puts files together. `--only "3 peaked"` simulates the rows whose name has the text.
+//! Seeds are fixed. Tables have Monte Carlo errors: mean ± standard error.
 #![allow(clippy::print_stdout)]
 
-use rayon::prelude::*;
+#[path = "common/confirmations.rs"]
+mod confirmations;
+#[path = "common/perceivers.rs"]
+mod perceivers;
+#[path = "common/resumed.rs"]
+mod resumed;
+
+use perceivers::{DIMENSIONS, WAYS, found, lattice, person};
+use resumed::{Shard, rows};
+use std::collections::BTreeMap;
 use std::time::Instant;
+use study_analysis::power::Likes;
 use study_base::rng::Stream;
 use study_plan::procedure::search::Acquire;
-use study_plan::procedure::{Choose, Lattice, Preferred, Search, SearchRule};
+use study_plan::procedure::{Choose, Lattice, Search, SearchRule};
 use study_stats::describe;
 
 /// Answers after which the recommended point is asked for.
 const AFTER: [usize; 3] = [20, 40, 60];
-/// Steps of each axis.
-const STEPS: usize = 9;
 
 fn main() {
-    let mut arguments = std::env::args().skip(1);
-    while let Some(argument) = arguments.next() {
-        if argument == "--regret" {
-            let given = arguments.next().and_then(|n| n.parse().ok());
-            return regret(given.expect("--regret takes a number"));
-        }
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let value = |name: &str| {
+        let at = arguments.iter().position(|a| a == name)?;
+        arguments.get(at + 1).cloned()
+    };
+    let number = |name: &str| {
+        let given = arguments.iter().any(|a| a == name);
+        given.then(|| {
+            let number = value(name).and_then(|n| n.parse::<u64>().ok());
+            number.unwrap_or_else(|| panic!("{name} takes a number"))
+        })
+    };
+    let file = value("--file").unwrap_or_else(|| "search.csv".to_owned());
+    let shard = Shard::of(value("--shard").as_deref());
+    let only = value("--only").unwrap_or_default();
+    let jobs = |names: Vec<String>, n: u64| -> Vec<(String, u64)> {
+        let names: Vec<String> = names.into_iter().filter(|n| n.contains(&only)).collect();
+        let mine = (0..n).filter(|i| shard.has(*i));
+        mine.flat_map(|i| names.iter().map(move |name| (name.clone(), i)))
+            .collect()
+    };
+    if arguments.iter().any(|a| a == "--table") {
+        return table(&file);
+    }
+    if let Some(n) = number("--confirm") {
+        return confirmations::print(n);
+    }
+    if let Some(n) = number("--flat") {
+        let own = jobs(vec![FLAT.to_owned()], n);
+        resumed::run(&file, own, |_, i| confirmations::flat(i));
+        return table(&file);
+    }
+    if let Some(n) = number("--perceivers") {
+        let worlds = worlds();
+        let names = worlds.iter().map(|world| world.name("perceivers"));
+        let own = jobs(names.collect(), n);
+        return resumed::run(&file, own, |name, i| {
+            let world = worlds.iter().find(|w| w.name("perceivers") == name);
+            world.expect("it is one of them").utilities(i)
+        });
+    }
+    if let Some(n) = number("--regret") {
+        let worlds = worlds();
+        let all: Vec<(String, usize, usize)> = (worlds.iter().enumerate())
+            .flat_map(|(w, world)| (0..WAYS.len()).map(move |m| (world.of_method(WAYS[m].1), w, m)))
+            .collect();
+        let own = jobs(all.iter().map(|one| one.0.clone()).collect(), n);
+        resumed::run(&file, own, |name, i| {
+            let one = all.iter().find(|one| one.0 == name);
+            let (_, w, m) = one.expect("it is one of them");
+            let world = &worlds[*w];
+            let person = person(world.likes, world.dimensions, i);
+            found(WAYS[*m].0, &world.lattice, &person, i, &AFTER)
+        });
+        return table(&file);
     }
     time();
+}
+
+/// The name of the lines of flat searches.
+const FLAT: &str = "flat";
+
+/// A space and what its perceivers like.
+struct World {
+    dimensions: usize,
+    lattice: Lattice,
+    likes: Likes,
+}
+
+impl World {
+    fn name(&self, what: &str) -> String {
+        format!("{what} {} {}", self.dimensions, self.likes.as_str())
+    }
+
+    fn of_method(&self, method: &str) -> String {
+        format!("{} {method}", self.name("regret"))
+    }
+
+    /// The utility of every point.
+    fn utilities(&self, number: u64) -> Vec<f64> {
+        let person = person(self.likes, self.dimensions, number);
+        let points = 0..self.lattice.len();
+        points
+            .map(|point| person.of_point(&self.lattice, point))
+            .collect()
+    }
+}
+
+fn worlds() -> Vec<World> {
+    let of = |dimensions: usize| {
+        Likes::ALL.map(|likes| World {
+            dimensions,
+            lattice: lattice(dimensions),
+            likes,
+        })
+    };
+    DIMENSIONS.into_iter().flat_map(of).collect()
 }
 
 fn time() {
@@ -46,7 +153,7 @@ fn time() {
             },
             trials: 200,
         };
-        let person = Person::new(Kind::Peaked, lattice.steps().len(), 1);
+        let person = person(Likes::Peaked, lattice.steps().len(), 1);
         let mut stream = Stream::new(1, &["search", "time"]);
         let mut search = Search::new(&rule, &lattice, &mut stream).expect("a rule");
         let mut answered = Search::new(
@@ -79,184 +186,153 @@ fn time() {
     }
 }
 
-#[derive(Debug, Clone, Copy)]
-enum Kind {
-    Peaked,
-    Ridge,
-    Camps,
-}
+/// The results of a name, by number.
+type Found = BTreeMap<String, BTreeMap<u64, Vec<f64>>>;
 
-impl Kind {
-    const ALL: [(Self, &'static str); 3] = [
-        (Self::Peaked, "peaked"),
-        (Self::Ridge, "ridge"),
-        (Self::Camps, "two camps"),
-    ];
-}
-
-/// A simulated perceiver. The best utility is about 4, the worst 0.
-struct Person {
-    kind: Kind,
-    /// The place that is liked best.
-    place: Vec<f64>,
-    /// The place that the other camp likes best.
-    other: Vec<f64>,
-    /// Of a ridge: the unit vector across it.
-    across: Vec<f64>,
-}
-
-impl Person {
-    fn new(kind: Kind, dimensions: usize, number: u64) -> Self {
-        let mut stream = Stream::new(number, &["search", "person"]);
-        let mut uniform = || -> Vec<f64> { (0..dimensions).map(|_| stream.unit()).collect() };
-        let (mut place, drawn) = (uniform(), uniform());
-        let mut other = place.clone();
-        if let Kind::Camps = kind {
-            let (own, others) = if number.is_multiple_of(2) {
-                (0.2, 0.8)
-            } else {
-                (0.8, 0.2)
-            };
-            let near = |center: f64, u: &f64| center + 0.2 * (u - 0.5);
-            place = drawn.iter().map(|u| near(own, u)).collect();
-            other = drawn.iter().map(|u| near(others, u)).collect();
-        }
-        let across: Vec<f64> = (0..dimensions).map(|_| stream.normal()).collect();
-        let length = across.iter().map(|x| x * x).sum::<f64>().sqrt();
-        Self {
-            kind,
-            place,
-            other,
-            across: across.iter().map(|x| x / length).collect(),
-        }
+/// Prints what is in a file.
+fn table(file: &str) {
+    let mut all = Found::new();
+    for (name, number, numbers) in rows(file) {
+        all.entry(name).or_default().insert(number, numbers);
     }
-
-    fn utility(&self, at: &[f64]) -> f64 {
-        let near = |place: &[f64]| {
-            let squares: f64 = at.iter().zip(place).map(|(a, b)| (a - b) * (a - b)).sum();
-            let width = 0.35 * (at.len() as f64 / 2.0).sqrt();
-            (-squares / (2.0 * width * width)).exp()
-        };
-        match self.kind {
-            Kind::Peaked => 4.0 * near(&self.place),
-            Kind::Ridge => {
-                let away = at.iter().zip(&self.place).zip(&self.across);
-                let distance: f64 = away.map(|((a, b), across)| (a - b) * across).sum();
-                4.0 * (-distance * distance / (2.0 * 0.2 * 0.2)).exp()
-            }
-            Kind::Camps => 4.0 * near(&self.place) + 2.5 * near(&self.other),
-        }
+    if let Some(flat) = all.get(FLAT) {
+        print_flat(flat);
     }
-
-    fn of_point(&self, lattice: &Lattice, point: usize) -> f64 {
-        self.utility(&lattice.coordinates(point))
-    }
-
-    fn answer(&self, lattice: &Lattice, [a, b]: [usize; 2], stream: &mut Stream) -> Preferred {
-        let mut felt = |point| self.of_point(lattice, point) + stream.normal();
-        let (preferred, other) = if felt(a) > felt(b) { (a, b) } else { (b, a) };
-        Preferred { preferred, other }
-    }
-
-    fn regret(&self, lattice: &Lattice, point: usize) -> f64 {
-        let all = lattice
-            .certified()
-            .iter()
-            .map(|p| self.of_point(lattice, *p));
-        all.fold(f64::NEG_INFINITY, f64::max) - self.of_point(lattice, point)
-    }
-}
-
-/// How a point is found.
-#[derive(Debug, Clone, Copy)]
-enum Way {
-    /// Five points on the diagonal, every pair equally often; the one with the most wins.
-    FivePoints,
-    Model(Choose),
-}
-
-const WAYS: [(Way, &str); 5] = [
-    (Way::FivePoints, "five fixed points"),
-    (Way::Model(Choose::Random), "random pairs"),
-    (Way::Model(Choose::Sobol), "Sobol pairs"),
-    (model(Acquire::Eubo), "EUBO"),
-    (model(Acquire::Challenger), "challenger"),
-];
-
-const fn model(acquire: Acquire) -> Way {
-    Way::Model(Choose::PreferenceGp { start: 8, acquire })
-}
-
-/// The regret after each number of answers.
-fn found(way: Way, lattice: &Lattice, person: &Person, number: u64) -> [f64; 3] {
-    let mut noise = Stream::new(number, &["search", "noise"]);
-    let choose = match way {
-        Way::FivePoints => return five_points(lattice, person, &mut noise),
-        Way::Model(choose) => choose,
+    let worlds = worlds();
+    let any = |world: &World| {
+        let name = world.name("regret");
+        all.keys().any(|key| key.starts_with(&name))
     };
-    let rule = SearchRule {
-        choose,
-        trials: AFTER[2] as u32,
-    };
-    let mut stream = Stream::new(number, &["search", "pairs"]);
-    let mut search = Search::new(&rule, lattice, &mut stream).expect("a rule");
-    AFTER.map(|after| {
-        while search.answered() < after {
-            let pair = search.next().expect("a pair");
-            search.answer(&person.answer(lattice, pair, &mut noise));
-        }
-        person.regret(lattice, search.best_point().expect("a posterior"))
-    })
-}
-
-fn five_points(lattice: &Lattice, person: &Person, noise: &mut Stream) -> [f64; 3] {
-    let dimensions = lattice.steps().len();
-    let points: Vec<usize> = (0..5)
-        .map(|i| lattice.point(&vec![i * (STEPS - 1) / 4; dimensions]))
-        .collect();
-    let pairs: Vec<(usize, usize)> = (0..5).flat_map(|b| (0..b).map(move |a| (a, b))).collect();
-    let mut wins = [0u32; 5];
-    let mut answered = 0;
-    AFTER.map(|after| {
-        while answered < after {
-            let (a, b) = pairs[answered % pairs.len()];
-            let answer = person.answer(lattice, [points[a], points[b]], noise);
-            wins[if answer.preferred == points[a] { a } else { b }] += 1;
-            answered += 1;
-        }
-        let most = wins.iter().max().copied().unwrap_or_default();
-        let best = wins.iter().position(|n| *n == most).unwrap_or_default();
-        person.regret(lattice, points[best])
-    })
-}
-
-fn regret(people: u64) {
-    println!("{people} perceivers of each kind\n");
+    if !worlds.iter().any(any) {
+        return;
+    }
     println!(
-        "| axes | perceiver | method | 20 answers | 40 answers | 60 answers |\n|---|---|---|---|---|---|"
+        "| axes | perceiver | method | perceivers | 20 answers | 40 answers | 60 answers |\n|---|---|---|---|---|---|---|"
     );
-    for dimensions in [2, 3] {
-        let lattice = Lattice::new(vec![STEPS; dimensions], |_| true).expect("a lattice");
-        for (kind, name) in Kind::ALL {
-            for (way, method) in WAYS {
-                let regrets: Vec<[f64; 3]> = (0..people)
-                    .into_par_iter()
-                    .map(|number| {
-                        let person = Person::new(kind, dimensions, number);
-                        found(way, &lattice, &person, number)
-                    })
-                    .collect();
-                let cells = [0, 1, 2].map(|at| {
-                    let own: Vec<f64> = regrets.iter().map(|r| r[at]).collect();
-                    let mean = describe::mean(&own).unwrap_or_default();
-                    let se = describe::sd(&own).unwrap_or_default() / (people as f64).sqrt();
-                    format!("{mean:.2} ± {se:.2}")
-                });
-                println!(
-                    "| {dimensions} | {name} | {method} | {} |",
-                    cells.join(" | ")
-                );
-            }
+    for world in &worlds {
+        for method in methods() {
+            let Some(found) = all.get(&world.of_method(method)) else {
+                continue;
+            };
+            let cells = [0, 1, 2].map(|at| {
+                let own: Vec<f64> = found.values().map(|r| r[at]).collect();
+                with_error(&own, 2)
+            });
+            println!(
+                "| {} | {} | {method} | {} | {} |",
+                world.dimensions,
+                world.likes.as_str(),
+                found.len(),
+                cells.join(" | ")
+            );
         }
     }
+    compare(&all, &worlds);
+}
+
+/// The program's own methods, and those of docs/search-compare.py.
+fn methods() -> impl Iterator<Item = &'static str> {
+    WAYS.into_iter().map(|way| way.1).chain(OTHERS)
+}
+
+const OTHERS: [&str; 2] = ["AEPsych", "BoTorch EUBO"];
+
+/// What the challenger is compared with: the same perceivers in both.
+fn compare(all: &Found, worlds: &[World]) {
+    println!(
+        "\n| axes | perceiver | answers | regret of five fixed points over that of the challenger | challenger less EUBO | challenger less AEPsych | challenger less BoTorch EUBO |\n|---|---|---|---|---|---|---|"
+    );
+    for world in worlds {
+        let of = |method: &str| all.get(&world.of_method(method));
+        let Some(own) = of("challenger") else {
+            continue;
+        };
+        for (at, answers) in AFTER.iter().enumerate() {
+            let both = |method: &str| -> Vec<(f64, f64)> {
+                let Some(other) = of(method) else {
+                    return Vec::new();
+                };
+                let same = own
+                    .iter()
+                    .filter_map(|(i, r)| Some((r[at], other.get(i)?[at])));
+                same.collect()
+            };
+            let less = |method: &str| {
+                let differences: Vec<f64> = both(method).iter().map(|(a, b)| a - b).collect();
+                with_error(&differences, 2)
+            };
+            println!(
+                "| {} | {} | {answers} | {} | {} | {} | {} |",
+                world.dimensions,
+                world.likes.as_str(),
+                ratio(&both("five fixed points")),
+                less("EUBO"),
+                less(OTHERS[0]),
+                less(OTHERS[1]),
+            );
+        }
+    }
+}
+
+/// The mean of the second numbers over that of the first, with its standard error by the delta method.
+fn ratio(both: &[(f64, f64)]) -> String {
+    let mean = |of: fn(&(f64, f64)) -> f64| {
+        let all: Vec<f64> = both.iter().map(of).collect();
+        describe::mean(&all).filter(|mean| *mean > 0.0)
+    };
+    let (Some(own), Some(other)) = (mean(|b| b.0), mean(|b| b.1)) else {
+        return "–".to_owned();
+    };
+    let ratio = other / own;
+    let rests: Vec<f64> = both.iter().map(|(a, b)| (b - ratio * a) / own).collect();
+    let error = describe::sd(&rests).unwrap_or_default() / (both.len() as f64).sqrt();
+    format!("{ratio:.1} ± {error:.1}")
+}
+
+/// Mean ± standard error.
+fn with_error(x: &[f64], digits: usize) -> String {
+    let Some(mean) = describe::mean(x) else {
+        return "–".to_owned();
+    };
+    let error = describe::sd(x).unwrap_or_default() / (x.len() as f64).sqrt();
+    format!("{mean:.digits$} ± {error:.digits$}")
+}
+
+/// The winner of searches in which every point is as good as every other.
+fn print_flat(found: &BTreeMap<u64, Vec<f64>>) {
+    println!(
+        "{} flat spaces, ten searchers each\n\n| what | mean | true |\n|---|---|---|",
+        found.len()
+    );
+    let column = |at: usize| -> Vec<f64> { found.values().map(|r| r[at]).collect() };
+    for (at, name) in confirmations::FLAT.iter().enumerate() {
+        let shown = match *name {
+            // A share of all comparisons, since some winners have few.
+            "of these, won" => {
+                let both: Vec<(f64, f64)> = column(2).into_iter().zip(column(3)).collect();
+                share(&both)
+            }
+            _ => with_error(&column(at), 3),
+        };
+        let truth = match at {
+            2 => "–",
+            3 | 5 => "0.5",
+            _ => "0",
+        };
+        println!("| {name} | {shown} | {truth} |");
+    }
+}
+
+/// The second numbers over the first ones, with the standard error by the delta method.
+fn share(both: &[(f64, f64)]) -> String {
+    let (all, won): (f64, f64) = both
+        .iter()
+        .fold((0.0, 0.0), |sum, b| (sum.0 + b.0, sum.1 + b.1));
+    if all <= 0.0 {
+        return "–".to_owned();
+    }
+    let (share, mean) = (won / all, all / both.len() as f64);
+    let rests: Vec<f64> = both.iter().map(|(n, k)| (k - share * n) / mean).collect();
+    let error = describe::sd(&rests).unwrap_or_default() / (both.len() as f64).sqrt();
+    format!("{share:.3} ± {error:.3}")
 }

@@ -144,6 +144,9 @@ pub(super) struct Args {
     /// Instead of a replication, confirm what the search in that folder found, on other participants
     #[arg(long, requires = "from")]
     confirm: bool,
+    /// Confirm by ratings of the two, with a margin of equivalence, in place of ABX and pairs
+    #[arg(long, requires = "confirm")]
+    ratings: bool,
     /// Also include these sessions of the search
     #[arg(long, value_name = "WHO", value_delimiter = ',', requires = "confirm")]
     include: Vec<Who>,
@@ -176,6 +179,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             let asked = Asked {
                 include: include(&args.include),
                 part: args.part.as_ref(),
+                ratings: args.ratings,
                 today: &today.to_string(),
                 seed,
             };

@@ -2,6 +2,7 @@
 
 mod assume;
 mod procedures;
+mod searches;
 mod shards;
 mod slurm;
 
@@ -28,6 +29,8 @@ pub(super) struct Args {
     assume: assume::Assume,
     #[command(flatten)]
     compare: procedures::Compare,
+    #[command(flatten)]
+    searches: searches::Searches,
     /// Print only the closed-form results, without simulation
     #[arg(long, conflicts_with_all = ["shards", "merge", "slurm"])]
     closed: bool,
@@ -75,7 +78,17 @@ pub(super) fn on_threads<T: Send>(
     threads: Option<u16>,
     work: impl FnOnce(Progress<'_>) -> T + Send,
 ) -> Result<T, Failure> {
-    let bar = super::console::progress(units as u64, unit(plan));
+    with_threads(unit(plan), units, threads, work)
+}
+
+/// The same of any units, whose plural is `unit`.
+pub(super) fn with_threads<T: Send>(
+    unit: &'static str,
+    units: usize,
+    threads: Option<u16>,
+    work: impl FnOnce(Progress<'_>) -> T + Send,
+) -> Result<T, Failure> {
+    let bar = super::console::progress(units as u64, unit);
     let progress = || bar.inc(1);
     let found = match threads {
         None => work(&progress),
@@ -99,6 +112,9 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         return run(&again, console);
     };
     let loaded = load::load(path)?;
+    if let Some(part) = searches::meant(&loaded.protocol, args)? {
+        return searches::run(&loaded.protocol, part, args, console);
+    }
     if args.compare.is_asked() {
         return procedures::run(&loaded.protocol, args, console);
     }

@@ -263,6 +263,67 @@ fn procedures_of_tracks_are_compared() {
     }
 }
 
+/// After how many answers the best point of a search is near enough.
+#[test]
+fn numbers_of_answers_of_a_search_are_compared() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    let search = new("search", dir);
+    let run = |more: &[&str]| {
+        let own = ["power", &search, "--studies", "10", "--trials", "16,12"];
+        study(&[&own[..], more].concat(), dir)
+    };
+    let (code, page, err) = run(&["--jnd", "9", "--out", "found"]);
+    assert_eq!(code, 0, "{err}");
+    let words: Vec<&str> = page.split_whitespace().collect();
+    for part in [
+        "10 perceivers of each kind search in the space switch, of which 81 points can be presented, up to 16 answers.",
+        "recommended one, and is not noticed below 9.00.",
+        "ridge: with 12 answers the regret of at least 80 % is not noticed.",
+        "What a search finds is to be confirmed.",
+    ] {
+        assert!(words.join(" ").contains(part), "{part}\n{page}");
+    }
+    assert!(page.lines().all(|l| l.chars().count() <= 100), "{page}");
+    let (code, text, err) = run(&["--json", "--threads", "1"]);
+    assert_eq!(code, 0, "{err}");
+    assert_eq!(run(&["--json", "--threads", "2"]).1, text);
+    let found: Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(found["format"], "study-power-search/1");
+    assert_eq!(found["assumptions"]["perceivers"], 10);
+    let jnd = found["assumptions"]["jnd"].as_f64().unwrap();
+    assert!((jnd - 0.953_872_552).abs() < 1e-6, "{jnd}");
+    let results = found["results"].as_array().unwrap();
+    let names: Vec<&str> = (results.iter())
+        .map(|r| r["perceivers"].as_str().unwrap())
+        .collect();
+    assert_eq!(names, ["peaked", "ridge", "two camps"]);
+    for result in results {
+        let regrets = result["regrets"].as_array().unwrap();
+        let answers: Vec<u64> = (regrets.iter())
+            .map(|r| r["answers"].as_u64().unwrap())
+            .collect();
+        assert_eq!(answers, [12, 16]);
+        assert!(regrets.iter().all(|r| r["mcse"].as_f64().unwrap() > 0.0));
+    }
+    assert!(dir.join("found/search.json").is_file());
+    let pairs = new("pairs", dir);
+    for (protocol, more, what) in [
+        (
+            &search,
+            &["--slope", "1"][..],
+            "of which only the number of perceivers",
+        ),
+        (&search, &["--trials", "501"], "at most 500 trials, not 501"),
+        (&search, &["--closed"], "do not apply to a search"),
+        (&search, &["--procedure", "own"], "do not apply to a search"),
+        (&pairs, &["--jnd", "1"], "--jnd and --best are of searches"),
+    ] {
+        let (code, _, err) = study(&[&["power", protocol], more].concat(), dir);
+        assert!(code != 0 && err.contains(what), "{more:?}: {err}");
+    }
+}
+
 /// What a protocol has and the simulation has not is said.
 #[test]
 fn what_is_not_simulated_is_said() {

@@ -190,6 +190,26 @@ fn the_shipped_search_has_the_identified_switch_among_its_points() {
     );
 }
 
+/// The same of the keyboard switch, whose table is that of the other protocol.
+#[test]
+fn the_shipped_search_of_a_key_has_the_measured_switch_among_its_points() {
+    let path = "protocols/keyboard-search";
+    let (code, out, err) = run(Path::new("."), &["check", path]);
+    assert_eq!(code, 0, "{err}");
+    assert!(
+        out.contains("keyboard-search: ok") && out.contains("0 warnings"),
+        "{out}{err}"
+    );
+    let loaded = study_analysis::load::load(Path::new(path)).unwrap();
+    let space = &loaded.protocol.spaces[0];
+    assert_eq!(space.lattice.certified().len(), 81);
+    let is_start = |point: &usize| space.levels(*point) == [1.0, 0.0];
+    assert_eq!((0..space.lattice.len()).filter(is_start).count(), 1);
+    let model =
+        |protocol: &str| fs::read(format!("protocols/{protocol}/models/zaku-ii.toml")).unwrap();
+    assert!(model("keyboard-search") == model("keyboard"));
+}
+
 /// A mechanism of an older version has 33 N at an edge that no data reached: it passes its
 /// certificate and is refused, or named where the protocol permits it.
 #[test]

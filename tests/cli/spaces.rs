@@ -181,6 +181,10 @@ fn a_search_is_rehearsed_verified_and_explored() {
         said.contains("confirmed with participants who did not take part in it"),
         "{said}"
     );
+    let analysis = at.join("r/s/analysis");
+    assert!(analysis.join("figures/part-1-search.svg").is_file());
+    let page = fs::read_to_string(analysis.join("report.html")).unwrap();
+    assert!(page.contains("What a search found") && page.contains("too good on average"));
     confirmed(at, &rows("better-pairs.csv"));
     no_search(at);
 }
@@ -228,6 +232,7 @@ fn confirmed(at: &Path, pairs: &str) {
     ] {
         assert_eq!(text.matches(expected).count(), 2, "{expected}: {text}");
     }
+    rated(at);
     // Not without being asked for.
     let (code, _, said) = study(&["new", "d", "--from", "r", "--confirm"], at);
     assert_eq!(code, 1);
@@ -258,6 +263,37 @@ fn confirmed(at: &Path, pairs: &str) {
         declared.contains("on participants who did not search") && declared.contains(simulated),
         "{declared}"
     );
+}
+
+/// The same two as ratings, of which a margin says when their difference is negligible.
+fn rated(at: &Path) {
+    let run = |arguments: &[&str]| {
+        let (code, out, err) = study(arguments, at);
+        assert_eq!(code, 0, "{arguments:?}: {out}{err}");
+        out + &err
+    };
+    let arguments = ["new", "e", "--from", "r", "--confirm", "--ratings"];
+    run(&[&arguments[..], &["--include", "simulated"]].concat());
+    let said = run(&["check", "e"]);
+    assert!(said.contains("0 warnings"), "{said}");
+    let text = fs::read_to_string(at.join("e/protocol.toml")).unwrap();
+    for expected in [
+        "exposure = { min_s = 1, max_s = 5.5, replays = 1 }",
+        "equivalence_margin = 0.5",
+        "searchers = []",
+    ] {
+        assert!(text.contains(expected), "{expected}: {text}");
+    }
+    run(&["rehearse", "e", "--participants", "4", "--out", "f"]);
+    let said = run(&["analyze", "f", "--include", "simulated"]);
+    let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
+    for expected in [
+        "best minus reference over participants",
+        "Within the margin of ± 0.5",
+        "confirms, on participants who did not search",
+    ] {
+        assert!(said.contains(expected), "{expected}: {said}");
+    }
 }
 
 /// Each of several searches is confirmed by itself.

@@ -9,6 +9,7 @@ mod faults;
 mod golden;
 mod guessing;
 mod parts;
+mod proposals;
 mod reproduced;
 mod requeue;
 mod search;

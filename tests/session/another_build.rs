@@ -9,7 +9,7 @@ use std::fs;
 use std::path::Path;
 
 /// What shortens a protocol of the repository.
-const SHORT: [(&str, &str); 11] = [
+const SHORT: [(&str, &str); 12] = [
     PATIENT,
     ("max_attempts = 3", "max_attempts = 50"),
     ("repetitions = 3", "repetitions = 1"),
@@ -21,6 +21,7 @@ const SHORT: [(&str, &str); 11] = [
     ("min_s = 1, max_s = 6", "min_s = 0.2, max_s = 0.4"),
     ("min_s = 4", "min_s = 0.2"),
     ("trials = 60, start = 12", "trials = 8, start = 5"),
+    ("trials = 40, start = 8", "trials = 8, start = 5"),
 ];
 
 /// A short copy of a protocol of the repository.
@@ -61,6 +62,7 @@ fn it_writes_the_same_journals() {
         ("keyboard", &[]),
         ("yes-no", &[]),
         ("realism-search", &[]),
+        ("keyboard-search", &[]),
     ] {
         let home = tempfile::tempdir().unwrap();
         let protocol = home.path().join("protocol");

@@ -6,6 +6,7 @@ mod adjusting_channels;
 mod adjustment_by_keys;
 mod another_build;
 mod blinding;
+mod blinding_of_search;
 mod bridges;
 mod by_keys;
 mod channels;
@@ -37,6 +38,7 @@ mod ranking_by_keys;
 mod rehearsed;
 mod releases;
 mod screen;
+mod search_by_keys;
 mod similarity_by_keys;
 #[path = "../support/mod.rs"]
 mod support;

@@ -207,6 +207,10 @@ fn answers(page: &Value) -> Value {
 
 impl Session {
     fn start(folder: &Path, protocol: &Path, more: &[&str]) -> Self {
+        Self::start_for("P01", folder, protocol, more)
+    }
+
+    fn start_for(participant: &str, folder: &Path, protocol: &Path, more: &[&str]) -> Self {
         let mut child = Command::new(crate::support::program())
             .arg("run")
             .arg(protocol)
@@ -233,7 +237,7 @@ impl Session {
             }
         });
         let mut stdin = child.stdin.take().unwrap();
-        stdin.write_all(b"P01\nlw\n").unwrap();
+        write!(stdin, "{participant}\nlw\n").unwrap();
         let browser = Browser {
             address: address.to_owned(),
             ..Browser::default()
@@ -249,7 +253,17 @@ impl Session {
 
     /// With its page open.
     pub(crate) fn opened(folder: &Path, protocol: &Path, more: &[&str]) -> Self {
-        let mut session = Self::start(folder, protocol, more);
+        Self::opened_for("P01", folder, protocol, more)
+    }
+
+    /// The same of another participant than P01.
+    pub(crate) fn opened_for(
+        participant: &str,
+        folder: &Path,
+        protocol: &Path,
+        more: &[&str],
+    ) -> Self {
+        let mut session = Self::start_for(participant, folder, protocol, more);
         let token = session.token.clone();
         assert_eq!(session.browser.open(&token), 200);
         session

@@ -11,7 +11,7 @@
 //! sums run over chunks ([`Settings::chunk`]) in order.
 //!
 //! Parts of pairs and of tracks are simulated answer by answer, and decided by the analysis of
-//! such parts.
+//! such parts. A search decides nothing: of it is known how near the best point it comes ([`SearchPlan`]).
 
 mod decide;
 mod draw;
@@ -20,10 +20,12 @@ mod factors;
 mod factors_plan;
 mod part_plan;
 mod parts;
+mod perceivers;
 mod pilot;
 mod plan;
 mod precision;
 mod procedures;
+mod searches;
 mod simulate;
 mod tally;
 mod tracks;
@@ -31,10 +33,12 @@ mod tracks;
 pub use expected::{Floor, Reach, Smallest, candidates, closed, design, floor, reach, smallest};
 pub use factors::FactorsWorld;
 pub use parts::{PairsWorld, PartWorld};
+pub use perceivers::{Likes, Perceiver};
 pub use pilot::{Parameters, Pilot, PilotError};
 pub use plan::{LeftOut, Overrides, Pace, Plan, PlanError};
 pub use precision::{Estimates, Moments, Precision, Quality};
 pub use procedures::{Alternative, POOLED, alternatives};
+pub use searches::{Regret, SearchAsked, SearchPlan, SearchResult, utility_jnd};
 pub use simulate::{Progress, Unit};
 pub use tally::{CellResult, Chunk, Tally, TestResult, enough, merge, run_chunk};
 pub use tracks::{TrackWorld, TracksWorld, Truth};

@@ -13,7 +13,7 @@
 //! at nodes, and such a blend is refused. Outside its nodes a table keeps the parameters of
 //! its edge.
 
-use crate::model::{Branch, Elements, Provenance, Realization, Trained};
+use crate::model::{Branch, Elements, Mechanism, Provenance, Realization, Trained};
 use std::collections::BTreeMap;
 use study_wire::elements::Spring;
 use study_wire::predict::{Lookup, locate};
@@ -111,6 +111,22 @@ impl Family {
         Ok(Self { from, vary })
     }
 
+    /// The same of a mechanism, too: the detents with the constant force, the friction of the follower, both dampings, both masses.
+    /// Its margins are not concave in the level, so that the ends of a range say nothing of what is between: for levels that are
+    /// certified one by one, such as the points of a space.
+    ///
+    /// # Errors
+    /// [`FamilyError`] as [`Family::new`], and of a blend with a mechanism.
+    pub fn of_points(from: Realization, vary: Vary) -> Result<Self, FamilyError> {
+        if from.mechanism.is_none() {
+            return Self::new(from, vary);
+        }
+        if matches!(vary, Vary::Blend(_)) {
+            return Err(FamilyError::Mechanism);
+        }
+        Ok(Self { from, vary })
+    }
+
     /// The table of a level. It has the origin of the table that is varied, but no VAF.
     pub fn at(&self, level: f64) -> Realization {
         let scaled = |values: &[f64]| values.iter().map(|v| level * v).collect::<Vec<_>>();
@@ -128,6 +144,20 @@ impl Family {
             return Realization {
                 units,
                 ..Realization::of_elements(from.id, from.provenance, from.vaf, from.trained, varied)
+            };
+        }
+        if let Some(mechanism) = &from.mechanism {
+            let varied = mechanism_at(mechanism, &self.vary, level);
+            let units = from.units;
+            return Realization {
+                units,
+                ..Realization::of_mechanism(
+                    from.id,
+                    from.provenance,
+                    from.vaf,
+                    from.trained,
+                    varied,
+                )
             };
         }
         let (positive, negative) = (&from.positive, &from.negative);
@@ -237,6 +267,29 @@ fn elements_at(elements: &Elements, vary: &Vary, level: f64) -> Elements {
                 *value += level;
             }
         }
+    }
+    varied
+}
+
+/// A mechanism of a level.
+fn mechanism_at(mechanism: &Mechanism, vary: &Vary, level: f64) -> Mechanism {
+    let mut varied = mechanism.clone();
+    let scalars = &mut varied.scalars;
+    match vary {
+        Vary::Blend(_) => {}
+        Vary::Damping => {
+            scalars.follower_n_s_per_mm *= level;
+            scalars.handle_n_s_per_mm *= level;
+        }
+        Vary::Mass => {
+            scalars.handle_kg *= level;
+            scalars.follower_kg *= level;
+        }
+        Vary::Elastic => {
+            scalars.offset_n *= level;
+            varied.detent.n.iter_mut().for_each(|n| *n *= level);
+        }
+        Vary::Friction => varied.friction.n.iter_mut().for_each(|n| *n += level),
     }
     varied
 }

@@ -18,6 +18,7 @@ mod pairs;
 mod parts;
 mod rankings;
 mod rendering;
+mod searches;
 mod similarity;
 mod strips;
 mod subjects;

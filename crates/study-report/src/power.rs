@@ -9,6 +9,7 @@ mod paragraph;
 mod part;
 mod precision;
 mod procedures;
+mod searches;
 
 pub use figure::figure;
 pub use json::{document, own_design};
@@ -17,6 +18,7 @@ pub use page::{head, results};
 pub use paragraph::paragraph;
 pub use precision::{About, Wanted};
 pub use procedures::{Compared, compared, compared_document};
+pub use searches::{SearchReport, search_document, search_page};
 
 use super::apa;
 use study_analysis::power::{
@@ -270,7 +272,7 @@ fn left_out(left: &LeftOut) -> Vec<String> {
     }
     if !left.never.is_empty() {
         found.push(format!(
-            "the power of magnitude estimation, MUSHRA, identification, similarity, ranking, adjustment and searches is not computed: part {}",
+            "the power of magnitude estimation, MUSHRA, identification, similarity, ranking and adjustment is not computed: part {}",
             ids(&left.never)
         ));
     }

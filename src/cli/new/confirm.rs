@@ -18,11 +18,17 @@ use study_session::store::SessionData;
 /// The study, after its comment and before the device and the search.
 const PROTOCOL: &str = include_str!("confirm.toml");
 
+/// The same with ratings of both in place of ABX and pairs.
+const RATINGS: &str = include_str!("confirm-ratings.toml");
+
 /// What the template asks of pairs.
 const PROMPT: &str = "\"Which one felt more like a real switch?\"";
 
 /// How the intervals of the template are felt.
 const INTERVALS: [&str; 2] = ["gap_s = 1.0", "exposure = { min_s = 1, max_s = 6 }"];
+
+/// How a switch is felt that is rated.
+const RATED: &str = "exposure = { min_s = 2 }";
 
 /// What is to be confirmed, and the seed and the day of the confirmation.
 #[derive(Debug)]
@@ -31,6 +37,8 @@ pub(super) struct Asked<'a> {
     pub(super) include: Include,
     /// The part that searched, if there are several.
     pub(super) part: Option<&'a PartId>,
+    /// Whether the two are rated, and not compared.
+    pub(super) ratings: bool,
     /// The day.
     pub(super) today: &'a str,
     /// The seed.
@@ -109,11 +117,15 @@ pub(super) fn confirmation(
     refuse_unplayable(&study.loaded, space, &start)?;
     let pairs = explore::pairs_csv(search).map_err(Failure::input)?;
     let (confirmed, seed) = following((own.id.as_str(), own.seed), "confirmation", asked.seed);
-    let text = with_values(PROTOCOL, &confirmed, seed)?;
+    let template = if asked.ratings { RATINGS } else { PROTOCOL };
+    let text = with_values(template, &confirmed, seed)?;
     let part = protocol.part(&search.part);
+    // What a search asks of two is no question about one.
     let mut text = text.replacen(PROMPT, &prompt(protocol, part), 1);
-    for (before, after) in INTERVALS.iter().zip(part.map(intervals).iter().flatten()) {
-        text = text.replace(before, after);
+    if let Some([gap, exposure]) = part.map(intervals) {
+        text = text.replace(INTERVALS[0], &gap);
+        text = text.replace(INTERVALS[1], &exposure);
+        text = text.replace(RATED, &exposure);
     }
     let sections = format!(
         "{}\n{}",

@@ -48,7 +48,7 @@ pub(super) struct Assume {
     /// True mean of the hidden reference minus that of the best realization
     #[arg(long, value_name = "B", value_parser = finite, allow_hyphen_values = true)]
     reference: Option<f64>,
-    /// The part of pairs or tracks (default: the one with the primary question)
+    /// The part of pairs or tracks, or the search (default: the one with the primary question)
     #[arg(long, value_name = "PART")]
     part: Option<PartId>,
     /// Effects of factors and their sizes in points: friction=0.5,friction:detent=0.3
@@ -123,7 +123,7 @@ enum Tracked {
 /// A value that a flag cannot have.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
-struct FlagError(&'static str);
+pub(super) struct FlagError(&'static str);
 
 fn number(
     text: &str,
@@ -142,7 +142,7 @@ fn not_negative(text: &str) -> Result<f64, FlagError> {
     number(text, |x| x >= 0.0, "give a number, 0 or more")
 }
 
-fn positive(text: &str) -> Result<f64, FlagError> {
+pub(super) fn positive(text: &str) -> Result<f64, FlagError> {
     number(text, |x| x > 0.0, "give a number above 0")
 }
 
@@ -244,6 +244,13 @@ fn test(text: &str) -> Result<Test, FlagError> {
     ))
 }
 
+impl Assume {
+    /// The part that is meant, if one is named.
+    pub(super) fn part(&self) -> Option<&PartId> {
+        self.part.as_ref()
+    }
+}
+
 /// The plan of a protocol with these flags.
 pub(super) fn plan(
     protocol: &Protocol,
@@ -335,6 +342,9 @@ pub(super) fn failure(error: &PlanError) -> Failure {
         | PlanError::NoRatings(_)
         | PlanError::NoTracks
         | PlanError::NoThresholds(_) => "--part names one of [[parts]]",
+        PlanError::NotOfSearches(_) | PlanError::TooManyAnswers(_) => {
+            "docs/power.md says what is simulated of a search"
+        }
         _ => "the assumptions are flags, or keys of [power] in the protocol",
     };
     Failure::input(error).hint(hint)

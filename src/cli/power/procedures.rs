@@ -14,7 +14,7 @@ pub(super) struct Compare {
     /// Procedures to compare by what a minute tells: own, staircase, quest+, constant
     #[arg(long, value_name = "RULE,…", value_delimiter = ',', value_parser = procedure, conflicts_with_all = ["closed", "shards", "merge", "slurm"])]
     procedure: Vec<Procedure>,
-    /// Numbers of trials of each track to compare
+    /// Numbers of trials of each track, or of answers of a search, to compare
     #[arg(long, value_name = "N,…", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(5..=10_000), conflicts_with_all = ["closed", "shards", "merge", "slurm"])]
     trials: Vec<u32>,
     /// Precision that is wanted, half the 95 % interval: participant=1.5, mean=1.2, contrast=1.3 as
@@ -47,6 +47,16 @@ impl Compare {
     /// Whether procedures or numbers of trials are compared.
     pub(super) fn is_asked(&self) -> bool {
         !self.procedure.is_empty() || !self.trials.is_empty()
+    }
+
+    /// Whether something is asked that only tracks have.
+    pub(super) fn is_of_tracks(&self) -> bool {
+        !self.procedure.is_empty() || !self.precision.is_empty()
+    }
+
+    /// Numbers of trials.
+    pub(super) fn trials(&self) -> &[u32] {
+        &self.trials
     }
 
     /// The precisions that are wanted of a plan.

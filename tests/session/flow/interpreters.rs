@@ -6,6 +6,7 @@ use super::part_rig::{
     adjustment, beside_a_reference, identification, pairs, ranking, read, similarity, track,
 };
 use super::rig::{DeviceMood, Rig, StoreMood};
+use super::search::searching;
 use super::studies::{MODELS, PRACTICE, question, rich};
 use crate::kinds::questions;
 use serde_json::{Value, json};
@@ -61,6 +62,7 @@ repetitions = 1
         similarity("identical = true\npractice = 2"),
         ranking("ties = true\npractice = 1\nrepetitions = 2\nexposure = { replays = 1 }"),
         adjustment("standard = 2.0\npractice = 1"),
+        searching(r#"{ name = "preference-gp", trials = 5, start = 3 }"#),
     ]
 }
 

@@ -10,7 +10,7 @@ use study_session::outcome::{Choice, Entry, Event};
 use study_session::session::{Ending, Input, Screen};
 use study_session::store::{Frozen, StudyFolder};
 
-fn searching(rule: &str) -> Protocol {
+pub(super) fn searching(rule: &str) -> Protocol {
     let parsed = study_plan::protocol::file::parse(
         "p",
         &format!(
@@ -136,6 +136,23 @@ fn a_search_after_a_fault_a_bad_trial_and_a_resume_is_the_one_without() {
         let mut rig = Rig::back(protocol.clone(), rig.journal.clone(), 60.0);
         end(&mut rig, &protocol);
         assert_eq!(compared(&rig, &protocol), expected, "{rule}");
+    }
+}
+
+/// The program ends after any event, and another one, which knows nothing but the journal, goes on: it proposes the pairs that
+/// would have come.
+#[test]
+fn a_search_is_picked_up_after_every_single_event() {
+    let protocol = searching(MODEL);
+    let mut calm = Rig::new(protocol.clone());
+    end(&mut calm, &protocol);
+    let expected = compared(&calm, &protocol);
+    for k in 1..calm.journal.len() {
+        let journal = &calm.journal[..k];
+        let mut rig = Rig::back(protocol.clone(), journal.to_vec(), 30.0);
+        end(&mut rig, &protocol);
+        assert_eq!(rig.journal[..k], *journal, "append only");
+        assert_eq!(compared(&rig, &protocol), expected, "after {k} events");
     }
 }
 

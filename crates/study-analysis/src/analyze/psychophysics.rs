@@ -11,6 +11,7 @@ pub(crate) mod decided;
 mod detection;
 mod discriminations;
 mod excluded;
+mod explored;
 mod findings;
 mod fits;
 mod identification;

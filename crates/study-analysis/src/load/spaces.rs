@@ -142,7 +142,7 @@ fn built(from: &Realization, axes: &[Axis]) -> Result<Vec<Realization>, FamilyEr
                 Vary::Detent => family::Vary::Elastic,
                 Vary::Friction => family::Vary::Friction,
             };
-            let family = Family::new(table, vary)?;
+            let family = Family::of_points(table, vary)?;
             longer.extend(axis.levels.levels().iter().map(|level| family.at(*level)));
         }
         Ok(longer)
@@ -293,6 +293,43 @@ mod tests {
     use super::Judged;
     use crate::load::{Purpose, load_begun, load_frozen, open};
     use std::fs;
+
+    /// The detents and the friction of a mechanism are searched as those of a table.
+    #[test]
+    fn a_mechanism_is_varied_point_by_point() {
+        let folder = tempfile::tempdir().unwrap();
+        let repository = concat!(env!("CARGO_MANIFEST_DIR"), "/../../");
+        fs::create_dir(folder.path().join("models")).unwrap();
+        let file = "models/mechanism.toml";
+        let from = format!("{repository}protocols/turn-signal-passive/{file}");
+        fs::copy(from, folder.path().join(file)).unwrap();
+        let text = fs::read_to_string(format!("{repository}src/cli/new/search.toml")).unwrap();
+        let axes = "detent = [0.4, 1.2], friction = [0.0, 1.6]";
+        assert!(text.contains(axes));
+        let text = text
+            .replace(axes, "detent = [0.8, 1.0], friction = [0.0, 0.2]")
+            .replace("models/static.toml", file)
+            .replace("grid = 9", "grid = 3");
+        let path = folder.path().join("protocol.toml");
+        fs::write(&path, text).unwrap();
+        let loaded = load_frozen(&path).unwrap();
+        let space = &loaded.protocol.spaces[0];
+        let start = loaded.start_of(space).unwrap();
+        // Of detent 0.8, 0.9, 1 and friction 0, 0.1, 0.2: the last detent without friction.
+        let same = &loaded.levels[&space.realization(6)];
+        assert!(same.is_alike(&start));
+        let before = start.mechanism.as_ref().unwrap();
+        assert!(space.lattice.certified().len() >= 3);
+        for point in space.lattice.certified() {
+            let table = &loaded.levels[&space.realization(*point)];
+            let levels = space.levels(*point);
+            let varied = table.mechanism.as_ref().unwrap();
+            let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a}, {b}");
+            near(varied.detent.n[7], levels[0] * before.detent.n[7]);
+            near(varied.friction.n[7], levels[1] + before.friction.n[7]);
+            assert_eq!(varied.scalars.handle_kg, before.scalars.handle_kg);
+        }
+    }
 
     /// With damping, the strongest points of the template need more than 12 N in motion, and none does at rest.
     #[test]

@@ -4,6 +4,7 @@ use super::{Assumptions, Cell, Pilot, Scale, Settings, Test, Vaf};
 use crate::analyze::ALPHA;
 use study_base::text::{PartId, QuestionId, Untrusted};
 use study_plan::procedure::ProcedureError;
+use study_plan::procedure::search::MAX_TRIALS;
 use study_plan::protocol::parts::Task;
 use study_plan::protocol::power::{PowerPlan, PowerScale};
 use study_plan::protocol::procedures::Procedure;
@@ -50,6 +51,15 @@ pub enum PlanError {
          magnitude estimation, MUSHRA, identification, similarity, ranking and adjustment; a search has no test"
     )]
     NoPower(PartId),
+    /// Assumptions that a search does not have.
+    #[error(
+        "the part `{0}` is a search, of which only the number of perceivers (--studies), --targets, --trials, --jnd and \
+         --best are stated"
+    )]
+    NotOfSearches(PartId),
+    /// More answers than a search can have.
+    #[error("a search has at most {MAX_TRIALS} trials, not {0}")]
+    TooManyAnswers(u32),
     /// A pilot of ratings for another part.
     #[error("a pilot has estimates for ratings, not for part `{0}`: state its assumptions")]
     PilotOfPart(PartId),
@@ -180,7 +190,7 @@ pub struct LeftOut {
     pub sessions: bool,
     /// Other parts that can be simulated.
     pub parts: Vec<PartId>,
-    /// Parts of magnitude estimation, MUSHRA, identification, similarity, ranking, adjustment and search.
+    /// Parts of magnitude estimation, MUSHRA, identification, similarity, ranking and adjustment.
     pub never: Vec<PartId>,
 }
 
@@ -197,11 +207,12 @@ impl LeftOut {
             .filter(|part| Some(&part.id) != simulated)
         {
             match part.task {
-                Task::Pairs(_) | Task::Discrimination { .. } => found.parts.push(part.id.clone()),
+                Task::Pairs(_) | Task::Discrimination { .. } | Task::Search(_) => {
+                    found.parts.push(part.id.clone());
+                }
                 Task::Magnitude(_)
                 | Task::Mushra(_)
                 | Task::Identification(_)
-                | Task::Search(_)
                 | Task::Similarity(_)
                 | Task::Ranking(_)
                 | Task::Adjustment(_) => {

@@ -8,6 +8,7 @@ use super::functions::{
 };
 use super::identification::confusions;
 use super::rankings::worths;
+use super::searches::search_map;
 use super::similarity::map;
 use super::thresholds::{by_conditions, by_participant};
 use super::weber::webers_law;
@@ -41,6 +42,7 @@ pub fn of_part(number: usize, part: &PartAnalysis) -> Vec<Drawn> {
         map(&name("map"), part),
         worths(&name("worths"), part),
         settings(&name("settings"), part),
+        search_map(&name("search"), part),
     ];
     let note = match (part.simulated, part.pilot) {
         (true, _) => Some("includes simulated data"),

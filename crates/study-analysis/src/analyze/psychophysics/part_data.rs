@@ -1,5 +1,6 @@
 //! What the parts of a study are analyzed from, and what is found of one.
 
+use super::explored::Exploration;
 use super::findings::PartFinding;
 use super::identification::OwnConfusions;
 use super::over_participants::Measured;
@@ -100,6 +101,8 @@ pub struct PartData {
     pub measured: Vec<Measured>,
     /// After what a questionnaire was asked between the trials.
     pub between: Option<Occasion>,
+    /// What a search found.
+    pub exploration: Option<Exploration>,
 }
 
 /// Positive answers of one participant in one condition.

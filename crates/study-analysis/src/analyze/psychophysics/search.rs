@@ -1,13 +1,15 @@
 //! What the searches of a study found: maps, and no test. A search decides nothing, because its pairs were chosen by the
 //! answers before them.
 
+pub use super::explored::{Exploration, Explored, ExploredPair, Population};
+
 use super::counting::Counting;
+use super::explored::by_participant;
 use super::part_data::{Intervals, StudyData};
 use crate::analyze::Rules;
-use crate::analyze::exclude::Applied;
 use crate::analyze::select::Include;
-use std::collections::{BTreeMap, BTreeSet};
-use study_base::text::{PartId, ParticipantId};
+use std::collections::BTreeSet;
+use study_base::text::ParticipantId;
 use study_plan::procedure::search::RecordedPair;
 use study_plan::protocol::{Answer, Part, SpaceRules};
 use study_session::outcome::fold::History;
@@ -15,113 +17,43 @@ use study_session::outcome::{FormId, RatingRow};
 use study_stats::describe::{mean, sd};
 use study_stats::preference_gp::Posterior;
 
-/// What a part that searches found.
-#[derive(Debug, Clone)]
-pub struct Exploration {
-    /// The part.
-    pub part: PartId,
-    /// Its space. Values below are those of its certified points, in their order.
-    pub space: SpaceRules,
-    /// The sessions that count, in their order. Two of the same participant are two searches.
-    pub searches: Vec<Explored>,
-    /// All of them together; `None` with fewer than two.
-    pub population: Option<Population>,
-    /// Whether pilots are among them.
-    pub pilot: bool,
-    /// Whether simulated participants are among them.
-    pub simulated: bool,
-    /// The effect of each preregistered exclusion rule.
-    pub exclusions: Vec<Applied>,
-}
-
-impl Exploration {
-    /// How many participants there are, of whom some may have searched in several sessions.
-    pub fn people(&self) -> usize {
-        by_participant(&self.searches).len()
-    }
-
-    /// Index of the best point: that of all together, or of the only search.
-    pub fn best(&self) -> Option<usize> {
-        let of_all = self.population.as_ref().map(|all| all.best);
-        of_all.or_else(|| self.searches.first().map(|own| own.best))
-    }
-}
-
-/// The search of one participant in one session.
-#[derive(Debug, Clone)]
-pub struct Explored {
-    /// Participant.
-    pub participant: ParticipantId,
-    /// Session, from 1.
-    pub session: u32,
-    /// Whether it is a pilot's.
-    pub pilot: bool,
-    /// Whether it is a simulated participant's.
-    pub simulated: bool,
-    /// The pairs in the order in which they were presented, with the corrected answers.
-    pub pairs: Vec<ExploredPair>,
-    /// Points that were left out because the device failed at them, from 0.
-    pub left_out: Vec<usize>,
-    /// The posterior mean of the utility of each point, in units of the noise of one impression, minus its mean over the
-    /// points: only differences of utilities are known.
-    pub mean: Vec<f64>,
-    /// The posterior standard deviation of that difference.
-    pub sd: Vec<f64>,
-    /// Index of the point with the largest mean, of those that were not left out.
-    pub best: usize,
-}
-
-/// A pair that was presented.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ExploredPair {
-    /// Trial of the session.
-    pub trial: u32,
-    /// Its two points, the lower number first.
-    pub points: [usize; 2],
-    /// The one that was preferred; `None` if that was declined.
-    pub preferred: Option<usize>,
-}
-
-/// The maps of several searches together. Each participant counts alike, however certain their map is; that of somebody with
-/// several sessions is the mean of them.
-#[derive(Debug, Clone)]
-pub struct Population {
-    /// Mean over the participants' maps.
-    pub mean: Vec<f64>,
-    /// Standard deviation between the participants' maps; between the sessions of the only one.
-    pub sd: Vec<f64>,
-    /// Index of the point with the largest mean, of those that were not left out in any search.
-    pub best: usize,
-}
-
 /// The explorations of all parts that search. Which participants and trials count is decided as for all parts.
 pub fn explorations(study: &StudyData<'_>, include: Include) -> Vec<Exploration> {
+    let parts = study.protocol.parts.iter();
+    parts
+        .filter_map(|part| exploration(study, part, include))
+        .collect()
+}
+
+/// The exploration of a part; `None` of one that does not search.
+pub(super) fn exploration(
+    study: &StudyData<'_>,
+    part: &Part,
+    include: Include,
+) -> Option<Exploration> {
+    let (space, _) = study.protocol.searched(part)?;
     let counting = Counting::of(study, include);
     let rows = study.rows.iter().filter(|row| counting.row(row));
     let rows: Vec<&RatingRow> = rows.collect();
     let intervals = Intervals::of(study.intervals);
     let rules = Rules::of(study.protocol, "", include);
-    let explore = |part: &Part| {
-        let (space, _) = study.protocol.searched(part)?;
-        let of_part = Counting::of_part(study, part, &rows, &intervals, &rules.exclude);
-        let kept: BTreeSet<_> = of_part.kept.iter().map(|row| key(row)).collect();
-        let excluded = of_part.all.iter().map(|row| key(row));
-        let excluded: BTreeSet<_> = excluded.filter(|key| !kept.contains(key)).collect();
-        let searches: Vec<Explored> = (study.sessions.iter())
-            .filter(|history| counting.session(history))
-            .filter_map(|history| explored(study, part, history, &excluded))
-            .collect();
-        Some(Exploration {
-            part: part.id.clone(),
-            space: space.clone(),
-            population: population(space, &searches),
-            pilot: searches.iter().any(|own| own.pilot),
-            simulated: searches.iter().any(|own| own.simulated),
-            searches,
-            exclusions: of_part.exclusions,
-        })
-    };
-    study.protocol.parts.iter().filter_map(explore).collect()
+    let of_part = Counting::of_part(study, part, &rows, &intervals, &rules.exclude);
+    let kept: BTreeSet<_> = of_part.kept.iter().map(|row| key(row)).collect();
+    let excluded = of_part.all.iter().map(|row| key(row));
+    let excluded: BTreeSet<_> = excluded.filter(|key| !kept.contains(key)).collect();
+    let searches: Vec<Explored> = (study.sessions.iter())
+        .filter(|history| counting.session(history))
+        .filter_map(|history| explored(study, part, history, &excluded))
+        .collect();
+    Some(Exploration {
+        part: part.id.clone(),
+        space: space.clone(),
+        population: population(space, &searches),
+        pilot: searches.iter().any(|own| own.pilot),
+        simulated: searches.iter().any(|own| own.simulated),
+        searches,
+        exclusions: of_part.exclusions,
+    })
 }
 
 /// Participant, session and trial.
@@ -219,15 +151,6 @@ fn centered(posterior: &Posterior) -> (Vec<f64>, Vec<f64>) {
     )
 }
 
-/// The searches of each participant.
-fn by_participant(searches: &[Explored]) -> BTreeMap<&ParticipantId, Vec<&Explored>> {
-    let mut own: BTreeMap<_, Vec<&Explored>> = BTreeMap::new();
-    for search in searches {
-        own.entry(&search.participant).or_default().push(search);
-    }
-    own
-}
-
 fn population(space: &SpaceRules, searches: &[Explored]) -> Option<Population> {
     let points = searches.iter().map(|own| own.mean.len()).min()?;
     let of_search = |own: &Explored| own.mean.clone();
@@ -273,6 +196,7 @@ fn population(space: &SpaceRules, searches: &[Explored]) -> Option<Population> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use study_base::text::PartId;
     use study_plan::procedure::{Ladder, Lattice};
     use study_plan::protocol::{Axis, Vary};
     use study_stats::preference_gp::{Choice, Kernel};

@@ -19,6 +19,7 @@ use super::part_data::{
 use super::preferences::{Choice, Preference, Preferences, in_both_orders, preferences};
 use super::questionnaires::of_questionnaires;
 use super::results::PartResults;
+use super::search::exploration;
 use super::sequential::{self, sequential_effects};
 use super::trials::Asked;
 use crate::analyze::Rules;
@@ -58,6 +59,7 @@ pub fn parts(study: &StudyData<'_>, include: Include) -> Vec<PartAnalysis> {
         } = Counting::of_part(study, part, &rows, &intervals, &rules.exclude);
         let found = |rows: &[&RatingRow]| of_part_task(study, part, rows, &intervals, &rules);
         let mut own = found(&rows)?;
+        own.data.exploration = exploration(study, part, include);
         if rows.len() < all.len() {
             own.results.before_exclusion = Some(found(&all)?.results.before_exclusion());
         }
