@@ -314,7 +314,8 @@ impl Runner {
             }),
             Ok((claimed, journal)) => {
                 self.took_time();
-                self.saver = Some(Saver::new(claimed.folder, journal, self.setup.threaded));
+                let saving = self.setup.saving.clone();
+                self.saver = Some(Saver::new(claimed.folder, journal, saving));
                 let identity = self.setup.device.identity();
                 Input::Claimed(Box::new(Claim {
                     participant,

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use study::runner::clock::{Clock as _, VirtualClock};
 use study::runner::rehearsal::first_day;
+use study::runner::saver::Saving;
 use study::runner::{Operator, OperatorError, Runner, Setup};
 use study_analysis::load::load;
 use study_device::virtual_device::{Options, VirtualDevice};
@@ -96,7 +97,7 @@ fn sitting(
         device_check: None,
         self_weighed: None,
         clock: Box::new(clock),
-        threaded: false,
+        saving: Saving::Loop,
     };
     let config = Config {
         participant: "P01".to_owned(),
