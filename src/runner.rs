@@ -105,7 +105,7 @@ pub struct Runner {
     /// When the session is told that the table is loaded.
     loaded_due: Option<Duration>,
     /// When the last turn of the loop began.
-    turned: Duration,
+    turned: Moment,
     /// When the device last reported about the current playback.
     last_report: Option<Duration>,
     /// The code on the physical sample of each realization.
@@ -143,7 +143,7 @@ impl Runner {
             load_began: Duration::ZERO,
             slot: None,
             loaded_due: None,
-            turned: Duration::ZERO,
+            turned: at,
             last_report: None,
             codes,
             limits,
