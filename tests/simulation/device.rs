@@ -50,7 +50,7 @@ impl SimDevice {
         (faults, uneven): (f64, f64),
     ) -> Self {
         let mut options = Options::seeded(seed);
-        options.device.servo_hz = 500.0;
+        options.device.servo_hz = 2000.0;
         options.device.telemetry_hz = 50.0;
         options.faults = FaultPlan::random(seed, faults);
         options.noise = Noise {
