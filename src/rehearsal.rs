@@ -7,6 +7,7 @@ use crate::rater::{Effect, Percepts, Rater};
 use crate::runner::Setup;
 use crate::runner::clock::{Clock as _, VirtualClock};
 use crate::runner::rehearsal::{RehearsalError, first_day, run_one};
+use crate::runner::saver::Saving;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -183,7 +184,7 @@ pub fn rehearse(
                 device_check: None,
                 self_weighed: None,
                 clock: Box::new(clock.clone()),
-                threaded: false,
+                saving: Saving::Loop,
             };
             run_one(setup, &id, &clock, &mut rater, &percepts)?;
         }

@@ -105,7 +105,7 @@ pub struct Runner {
     /// When the session is told that the table is loaded.
     loaded_due: Option<Duration>,
     /// When the last turn of the loop began.
-    turned: Duration,
+    turned: Moment,
     /// When the device last reported about the current playback.
     last_report: Option<Duration>,
     /// The code on the physical sample of each realization.
@@ -145,7 +145,7 @@ impl Runner {
             load_began: Duration::ZERO,
             slot: None,
             loaded_due: None,
-            turned: Duration::ZERO,
+            turned: at,
             last_report: None,
             codes,
             limits,
@@ -322,7 +322,8 @@ impl Runner {
             }),
             Ok((claimed, journal)) => {
                 self.took_time();
-                self.saver = Some(Saver::new(claimed.folder, journal, self.setup.threaded));
+                let saving = self.setup.saving.clone();
+                self.saver = Some(Saver::new(claimed.folder, journal, saving));
                 let identity = self.setup.device.identity();
                 Input::Claimed(Box::new(Claim {
                     participant,

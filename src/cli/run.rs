@@ -14,6 +14,7 @@ use super::{Console, Failure, Kind, study_folder};
 use crate::plain::Plain;
 use crate::runner::beside::{Beside, Own};
 use crate::runner::clock::{Clock, HurriedClock, RealClock};
+use crate::runner::saver::Saving;
 use crate::runner::{Operator, Runner, Setup};
 use crate::screen::Address;
 use crate::tui::{self, Tui};
@@ -236,7 +237,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         self_weighed: examined.self_weighed,
         device,
         clock,
-        threaded: true,
+        saving: Saving::Thread,
     };
     let config = Config {
         participant: args.participant.clone().unwrap_or_default(),

@@ -8,6 +8,7 @@
 //! the journal says so: no answer waits for it.
 
 use std::collections::VecDeque;
+use std::rc::Rc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -56,6 +57,20 @@ pub enum SaveEvent {
     Left(Receipt),
 }
 
+/// Who runs the saver of a session, and when.
+#[derive(Clone)]
+pub enum Saving {
+    /// A thread of its own.
+    Thread,
+    /// The loop of the session: every event is on disk before the next input, as a rehearsal on a
+    /// virtual clock requires.
+    Loop,
+    /// The loop of the session, in turns that a scheduler gives, so that saving takes time on a
+    /// virtual clock: it is told how many jobs wait, and says how many are done now. A turn is
+    /// what the thread does without waiting for another job.
+    Turns(Rc<dyn Fn(usize) -> usize>),
+}
+
 /// The saver of one session; holds the lock of its folder.
 pub struct Saver {
     mode: Mode,
@@ -72,6 +87,11 @@ enum Mode {
         handle: JoinHandle<()>,
         /// Whether the premature end of the thread has been reported.
         reported: bool,
+    },
+    Turns {
+        worker: Box<Worker>,
+        waiting: VecDeque<Job>,
+        turns: Rc<dyn Fn(usize) -> usize>,
     },
 }
 
@@ -111,8 +131,8 @@ struct Unsaved {
 }
 
 impl Saver {
-    /// A saver for a claimed folder, on its own thread or on that of the caller.
-    pub fn new(folder: SessionFolder, journal: Journal, threaded: bool) -> Self {
+    /// A saver for a claimed folder.
+    pub fn new(folder: SessionFolder, journal: Journal, saving: Saving) -> Self {
         let mut worker = Box::new(Worker {
             folder,
             journal,
@@ -122,36 +142,37 @@ impl Saver {
             unsaved: VecDeque::new(),
             broken: false,
         });
-        let mode = if threaded {
-            let (jobs, queue) = channel();
-            let (send, events) = channel();
-            let handle = std::thread::spawn(move || {
-                while let Ok(job) = queue.recv() {
-                    let mut events = worker.work(job);
-                    for job in queue.try_iter() {
-                        events.extend(worker.work(job));
+        let mode = match saving {
+            Saving::Thread => {
+                let (jobs, queue) = channel();
+                let (send, events) = channel();
+                let handle = std::thread::spawn(move || {
+                    while let Ok(job) = queue.recv() {
+                        for event in worker.turn(std::iter::once(job).chain(queue.try_iter())) {
+                            // The work goes on even if the session loop has ended.
+                            let _ = send.send(event);
+                        }
                     }
-                    events.extend(worker.save());
-                    for event in events {
-                        // The work goes on even if the session loop has ended.
+                    for event in worker.finish() {
                         let _ = send.send(event);
                     }
+                });
+                Mode::Thread {
+                    jobs,
+                    events,
+                    handle,
+                    reported: false,
                 }
-                for event in worker.finish() {
-                    let _ = send.send(event);
-                }
-            });
-            Mode::Thread {
-                jobs,
-                events,
-                handle,
-                reported: false,
             }
-        } else {
-            Mode::Inline {
+            Saving::Loop => Mode::Inline {
                 worker,
                 events: Vec::new(),
-            }
+            },
+            Saving::Turns(turns) => Mode::Turns {
+                worker,
+                waiting: VecDeque::new(),
+                turns,
+            },
         };
         Self { mode }
     }
@@ -165,6 +186,7 @@ impl Saver {
                 // nothing is shown as saved.
                 let _ = jobs.send(job);
             }
+            Mode::Turns { waiting, .. } => waiting.push_back(job),
         }
     }
 
@@ -188,6 +210,14 @@ impl Saver {
                 }
                 new
             }
+            Mode::Turns {
+                worker,
+                waiting,
+                turns,
+            } => match given(&**turns, waiting) {
+                0 => Vec::new(),
+                jobs => worker.turn(waiting.drain(..jobs)),
+            },
         }
     }
 
@@ -215,12 +245,43 @@ impl Saver {
                 }
                 events.try_iter().collect()
             }
+            Mode::Turns {
+                mut worker,
+                mut waiting,
+                turns,
+            } => {
+                let mut events = Vec::new();
+                while !waiting.is_empty() {
+                    match given(&*turns, &waiting) {
+                        // A disk that does not answer.
+                        0 => return events,
+                        jobs => events.extend(worker.turn(waiting.drain(..jobs))),
+                    }
+                }
+                events.extend(worker.finish());
+                events
+            }
         }
     }
 }
 
+/// How many of the jobs that wait are done now.
+fn given(turns: &dyn Fn(usize) -> usize, waiting: &VecDeque<Job>) -> usize {
+    match waiting.len() {
+        0 => 0,
+        jobs => turns(jobs).min(jobs),
+    }
+}
+
 impl Worker {
-    /// Does a job; [`Worker::save`] must follow.
+    /// Does jobs, and writes their events together.
+    fn turn(&mut self, jobs: impl Iterator<Item = Job>) -> Vec<SaveEvent> {
+        let mut events: Vec<SaveEvent> = jobs.flat_map(|job| self.work(job)).collect();
+        events.extend(self.save());
+        events
+    }
+
+    /// Does a job; [`Self::save`] must follow.
     fn work(&mut self, job: Job) -> Vec<SaveEvent> {
         match job {
             Job::Append(at, event) => {

@@ -1,6 +1,7 @@
 //! What a session needs.
 
 use super::clock::Clock;
+use super::saver::Saving;
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 use std::sync::Arc;
@@ -44,7 +45,6 @@ pub struct Setup {
     pub self_weighed: Option<SelfWeighed>,
     /// The clock.
     pub clock: Box<dyn Clock>,
-    /// Whether a thread saves. Without it every event is on disk before the next input,
-    /// as a rehearsal on a virtual clock requires.
-    pub threaded: bool,
+    /// Who saves.
+    pub saving: Saving,
 }

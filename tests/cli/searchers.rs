@@ -11,6 +11,7 @@ use study::rater::{Effect, Percepts, Rater};
 use study::runner::Setup;
 use study::runner::clock::{Clock as _, VirtualClock};
 use study::runner::rehearsal::{first_day, run_one};
+use study::runner::saver::Saving;
 use study_analysis::load;
 use study_base::text::ParticipantId;
 use study_device::virtual_device::{Options, VirtualDevice};
@@ -46,7 +47,7 @@ fn took_part(protocol: &Path, results: &Path, kind: SeatKind, people: &[&str]) {
             device_check: None,
             self_weighed: None,
             clock: Box::new(clock.clone()),
-            threaded: false,
+            saving: Saving::Loop,
         };
         let mut rater = Rater::new(7, number as u32, Effect::BuiltIn);
         run_one(setup, who, &clock, &mut rater, &percepts).unwrap();

@@ -9,6 +9,7 @@ use std::time::Duration;
 use study::rater::{Effect, Percepts, Rater};
 use study::runner::clock::{Clock as _, VirtualClock};
 use study::runner::rehearsal::{first_day, run_one};
+use study::runner::saver::Saving;
 use study::runner::{Setup, playback_limits};
 use study_base::limits::{Limit, Limits};
 use study_base::text::QuestionId;
@@ -153,7 +154,7 @@ fn session(falls_silent: bool) -> (Vec<Load>, Vec<serde_json::Value>) {
         device_check: None,
         self_weighed: None,
         clock: Box::new(clock.clone()),
-        threaded: false,
+        saving: Saving::Loop,
     };
     let mut rater = Rater::new(1, 1, Effect::None);
     run_one(setup, "SIM001", &clock, &mut rater, &Percepts::default()).unwrap();

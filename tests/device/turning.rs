@@ -7,6 +7,7 @@ use study::rater::{Effect, Percepts, Rater};
 use study::runner::Setup;
 use study::runner::clock::{Clock as _, VirtualClock};
 use study::runner::rehearsal::{first_day, run_one};
+use study::runner::saver::Saving;
 use study_analysis::load;
 use study_device::firmware::{Wrong, WrongLoads};
 use study_device::virtual_device::{Options, VirtualDevice};
@@ -55,7 +56,7 @@ fn session(
         device_check: None,
         self_weighed,
         clock: Box::new(clock.clone()),
-        threaded: false,
+        saving: Saving::Loop,
     };
     let mut rater = Rater::new(3, 1, Effect::BuiltIn);
     run_one(setup, "SIM001", &clock, &mut rater, &percepts).unwrap();

@@ -11,6 +11,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use study::runner::clock::{Clock, VirtualClock};
 use study::runner::rehearsal::first_day;
+use study::runner::saver::Saving;
 use study::runner::{Runner, Setup};
 use study::tui::{ColorDepth, Surface};
 use study_analysis::load::{Loaded, load};
@@ -112,7 +113,7 @@ pub(crate) fn session_by(
         self_weighed: None,
         deliveries: Default::default(),
         clock: reads(clock.clone()),
-        threaded: false,
+        saving: Saving::Loop,
     };
     let config = Config {
         participant: "P01".to_owned(),

@@ -9,6 +9,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 use study::runner::clock::VirtualClock;
+use study::runner::saver::Saving;
 use study::runner::{Ended, Runner, Setup};
 use study_device::manual::Manual;
 use study_plan::protocol::{Answer, Consent, DeviceKind};
@@ -110,7 +111,7 @@ fn session_of(mut kept: Kept, from: usize, leave: &Input) -> Option<Session> {
         device_check: None,
         self_weighed: None,
         clock: Box::new(clock.clone()),
-        threaded: false,
+        saving: Saving::Loop,
     };
     let config = Config {
         participant: "P01".to_owned(),

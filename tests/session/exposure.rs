@@ -2,16 +2,19 @@
 
 use crate::memory::MemoryDisk;
 use crate::support::repository;
+use std::cell::Cell;
 use std::path::Path;
+use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
-use study::runner::clock::{Clock as _, VirtualClock};
+use study::runner::clock::{Clock, VirtualClock};
 use study::runner::rehearsal::first_day;
+use study::runner::saver::Saving;
 use study::runner::{Operator, OperatorError, Runner, Setup};
 use study_analysis::load::load;
 use study_device::virtual_device::{Options, VirtualDevice};
-use study_plan::protocol::{DeviceKind, Exposure};
-use study_session::outcome::{Channel, Event, Failure};
+use study_plan::protocol::{Answer, DeviceKind, Exposure};
+use study_session::outcome::{Channel, Event, Failure, Moment};
 use study_session::session::{Config, Input, Screen, View};
 use study_session::store::{Frozen, SeatKind, StudyFolder};
 
@@ -39,7 +42,7 @@ impl Operator for Patient {
             }
             Screen::Form { questions, .. } if self.rated < 3 => {
                 self.rated += 1;
-                let answer = study_plan::protocol::Answer::Rating(4);
+                let answer = Answer::Rating(4);
                 vec![Input::Answer(vec![(questions[0].id.clone(), answer)])]
             }
             Screen::Form { .. } => vec![Input::Quit],
@@ -63,7 +66,7 @@ fn session(exposure: Exposure, clock: VirtualClock, operator: &mut dyn Operator)
 fn sitting(
     disk: &MemoryDisk,
     exposure: Exposure,
-    clock: VirtualClock,
+    clock: impl Clock + 'static,
     operator: &mut dyn Operator,
 ) -> Vec<Event> {
     let mut loaded = load(Path::new(&repository("protocols/turn-signal"))).unwrap();
@@ -96,7 +99,7 @@ fn sitting(
         device_check: None,
         self_weighed: None,
         clock: Box::new(clock),
-        threaded: false,
+        saving: Saving::Loop,
     };
     let config = Config {
         participant: "P01".to_owned(),
@@ -253,4 +256,72 @@ fn a_rating_waits_no_longer_than_a_pause_may_be_while_the_program_stands_still()
     assert_eq!(felt_again_after(Duration::ZERO), 0);
     assert_eq!(felt_again_after(Duration::from_secs(15)), 0);
     assert_eq!(felt_again_after(Duration::from_secs(25)), 1);
+}
+
+/// The clock of a computer whose monotonic clock stands still while it is suspended.
+#[derive(Clone)]
+struct Suspendable {
+    clock: VirtualClock,
+    asleep: Rc<Cell<Duration>>,
+}
+
+impl Clock for Suspendable {
+    fn now(&self) -> Moment {
+        let at = self.clock.now();
+        let asleep_ns = u64::try_from(self.asleep.get().as_nanos()).unwrap();
+        Moment {
+            mono_ns: at.mono_ns - asleep_ns,
+            ..at
+        }
+    }
+}
+
+/// Somebody whose computer is suspended at the first rating, and who rates on waking it up.
+struct Awoken {
+    patient: Patient,
+    asleep: Rc<Cell<Duration>>,
+}
+
+impl Operator for Awoken {
+    fn next(&mut self, view: &View, timeout: Duration) -> Result<Vec<Input>, OperatorError> {
+        if matches!(view.screen, Screen::Form { .. }) && self.asleep.get().is_zero() {
+            let asleep = Duration::from_secs(100);
+            self.patient.clock.advance(asleep);
+            self.asleep.set(asleep);
+        }
+        self.patient.next(view, timeout)
+    }
+}
+
+#[test]
+fn a_rating_on_waking_up_is_not_about_what_was_felt_before() {
+    let clock = Suspendable {
+        clock: VirtualClock::starting_at(first_day()),
+        asleep: Rc::default(),
+    };
+    let mut operator = Awoken {
+        patient: Patient {
+            clock: clock.clock.clone(),
+            left_s: Vec::new(),
+            rated: 0,
+        },
+        asleep: clock.asleep.clone(),
+    };
+    let events = sitting(&MemoryDisk::new(), exactly(FELT_S), clock, &mut operator);
+    let again = |event: &&Event| match event {
+        Event::AttemptFailed { detail, .. } => detail.starts_with("felt again"),
+        _ => false,
+    };
+    assert_eq!(events.iter().filter(again).count(), 1);
+    // Of three ratings the first one came too late.
+    let rating = |event: &&Event| {
+        matches!(
+            event,
+            Event::Answered {
+                answer: Answer::Rating(_),
+                ..
+            }
+        )
+    };
+    assert_eq!(events.iter().filter(rating).count(), 2);
 }

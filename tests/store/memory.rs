@@ -316,6 +316,34 @@ impl MemoryDisk {
         }
         files
     }
+
+    /// The files of a folder, with their bytes, as a loss of power would leave them now if nothing
+    /// that is not synced survived it; only those with certain names.
+    pub fn on_medium(&self, folder: &Path, which: fn(&str) -> bool) -> Vec<Vec<u8>> {
+        let state = self.state.lock().unwrap();
+        let mut at = 0;
+        for part in folder.components() {
+            let Component::Normal(name) = part else {
+                continue;
+            };
+            let Node::Folder { synced, .. } = &state.nodes[at] else {
+                return Vec::new();
+            };
+            match synced.get(name.to_str().unwrap()) {
+                Some(inner) => at = *inner,
+                None => return Vec::new(),
+            }
+        }
+        let Node::Folder { synced, .. } = &state.nodes[at] else {
+            return Vec::new();
+        };
+        let bytes = |node: &usize| match &state.nodes[*node] {
+            Node::File { synced, .. } => Some(synced.clone()),
+            Node::Folder { .. } => None,
+        };
+        let named = synced.iter().filter(|(name, _)| which(name));
+        named.filter_map(|(_, node)| bytes(node)).collect()
+    }
 }
 
 impl Appender for File {

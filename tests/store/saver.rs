@@ -5,8 +5,10 @@
 use crate::memory::MemoryDisk;
 use crate::process::open;
 use crate::world::{at, begun, ended, real, started};
+use std::cell::Cell;
 use std::path::Path;
-use study::runner::saver::{Job, SaveEvent, Saver};
+use std::rc::Rc;
+use study::runner::saver::{Job, SaveEvent, Saver, Saving};
 use study_session::outcome::{Author, Event, Sample};
 use study_session::store::StudyFolder;
 use study_session::store::disk::Disk as _;
@@ -29,7 +31,7 @@ fn playback(disk: &MemoryDisk, before: impl Fn(&MemoryDisk)) -> (StudyFolder, Ve
     let mut claimed = study.claim(&real("P01")).unwrap();
     let start = started("P01", 1, claimed.seat);
     let journal = claimed.folder.journal().unwrap();
-    let mut saver = Saver::new(claimed.folder, journal, false);
+    let mut saver = Saver::new(claimed.folder, journal, Saving::Loop);
     before(disk);
     saver.send(Job::Append(at(0), start));
     saver.send(Job::Append(at(1), begun(1, 1, 1, "B")));
@@ -130,7 +132,7 @@ fn who_refuses_after_a_crash_leaves_no_copy_of_the_consent() {
         let start = started("P01", 1, claimed.seat);
         let journal = claimed.folder.journal().unwrap();
         claimed.folder.keep_consent("signed: QXJ").unwrap();
-        let mut saver = Saver::new(claimed.folder, journal, false);
+        let mut saver = Saver::new(claimed.folder, journal, Saving::Loop);
         saver.send(Job::Append(at(0), start));
         let consented = Event::Consented {
             document: "Information".to_owned(),
@@ -144,5 +146,52 @@ fn who_refuses_after_a_crash_leaves_no_copy_of_the_consent() {
         assert_eq!(saved, 2, "{events:?}");
         let copy = disk.read(Path::new("results/small/sessions/P01/1/consent.txt"));
         assert_eq!(copy.is_ok(), accepted);
+    }
+}
+
+/// A saver that is given turns, and the number of jobs that the next ones do.
+fn in_turns(disk: &MemoryDisk) -> (Saver, Rc<Cell<usize>>) {
+    let mut claimed = open(disk).unwrap().claim(&real("P01")).unwrap();
+    let start = started("P01", 1, claimed.seat);
+    let journal = claimed.folder.journal().unwrap();
+    let jobs = Rc::new(Cell::new(0));
+    let given = jobs.clone();
+    let turns = Saving::Turns(Rc::new(move |_| given.get()));
+    let mut saver = Saver::new(claimed.folder, journal, turns);
+    let events = [start, begun(1, 1, 1, "B"), ended(1, 1)];
+    for (s, event) in (0..).zip(events) {
+        saver.send(Job::Append(at(s), event));
+    }
+    (saver, jobs)
+}
+
+/// What is acknowledged is in the journal, and nothing is before a turn is given.
+#[test]
+fn a_saver_in_turns_does_as_much_as_it_is_given() {
+    let disk = MemoryDisk::new();
+    let (mut saver, jobs) = in_turns(&disk);
+    let events = || open(&disk).unwrap().sessions().unwrap()[0].entries.len();
+    let saved = |events: Vec<SaveEvent>| {
+        let saved = events.iter().filter(|e| **e == SaveEvent::Saved);
+        saved.count()
+    };
+    for (given, written, all) in [(0, 0, 0), (2, 2, 2), (0, 0, 2), (9, 1, 3), (9, 0, 3)] {
+        jobs.set(given);
+        assert_eq!((saved(saver.drain()), events()), (written, all));
+    }
+    assert!(matches!(&saver.finish()[..], [SaveEvent::Left(_)]));
+}
+
+#[test]
+fn a_saver_in_turns_gives_a_disk_up_that_does_not_answer_at_the_end() {
+    for (given, saved) in [(0, 0), (1, 3)] {
+        let disk = MemoryDisk::new();
+        let (saver, jobs) = in_turns(&disk);
+        jobs.set(given);
+        let left = saver.finish().len();
+        // The receipt follows the last event.
+        assert_eq!(left, saved + usize::from(saved > 0));
+        let entries = &open(&disk).unwrap().sessions().unwrap()[0].entries;
+        assert_eq!(entries.len(), saved);
     }
 }

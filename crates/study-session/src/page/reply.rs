@@ -9,6 +9,7 @@ use super::{Does, Page, participant, same_page};
 use crate::session::{Input, Screen, View};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, VecDeque};
+use study_base::text::QuestionId;
 use study_plan::protocol::answer::tidy;
 use study_plan::protocol::phrases::Words;
 use study_plan::protocol::{Answer, Given, Question, Refusal, Turn};
@@ -99,7 +100,8 @@ impl Sent {
 pub enum Outcome {
     /// It was taken, and everything is on disk.
     Saved,
-    /// It is for another page than the one that is shown, or came before anybody could read it.
+    /// It is for another page than the one that is shown, or came before anybody could read it, or
+    /// as the session left its page.
     Stale,
     /// It is not accepted, with what can be done instead, in the language of the study; empty
     /// if the page does not offer it.
@@ -149,6 +151,8 @@ struct Pending {
     leaves: Option<Screen>,
     /// Whether it confirms a level: an answer that is recorded once the device has stopped.
     confirms: bool,
+    /// The questions that it answers.
+    answers: Vec<QuestionId>,
 }
 
 /// A reply that has arrived.
@@ -266,6 +270,10 @@ impl Exchange {
                     key: reply.key,
                     leaves: leaves.then(|| view.screen.clone()),
                     confirms: sets && matches!(input, Input::Advance | Input::RateStopped),
+                    answers: match &input {
+                        Input::Answer(answers) => answers.iter().map(|a| a.0.clone()).collect(),
+                        _ => Vec::new(),
+                    },
                 });
                 return Some(input);
             }
@@ -297,9 +305,12 @@ impl Exchange {
         // A level is still to be set, or was lost with the device.
         let unset = view.adjusting.is_some() || matches!(view.screen, Screen::DeviceTrouble { .. });
         let lost = pending.confirms && unset;
-        let outcome = match lost || pending.leaves.as_ref().is_some_and(stays) {
-            true => Outcome::Refused(refusal(view)),
-            false => Outcome::Saved,
+        let outcome = if lost || pending.leaves.as_ref().is_some_and(stays) {
+            Outcome::Refused(refusal(view))
+        } else if pending.is_unanswered(view) {
+            Outcome::Stale
+        } else {
+            Outcome::Saved
         };
         self.settle(&pending.key, outcome);
     }
@@ -309,6 +320,20 @@ impl Exchange {
         if let Some(known) = known {
             known.outcome = Some(outcome);
             self.settled += 1;
+        }
+    }
+}
+
+impl Pending {
+    /// Whether the session does not have its answers: it had left the page when they came, such
+    /// as after a standstill of the program, or they count no more. No view has initials.
+    fn is_unanswered(&self, view: &View) -> bool {
+        match &self.leaves {
+            Some(Screen::Form { form, .. }) if form.can_be_declined() => {
+                let mut answers = self.answers.iter();
+                answers.any(|question| view.given(*form, question).is_none())
+            }
+            _ => false,
         }
     }
 }

@@ -376,3 +376,37 @@ fn a_confirmed_level_is_saved_only_after_the_stop() {
         assert_eq!(exchange.outcome("1"), Some(outcome), "{:?}", then.screen);
     }
 }
+
+/// Answers that come as the session leaves their page, such as after a standstill of the program,
+/// are not recorded, and the page does not say that they are saved.
+#[test]
+fn answers_that_the_session_does_not_have_are_not_saved() {
+    use reply::{Exchange, Outcome, Sent};
+    let form = asks(false, rating(7));
+    let Screen::Form { questions, .. } = &form.screen else {
+        panic!("a form");
+    };
+    let reference = view(Screen::Reference {
+        prompt: "Feel the reference.".to_owned(),
+        wait_s: 0.0,
+    });
+    let mut recorded = reference.clone();
+    recorded.correctable = vec![Correctable {
+        form: FormId::Intake,
+        title: "intake".to_owned(),
+        question: questions[0].clone(),
+        answer: Answer::Rating(5),
+    }];
+    for (then, outcome) in [(&recorded, Outcome::Saved), (&reference, Outcome::Stale)] {
+        let mut exchange = Exchange::new("run".to_owned());
+        exchange.show(&form);
+        let answers = format!(r#"{{"{}":"5"}}"#, questions[0].id);
+        let reply = format!(
+            r#"{{"page":"run.1","key":"1","shown_ms":300,"does":"answer","answers":{answers}}}"#
+        );
+        assert!(exchange.arrive(Sent::read(reply.as_bytes()).unwrap()));
+        assert!(matches!(exchange.input(&form), Some(Input::Answer(_))));
+        exchange.show(then);
+        assert_eq!(exchange.outcome("1"), Some(&outcome));
+    }
+}
