@@ -19,6 +19,7 @@ pub mod theme;
 pub mod ui_state;
 pub mod views;
 pub mod waiting;
+pub mod watching;
 pub mod widgets;
 pub mod wrap;
 
