@@ -2,6 +2,7 @@
 //! shared by `study status`, `study desk` and the desk of a session. Only reads.
 
 use super::{Failure, study_folder};
+use crate::tui::desk::is_almost_full;
 use chrono::{DateTime, FixedOffset};
 use serde::Serialize;
 use std::path::Path;
@@ -15,9 +16,6 @@ use study_session::store::{
     participants,
 };
 
-/// Free space below which the disk is called almost full, bytes: room for the telemetry of a few
-/// dozen sessions.
-const LOW_BYTES: u64 = 1 << 30;
 /// Free rows that are listed.
 const ROWS_LISTED: usize = 20;
 
@@ -334,11 +332,6 @@ fn kept(sessions: &[SessionData], planned: Option<u32>) -> Rows {
     }
 }
 
-/// Whether a disk with so many free bytes is almost full.
-pub(super) fn is_low(free_bytes: u64) -> bool {
-    free_bytes < LOW_BYTES
-}
-
 /// The free bytes of the disk that a folder is on; `None` if the system does not say.
 pub(super) fn free_bytes(folder: &Path) -> Option<u64> {
     RealDisk.free_bytes(folder).ok().flatten()
@@ -348,7 +341,7 @@ fn storage(study: &StudyFolder, mirror: Option<&Path>) -> Storage {
     let free_bytes = free_bytes(study.path());
     Storage {
         free_bytes,
-        almost_full: free_bytes.is_some_and(is_low),
+        almost_full: free_bytes.is_some_and(is_almost_full),
         mirror: mirror.map(|mirror| copied(study, mirror)),
     }
 }

@@ -1,6 +1,7 @@
 //! What a study has come to, in lines of text.
 
 use crate::cli::overview::{Coming, Copied, Overview, Person, Reality};
+use crate::tui::desk::size;
 use crate::tui::wrap::{one_line, width};
 use std::cmp::Reverse;
 use study_base::text::counted;
@@ -277,20 +278,6 @@ fn storage(study: &Overview, named: usize) -> String {
         }
     };
     format!("{free} · mirror {folder}: {state}")
-}
-
-/// A size on a disk.
-fn size(bytes: u64) -> String {
-    let (value, unit) = match bytes as f64 {
-        bytes if bytes < 1e6 => (bytes / 1e3, "kB"),
-        bytes if bytes < 1e9 => (bytes / 1e6, "MB"),
-        bytes if bytes < 1e12 => (bytes / 1e9, "GB"),
-        bytes => (bytes / 1e12, "TB"),
-    };
-    match value < 9.95 {
-        true => format!("{value:.1} {unit}"),
-        false => format!("{value:.0} {unit}"),
-    }
 }
 
 /// The state in words.
