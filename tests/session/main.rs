@@ -14,6 +14,7 @@ mod commission;
 mod consent_page;
 #[path = "../support/designs.rs"]
 mod designs;
+mod desk;
 mod devices;
 mod dying_disk;
 mod exposure;
