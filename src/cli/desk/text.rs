@@ -10,7 +10,8 @@ use study_session::store::{Due, when};
 
 /// Participants that a line names before it only counts.
 const NAMED: usize = 4;
-/// Names of a table's columns, and how little each is missed where there is no room, if it can be.
+/// Names of a table's columns. Of those with a number the largest is left out first where there is no
+/// room, and each if it is empty.
 const COLUMNS: [(&str, Option<u8>); 8] = [
     ("participant", None),
     ("row", Some(2)),
@@ -370,4 +371,127 @@ fn cells(person: &Person) -> [String; COLUMNS.len()] {
 /// A text of files and people as one line that is safe to print.
 fn safe(text: &str) -> String {
     one_line(text, usize::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::overview::{Mirror, Rows, Storage};
+    use chrono::{DateTime, FixedOffset, TimeDelta};
+    use study_base::text::{PartId, ParticipantId};
+
+    fn now() -> DateTime<FixedOffset> {
+        DateTime::parse_from_rfc3339("2026-03-10T09:00:00+01:00").unwrap()
+    }
+
+    /// The `n`th participant, who took part so many hours ago.
+    fn person(n: u32, state: State, hours: i64) -> Person {
+        Person {
+            participant: ParticipantId::new(format!("P{n:02}")).unwrap(),
+            kind: Reality::Real,
+            row: Some(n),
+            group: None,
+            state,
+            running: false,
+            erased: false,
+            session: 1,
+            sessions_done: usize::from(state == State::Done),
+            trials_done: 15,
+            trials_planned: Some(15),
+            last_activity: Some(now() - TimeDelta::hours(hours)),
+            reason: String::new(),
+            next: None,
+        }
+    }
+
+    fn coming(due: Due, hours: i64) -> Option<Coming> {
+        Some(Coming {
+            session: PartId::new("two").unwrap(),
+            due,
+            from: now() + TimeDelta::hours(hours - 24),
+            until: Some(now() + TimeDelta::hours(hours)),
+        })
+    }
+
+    /// Forty participants, of whom the last but one is late and the last is running.
+    fn many() -> Overview {
+        let mut people: Vec<Person> = (1..=40).map(|n| person(n, State::Done, 100)).collect();
+        people[38].next = coming(Due::Overdue, -5);
+        people[39].state = State::Unfinished;
+        people[39].running = true;
+        people[3].next = coming(Due::Now, 20);
+        people[4].next = coming(Due::Later, 40);
+        people[5].state = State::Excluded;
+        "did not \u{1b}[2J understand".clone_into(&mut people[5].reason);
+        Overview {
+            study: "spring".to_owned(),
+            folder: "results/spring".to_owned(),
+            protocol_version: 2,
+            read_at: now(),
+            planned: Some(48),
+            sessions_each: Some(2),
+            participants: people,
+            rows: Rows {
+                kept: 39,
+                next: Some(6),
+                freed: vec![6],
+                twice: vec![7],
+                beyond: Vec::new(),
+            },
+            groups: Vec::new(),
+            last_activity: Some(now()),
+            storage: Storage {
+                free_bytes: Some(12_300_000_000),
+                almost_full: false,
+                mirror: Some(Mirror {
+                    folder: "/media/usb/spring".to_owned(),
+                    state: Copied::InStep,
+                    differs: Vec::new(),
+                }),
+            },
+            warnings: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn it_fits_into_a_terminal_and_whoever_asks_for_somebody_comes_first() {
+        for (columns, rows) in [(80, 22), (60, 18), (60, 12)] {
+            let lines = within(&many(), columns, rows);
+            assert!(lines.len() <= rows, "{columns} × {rows}: {}", lines.len());
+            let fits = |line: &String| width(line) <= columns && !line.contains('\u{1b}');
+            assert!(lines.iter().all(fits), "{lines:#?}");
+            let place = |who: &str| lines.iter().position(|line| line.starts_with(who));
+            assert!(place("OVERDUE: P39 session two until 2026-03-10 04:00").is_some());
+            if rows > 12 {
+                assert!(place("P40 ") < place("P39 "), "{lines:#?}");
+                assert!(place("P40 ").is_some());
+                assert!(
+                    lines.last().unwrap().ends_with("more participants"),
+                    "{lines:#?}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn printed_whole_nobody_and_nothing_is_left_out() {
+        let lines = all(&many(), None);
+        for line in [
+            "spring · protocol version 2 · results/spring",
+            "Read 2026-03-10 09:00 · last activity 2026-03-10 09:00",
+            "Participants: 48 planned, 35 done, 3 to come again, 1 running now, 1 excluded",
+            "Rows: 39 kept of 48 · next free 6 · free again: 6 · kept twice: 7",
+            "Disk: 12 GB free · mirror /media/usb/spring: in step",
+            "OVERDUE: P39 session two until 2026-03-10 04:00",
+            "Due now: P04 session two until 2026-03-11 05:00",
+            "Later: P05 session two from 2026-03-11 01:00",
+            "Left out: P06 excluded (did not \\u{1b}[2J understand)",
+        ] {
+            assert!(lines.iter().any(|l| l == line), "{line}\n{lines:#?}");
+        }
+        let table = lines
+            .iter()
+            .filter(|line| line.starts_with('P') && line.contains("15/15"));
+        assert_eq!(table.count(), 40);
+    }
 }
