@@ -66,7 +66,11 @@ impl DeskView<'_> {
             let values = [("n", &n as &dyn Display), ("total", &of)];
             Say::Part.fill(self.desk.language, &values)
         });
-        joined([now, done, part].into_iter().flatten())
+        let known = joined([now, done, part].into_iter().flatten());
+        match known.is_empty() {
+            true => NOTHING.to_owned(),
+            false => known,
+        }
     }
 
     /// What the participant does, with the time that it takes or has taken.
