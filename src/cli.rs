@@ -10,6 +10,7 @@ mod check;
 mod command_line;
 mod completions;
 mod correct;
+mod desk;
 mod device;
 mod device_selection;
 mod doctor;
@@ -20,6 +21,7 @@ mod identify;
 mod import;
 mod include;
 mod new;
+mod overview;
 mod participant;
 mod power;
 mod preregister;
@@ -73,6 +75,8 @@ enum Command {
     Schedule(schedule::Args),
     /// Show the state of each participant and the next row
     Status(status::Args),
+    /// Show all participants of a study: progress, returns due, exclusions, rows, disk and mirror
+    Desk(desk::Args),
     /// Show a session or a trial again: what was on the screen, answered and felt
     Replay(replay::Args),
     /// Change the state of a participant
@@ -131,6 +135,7 @@ pub fn run(cli: Cli, console: &mut Console) -> Result<(), Failure> {
         Command::Preregister(args) => preregister::run(&args, console),
         Command::Schedule(args) => schedule::run(&args, console),
         Command::Status(args) => status::run(&args, console),
+        Command::Desk(args) => desk::run(&args, console),
         Command::Replay(args) => replay::run(&args, console),
         Command::Participant(args) => participant::run(&args, console),
         Command::Correct(args) => correct::run(&args, console),

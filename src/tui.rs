@@ -10,6 +10,7 @@
 //! Untrusted text (protocol, comments, messages of a device) passes through
 //! [`study_base::text::Untrusted`] in [`wrap`] before it reaches a cell.
 
+pub mod desk;
 pub mod editor;
 pub mod keys;
 pub mod pace;
@@ -19,6 +20,7 @@ pub mod theme;
 pub mod ui_state;
 pub mod views;
 pub mod waiting;
+pub mod watching;
 pub mod widgets;
 pub mod wrap;
 
@@ -27,6 +29,7 @@ pub use theme::ColorDepth;
 
 use crate::runner::{Operator, OperatorError};
 use crossterm::event::{Event, MouseEventKind};
+use desk::Desk;
 use pace::Pace;
 use std::time::{Duration, Instant};
 use study_session::outcome::Channel;
@@ -108,6 +111,13 @@ impl Tui {
         })
     }
 
+    /// The same as the experimenter's desk, beside a page of the participant's own.
+    #[must_use]
+    pub fn with_desk(mut self, desk: Desk) -> Self {
+        self.surface = self.surface.with_desk(desk);
+        self
+    }
+
     /// Draws the view if anything visible has changed.
     fn draw(&mut self, view: &View) -> Result<(), OperatorError> {
         let surface = &mut self.surface;
@@ -159,6 +169,8 @@ impl Operator for Tui {
 
     fn next(&mut self, view: &View, timeout: Duration) -> Result<Vec<Input>, OperatorError> {
         let until = Instant::now() + timeout;
+        let translated = self.surface.translated(view);
+        let view = &*translated;
         self.suspend_if_asked(view)?;
         loop {
             if let Some(signal) = self.terminal.take_signal() {

@@ -32,6 +32,10 @@ const EXIT: &[(&str, &str)] = &[
 const ENVIRONMENT: &[(&str, &str)] = &[
     ("NO_COLOR", "no colors if set"),
     ("STUDY_PLAIN", "sessions in plain lines if set and not 0"),
+    (
+        "STUDY_LANG",
+        "language of the experimenter's desk, such as de; otherwise that of LC_ALL, LC_MESSAGES or LANG",
+    ),
     ("TERM", "dumb: sessions in plain lines, no bars"),
 ];
 

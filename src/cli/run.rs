@@ -1,5 +1,6 @@
 //! `study run`: a session in the terminal.
 
+mod desk;
 mod ending;
 mod hurry;
 mod page;
@@ -189,13 +190,10 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     };
     tui::survive_file_size_limit();
     // The terminal comes before the folder: without a terminal nothing is created.
-    let mut operator: Box<dyn Operator> = match plain {
-        true => Box::new(Plain::open(args.live, times).map_err(unusable)?),
-        false => Box::new(Tui::open(options).map_err(unusable)?),
+    let terminal = match plain {
+        true => At::Lines(Box::new(Plain::open(args.live, times).map_err(unusable)?)),
+        false => At::Screen(Box::new(Tui::open(options).map_err(unusable)?)),
     };
-    if let Some(own) = own {
-        operator = Box::new(Beside::new(own, operator));
-    }
     let study = match begun {
         Some(study) => study,
         None => {
@@ -221,6 +219,18 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         let goes_on = people::goes_on(&session.history, &protocol);
         let left = people::left(&session.history, at.wall);
         roster.interrupted(session.participant.clone(), left, goes_on);
+    }
+    let mut operator: Box<dyn Operator> = match (terminal, &own) {
+        (At::Lines(lines), _) => lines,
+        (At::Screen(screen), None) => screen,
+        (At::Screen(screen), Some(_)) => {
+            let desk = desk::desk(&known, seats, &plan, &roster, &protocol);
+            desk::measure(desk.free.clone(), &args.results);
+            Box::new(screen.with_desk(desk))
+        }
+    };
+    if let Some(own) = own {
+        operator = Box::new(Beside::new(own, operator));
     }
     let setup = Setup {
         protocol: protocol.clone(),
@@ -281,6 +291,14 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         &ended.ending,
         &resume,
     )
+}
+
+/// How the experimenter sits at the terminal.
+enum At {
+    /// Reading and typing lines.
+    Lines(Box<Plain>),
+    /// Before pages.
+    Screen(Box<Tui>),
 }
 
 /// The protocol of the working folder.

@@ -1,5 +1,6 @@
 //! `study status`
 
+use super::overview::{Reality, is_running};
 use super::{Console, Failure, study_folder};
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -53,9 +54,11 @@ fn of_study(study: &StudyFolder, sessions: &[SessionData], look: Look) -> String
         study.version()
     );
     let all = participants(sessions);
-    let real: Vec<_> = all.iter().filter(|p| !p.pilot && !p.simulated).collect();
-    let pilots: Vec<_> = all.iter().filter(|p| p.pilot).collect();
-    let simulated: Vec<_> = all.iter().filter(|p| p.simulated).collect();
+    let of = |kind: Reality| -> Vec<&ParticipantRow> {
+        let of_kind = |row: &&ParticipantRow| Reality::of(row) == kind;
+        all.iter().filter(of_kind).collect()
+    };
+    let [real, pilots, simulated] = [Reality::Real, Reality::Pilot, Reality::Simulated].map(of);
     for (title, rows) in [
         ("", &real),
         ("Pilots", &pilots),
@@ -143,13 +146,6 @@ fn lateness(sessions: &[SessionData]) -> Option<[f64; 2]> {
         .flat_map(|(_, attempt)| &attempt.presentations)
         .filter_map(|p| p.ended?.1.playback.host_late_ms)
         .reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])])
-}
-
-/// Whether a session is open in a program at this moment.
-fn is_running(study: &StudyFolder, sessions: &[SessionData], row: &ParticipantRow) -> bool {
-    let own = |s: &&SessionData| s.participant == row.participant && s.session == row.session;
-    let own = sessions.iter().find(own);
-    row.state == State::Unfinished && own.is_some_and(|session| study.is_open(session))
 }
 
 /// Cells of the bar of a participant.

@@ -167,12 +167,18 @@ pub(super) fn values(change: &Change) -> String {
 
 /// Prints [`study_analysis::load::damage`] on standard error.
 pub(super) fn warn(study: &StudyFolder, warnings: &[String], console: &mut Console) {
+    warn_of(&study.path().display().to_string(), warnings, console);
+}
+
+/// The same of a study by its folder.
+pub(super) fn warn_of(folder: &str, warnings: &[String], console: &mut Console) {
     for warning in warnings {
         console.say(format!("warning: {warning}"));
     }
     if !warnings.is_empty() {
-        let path = study.path().display();
-        console.say(format!("  hint: `study verify {path}` lists all findings"));
+        console.say(format!(
+            "  hint: `study verify {folder}` lists all findings"
+        ));
     }
 }
 

@@ -65,6 +65,8 @@ pub enum Key {
     Decline,
     /// F7 or Ctrl-F.
     Replay,
+    /// F9 or Ctrl-G: the desk, or the participant's page.
+    Desk,
     /// F10, Ctrl-Q or Ctrl-C.
     Quit,
     /// Ctrl-Z.
@@ -142,6 +144,7 @@ pub fn read(event: &KeyEvent) -> Option<Key> {
         KeyCode::F(5) => Key::Pause,
         KeyCode::F(6) => Key::Decline,
         KeyCode::F(7) => Key::Replay,
+        KeyCode::F(9) => Key::Desk,
         KeyCode::F(10) => Key::Quit,
         // AltGr arrives as Ctrl and Alt on some systems: a character.
         KeyCode::Char(c) if control && alt => Key::Char(c),
@@ -160,6 +163,7 @@ fn with_control(c: char) -> Option<Key> {
         'd' => Key::Decline,
         'e' => Key::Correct,
         'f' => Key::Replay,
+        'g' => Key::Desk,
         'h' => Key::Backspace,
         'j' => Key::NewLine,
         'p' => Key::Pause,
@@ -196,6 +200,7 @@ mod tests {
             (4, 'b', Key::MarkBad),
             (5, 'p', Key::Pause),
             (6, 'd', Key::Decline),
+            (9, 'g', Key::Desk),
             (10, 'q', Key::Quit),
             (10, 'c', Key::Quit),
         ] {

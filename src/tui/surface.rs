@@ -3,6 +3,7 @@
 //! Everything that the terminal shows and does is here, so that a test can drive whole
 //! sessions by keys.
 
+use super::desk::{Desk, Doing, Say, Strip};
 use super::theme::{ColorDepth, Theme};
 use super::ui_state::UiState;
 use super::views::Page;
@@ -10,7 +11,9 @@ use crossterm::event::{Event, KeyEvent, KeyModifiers, MouseButton, MouseEventKin
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 use ratatui::widgets::Widget as _;
+use std::borrow::Cow;
 use study_session::page::{self, same_page};
+use study_session::session::view::DeviceState;
 use study_session::session::{Input, Screen, View};
 
 /// The state of the interface, its styles and its size.
@@ -22,6 +25,8 @@ pub struct Surface {
     screen: Option<Screen>,
     live: bool,
     waits: bool,
+    /// What the experimenter's desk knows, if there is one, and the course of the session.
+    desk: Option<Box<(Desk, Strip)>>,
 }
 
 impl Surface {
@@ -34,6 +39,7 @@ impl Surface {
             screen: None,
             live: false,
             waits: false,
+            desk: None,
         }
     }
 
@@ -42,6 +48,26 @@ impl Surface {
     pub fn with_live(mut self, live: bool) -> Self {
         self.live = live;
         self
+    }
+
+    /// The same, which shows the desk in place of what the participant reads on a page of their own.
+    #[must_use]
+    pub fn with_desk(mut self, desk: Desk) -> Self {
+        let elsewhere = Say::NotHere.get(desk.language);
+        self.state.set_desk(elsewhere.to_owned());
+        self.desk = Some(Box::new((desk, Strip::default())));
+        self
+    }
+
+    /// A view with the fixed sentences in the experimenter's language, if there is a desk.
+    pub fn translated<'v>(&self, view: &'v View) -> Cow<'v, View> {
+        match self.desk.as_ref().and_then(|desk| desk.0.words.clone()) {
+            None => Cow::Borrowed(view),
+            Some(words) => Cow::Owned(View {
+                words,
+                ..view.clone()
+            }),
+        }
     }
 
     /// Whether a view has another page than the last one that was followed.
@@ -68,6 +94,11 @@ impl Surface {
     /// Adapts to the screen of a view and to a size.
     pub fn follow(&mut self, view: &View, area: Rect) {
         self.area = area;
+        if let Some(desk) = &mut self.desk
+            && view.line.device != DeviceState::Unknown
+        {
+            desk.1.add(view.line.elapsed_s, Doing::of(&view.screen));
+        }
         let old = self.screen.as_ref();
         if self.state.follow(view, old) {
             self.screen = Some(view.screen.clone());
@@ -81,6 +112,7 @@ impl Surface {
             content: page::page(view),
             state: &self.state,
             live: self.live,
+            desk: self.desk.as_deref(),
             waits: self.waits,
             theme: self.theme,
         }
@@ -112,7 +144,7 @@ impl Surface {
         self.follow(view, self.area);
         let key = self.as_key(event, view);
         let event = key.as_ref().unwrap_or(event);
-        if Page::too_small(self.area) {
+        if self.page(view).is_small(self.area) {
             return self.state.blind(event, view);
         }
         let Event::Mouse(mouse) = event else {

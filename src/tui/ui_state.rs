@@ -12,6 +12,7 @@ pub mod dialog;
 pub mod field;
 mod key_handling;
 
+use super::desk;
 use super::editor::{Editor, Handled};
 use super::keys;
 use crossterm::event::Event;
@@ -36,6 +37,12 @@ pub struct UiState {
     notice: Option<String>,
     reading: Reading,
     suspend: bool,
+    /// At the experimenter's desk: what is said of a key that acts on the participant's page.
+    desk: Option<String>,
+    /// Whether the participant's page is asked for in place of the desk.
+    asks_page: bool,
+    /// Whether the desk is in the place of the page.
+    at_desk: bool,
 }
 
 /// Where typed text goes while no dialog is open.
@@ -111,6 +118,18 @@ impl UiState {
         self.dialogs.last()
     }
 
+    /// Shows the desk in place of what the participant reads; the text is said of keys that act on
+    /// their page.
+    pub fn set_desk(&mut self, elsewhere: String) {
+        self.desk = Some(elsewhere);
+    }
+
+    /// Whether the desk is in the place of the participant's page: nothing on that page is drawn, and no
+    /// key acts on it.
+    pub fn at_desk(&self) -> bool {
+        self.at_desk
+    }
+
     /// A notice about the last key.
     pub fn notice(&self) -> Option<&str> {
         self.notice.as_deref()
@@ -182,6 +201,10 @@ impl UiState {
                 self.focus = Focus::Who;
             }
             _ => {}
+        }
+        self.at_desk = self.desk.is_some() && !self.asks_page && desk::covers(&view.screen);
+        if self.at_desk {
+            self.focus = Focus::None;
         }
         // A dialog must not cover a fault, and typed text must not be lost.
         if is_fault(&view.screen) {

@@ -7,6 +7,7 @@
 
 pub mod answer;
 pub mod choice;
+pub mod desk;
 pub mod dialogs;
 pub mod form;
 pub mod page;

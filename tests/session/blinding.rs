@@ -60,7 +60,7 @@ pub(crate) fn inputs(view: &View) -> Vec<Input> {
 }
 
 /// The simulated device on which a session is played, with its own faults or another one.
-fn device(options: Options) -> Box<dyn Device> {
+pub(crate) fn device(options: Options) -> Box<dyn Device> {
     Box::new(VirtualDevice::new(options))
 }
 
@@ -134,6 +134,20 @@ fn pages(
     fault: Option<InjectedFault>,
     device: fn(Options) -> Box<dyn Device>,
 ) -> Vec<String> {
+    let surface = Surface::new(ColorDepth::None).with_live(true);
+    pages_on(surface, name, first, entry, change, fault, device)
+}
+
+/// The same on this terminal.
+pub(crate) fn pages_on(
+    mut surface: Surface,
+    name: &str,
+    first: &ModelId,
+    entry: Entry,
+    change: fn(&mut Protocol),
+    fault: Option<InjectedFault>,
+    device: fn(Options) -> Box<dyn Device>,
+) -> Vec<String> {
     let mut loaded = load(Path::new(&repository(name))).unwrap();
     let protocol = &mut loaded.protocol;
     protocol.session.entry = entry;
@@ -153,7 +167,6 @@ fn pages(
     order.insert(0, first.clone());
     let orders = BTreeMap::from([(1, order)]);
     let (mut runner, clock) = session(loaded, Some(orders), fault, device);
-    let mut surface = Surface::new(ColorDepth::None).with_live(true);
     let mut pages = Vec::new();
     let (mut played, mut over) = (false, false);
     for _ in 0..20_000 {
@@ -180,14 +193,14 @@ fn pages(
     panic!("no second trial:\n{}", pages.last().unwrap())
 }
 
-const PROTOCOLS: [&str; 4] = [
+pub(crate) const PROTOCOLS: [&str; 4] = [
     "protocols/keyboard",
     "protocols/turn-signal",
     "protocols/turn-signal-extended",
     "protocols/turn-signal-passive",
 ];
 
-fn realizations(name: &str) -> Vec<ModelId> {
+pub(crate) fn realizations(name: &str) -> Vec<ModelId> {
     let loaded = load(Path::new(&repository(name))).unwrap();
     loaded.protocol.models.into_iter().map(|m| m.id).collect()
 }
@@ -229,7 +242,7 @@ fn compare_on(
     }
 }
 
-fn without_strokes(protocol: &mut Protocol) {
+pub(crate) fn without_strokes(protocol: &mut Protocol) {
     protocol.trial.minimum_strokes = 0;
 }
 
@@ -386,11 +399,13 @@ fn looks_at_a_track(
     let loaded = load(folder).unwrap();
     let (mut runner, clock) = session(loaded, None, None, device);
     let mut surface = Surface::new(ColorDepth::None).with_live(true);
+    let mut desk = Surface::new(ColorDepth::None).with_desk(crate::desk::at_hand());
     let (mut pages, mut felt) = (Vec::new(), String::new());
     for _ in 0..20_000 {
         let view = runner.view();
         let own = serde_json::to_string(&study_session::page::participant(&view)).unwrap();
-        pages.push(picture(&drawn(&mut surface, &view, 80, 24)) + &own);
+        let desk = picture(&drawn(&mut desk, &view, 80, 24));
+        pages.push(picture(&drawn(&mut surface, &view, 80, 24)) + &own + &desk);
         if matches!(view.screen, Screen::Playing { .. }) {
             let model = runner.felt().unwrap().as_str();
             felt.push(if model.ends_with("standard") {
@@ -422,7 +437,7 @@ fn looks_at_a_track(
 }
 
 /// No level, no order of the intervals and no answer changes what a screen shows or for how long,
-/// for participant and experimenter: at each look the pages are the same.
+/// for participant and experimenter, the desk included: at each look the pages are the same.
 #[test]
 fn levels_orders_and_answers_leave_nothing_on_a_screen_and_take_the_same_time() {
     let folder = folder_of_a_track();

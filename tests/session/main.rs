@@ -16,6 +16,7 @@ mod consent_page;
 mod debriefing_page;
 #[path = "../support/designs.rs"]
 mod designs;
+mod desk;
 mod devices;
 mod dying_disk;
 mod exposure;

@@ -169,6 +169,7 @@ pub(crate) fn view(screen: Screen) -> View {
             all_saved: !matches!(screen, Screen::Saving | Screen::SaveTrouble { .. }),
         },
         words: Default::default(),
+        course: Default::default(),
         banner: None,
         notice: None,
         entry: Entry::Participant,

@@ -7,12 +7,15 @@ mod corrected;
 mod crash;
 #[path = "../support/designs.rs"]
 mod designs;
+mod desk;
 mod dictionary;
 mod example_study;
 mod folder;
 mod groups;
 mod heads;
 mod journal;
+#[path = "../support/json_schema.rs"]
+mod json_schema;
 mod memory;
 mod mirrors;
 mod process;

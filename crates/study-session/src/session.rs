@@ -29,6 +29,7 @@ mod adjusting;
 mod away;
 mod between;
 mod consenting;
+mod course;
 mod failures;
 mod flow;
 mod forms;
@@ -132,6 +133,7 @@ pub struct Session {
 
 /// Facts of a claim that are not in the journal.
 struct ClaimFacts {
+    session: u32,
     seat: Seat,
     device_kind: DeviceKind,
     device_id: String,

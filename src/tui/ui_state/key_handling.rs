@@ -53,6 +53,10 @@ impl UiState {
         if !self.dialogs.is_empty() {
             return self.press_in_dialog(key, view);
         }
+        if key == Key::Desk && self.desk.is_some() {
+            self.asks_page = !self.asks_page;
+            return Vec::new();
+        }
         if let Some(opened) = self.command(key, view) {
             match opened {
                 Ok(dialog) => self.dialogs.push(dialog),
@@ -72,7 +76,7 @@ impl UiState {
         let leaving = self.dialog() == Some(&Dialog::Confirm(Confirm::Quit));
         match keys::read(event) {
             Some(Key::Char(' ')) if view.armed => vec![Input::Stop],
-            Some(key @ (Key::Esc | Key::Quit)) => self.press(key, view),
+            Some(key @ (Key::Esc | Key::Quit | Key::Desk)) => self.press(key, view),
             Some(key @ Key::Char(_)) if leaving => self.press(key, view),
             _ => Vec::new(),
         }
@@ -157,6 +161,9 @@ impl UiState {
     }
 
     fn press_on_screen(&mut self, key: Key, view: &View) -> Vec<Input> {
+        if self.at_desk {
+            return self.press_at_desk(key, view);
+        }
         let read = self.reading.scrolled >= self.reading.most;
         match &view.screen {
             Screen::Who {
@@ -209,6 +216,19 @@ impl UiState {
             | Screen::DeviceTrouble { .. }
             | Screen::Saving
             | Screen::Paused { .. } => advance(key, view),
+        }
+    }
+
+    /// Keys at the desk: nobody answers or goes on on a page that is not on the screen.
+    fn press_at_desk(&mut self, key: Key, view: &View) -> Vec<Input> {
+        match (key, &view.screen) {
+            // Elsewhere it is explained.
+            (Key::Replay, Screen::Form { .. } | Screen::Stopped { .. }) => vec![Input::PlayAgain],
+            (Key::Enter | Key::Tab | Key::BackTab | Key::Char(_), _) => {
+                self.notice.clone_from(&self.desk);
+                Vec::new()
+            }
+            _ => Vec::new(),
         }
     }
 
@@ -353,7 +373,7 @@ impl UiState {
 fn is_command(key: Key) -> bool {
     matches!(
         key,
-        Key::Remark | Key::Correct | Key::MarkBad | Key::Decline | Key::Replay
+        Key::Remark | Key::Correct | Key::MarkBad | Key::Decline | Key::Replay | Key::Desk
     )
 }
 

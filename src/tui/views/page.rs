@@ -2,6 +2,7 @@
 //! status line, and a dialog above them. A terminal that is too small shows a message.
 
 use super::MINIMUM;
+use super::desk::{self, DeskView};
 use super::dialogs::DialogView;
 use super::form::FormView;
 use super::playing::Playing;
@@ -9,6 +10,7 @@ use super::prose::{ProseView, prose};
 use super::status::{Status, Top};
 use super::trouble::Trouble;
 use super::who::WhoView;
+use crate::tui::desk::{Desk, Say, Strip, covers};
 use crate::tui::keys;
 use crate::tui::theme::Theme;
 use crate::tui::ui_state::dialog::{Confirm, Dialog};
@@ -41,6 +43,8 @@ pub struct Page<'a> {
     pub state: &'a UiState,
     /// Whether it shows that telemetry arrives.
     pub live: bool,
+    /// What the experimenter's desk knows, if there is one, and the course of the session.
+    pub desk: Option<&'a (Desk, Strip)>,
     /// Whether an Enter would not advance now.
     pub waits: bool,
     /// The styles.
@@ -62,9 +66,23 @@ pub struct TextRoom {
 type Hint = (String, String);
 
 impl<'a> Page<'a> {
-    /// Whether an area is too small for any screen.
-    pub fn too_small(area: Rect) -> bool {
-        area.width < MINIMUM.0 || area.height < MINIMUM.1
+    /// What is drawn in the place of the participant's page, if that is the desk.
+    fn at_desk(&self) -> Option<&'a (Desk, Strip)> {
+        self.desk.filter(|_| self.state.at_desk())
+    }
+
+    /// The smallest area in which the screen is drawn: columns and rows.
+    fn minimum(&self) -> (u16, u16) {
+        match self.at_desk() {
+            Some(_) => desk::MINIMUM,
+            None => MINIMUM,
+        }
+    }
+
+    /// Whether an area is too small for the screen.
+    pub fn is_small(&self, area: Rect) -> bool {
+        let (columns, rows) = self.minimum();
+        area.width < columns || area.height < rows
     }
 
     /// The area of the screen.
@@ -78,7 +96,7 @@ impl<'a> Page<'a> {
                 questions,
                 to_experimenter,
                 ..
-            } => Some(FormView {
+            } if self.at_desk().is_none() => Some(FormView {
                 view: self.view,
                 page: &self.content,
                 questions,
@@ -131,7 +149,7 @@ impl<'a> Page<'a> {
     /// The key whose hint is at a position.
     pub fn key_at(&self, area: Rect, place: Position) -> Option<KeyCode> {
         let line = row(area, area.height.saturating_sub(3));
-        if Self::too_small(area) || self.state.dialog().is_some() || place.y != line.y {
+        if self.is_small(area) || self.state.dialog().is_some() || place.y != line.y {
             return None;
         }
         let keys = self.offered(area.width);
@@ -155,7 +173,11 @@ impl<'a> Page<'a> {
                     "Esc" => KeyCode::Esc,
                     "Tab" => KeyCode::Tab,
                     "Shift-Tab" => KeyCode::BackTab,
+                    "F2" => KeyCode::F(2),
+                    "F3" => KeyCode::F(3),
+                    "F5" => KeyCode::F(5),
                     "F7" => KeyCode::F(7),
+                    "F9" => KeyCode::F(9),
                     "F10" => KeyCode::F(10),
                     _ => return None,
                 });
@@ -167,7 +189,7 @@ impl<'a> Page<'a> {
 
     /// The target at a position.
     pub fn hit(&self, area: Rect, place: Position) -> Option<Target> {
-        if Self::too_small(area) || self.state.dialog().is_some() {
+        if self.is_small(area) || self.state.dialog().is_some() {
             return None;
         }
         self.form()?.hit(Self::body(area), place)
@@ -175,7 +197,7 @@ impl<'a> Page<'a> {
 
     /// The position of the terminal's cursor.
     pub fn cursor(&self, area: Rect) -> Option<Position> {
-        if Self::too_small(area) {
+        if self.is_small(area) {
             return None;
         }
         let body = Self::body(area);
@@ -190,11 +212,11 @@ impl<'a> Page<'a> {
 
     /// The sizes of this page in an area.
     pub fn room(&self, area: Rect) -> TextRoom {
-        if Self::too_small(area) {
+        if self.is_small(area) {
             return TextRoom::default();
         }
         let body = Self::body(area);
-        let (most, page) = match prose(&self.content) {
+        let (most, page) = match prose(&self.content).filter(|_| self.at_desk().is_none()) {
             Some(prose) => self.prose(&prose).room(body),
             None => (0, 0),
         };
@@ -219,7 +241,16 @@ impl<'a> Page<'a> {
     }
 
     fn screen(&self, area: Rect, buf: &mut Buffer) {
-        if let Some(form) = self.form() {
+        if let Some((desk, strip)) = self.at_desk() {
+            let desk = DeskView {
+                view: self.view,
+                page: &self.content,
+                desk,
+                strip,
+                theme: self.theme,
+            };
+            desk.render(area, buf);
+        } else if let Some(form) = self.form() {
             form.render(area, buf);
         } else if let Some(who) = self.who() {
             who.render(area, buf);
@@ -234,6 +265,29 @@ impl<'a> Page<'a> {
 
     /// The keys at the foot of the screen.
     fn keys(&self) -> Vec<Hint> {
+        let Some((desk, _)) = self.desk.filter(|_| covers(&self.view.screen)) else {
+            return self.page_keys();
+        };
+        let words = &self.view.words;
+        let hint = |key: &str, what: Phrase| (key.to_owned(), words.get(what).to_owned());
+        let own = |key: &str, what: Say| (key.to_owned(), what.get(desk.language).to_owned());
+        if self.at_desk().is_none() {
+            return [vec![own("F9", Say::DeskKey)], self.page_keys()].concat();
+        }
+        let mut all = vec![
+            hint("F3", Phrase::CorrectIt),
+            hint("F2", Phrase::Remark),
+            own("F5", Say::PauseKey),
+            own("F9", Say::PageKey),
+        ];
+        if self.view.armed {
+            all.push(hint("Esc", Phrase::Stop));
+        }
+        all
+    }
+
+    /// Those of the page.
+    fn page_keys(&self) -> Vec<Hint> {
         let words = &self.view.words;
         let hint = |key: &str, what: Phrase| (key.to_owned(), words.get(what).to_owned());
         if let Some(form) = self.form() {
@@ -273,8 +327,11 @@ impl<'a> Page<'a> {
     }
 
     /// Whether the page is the participant's: not the experimenter's own ones, nor with
-    /// `--live`.
+    /// `--live`. On the desk everything is above the status line.
     fn own(&self) -> bool {
+        if self.desk.is_some() {
+            return self.at_desk().is_some();
+        }
         self.view.entry == Entry::Participant
             && !self.live
             && !self.content.is_of_experimenter(self.view)
@@ -306,7 +363,8 @@ impl<'a> Page<'a> {
 
     /// Whether the keys are drawn as caps.
     fn has_caps(&self) -> bool {
-        self.content.kind == Kind::Playing && self.view.entry == Entry::Participant
+        let plays = self.content.kind == Kind::Playing && self.view.entry == Entry::Participant;
+        plays && self.at_desk().is_none()
     }
 
     fn small(&self, area: Rect, buf: &mut Buffer) {
@@ -324,7 +382,7 @@ impl<'a> Page<'a> {
         } else {
             ""
         };
-        let (w, h) = MINIMUM;
+        let (w, h) = self.minimum();
         let lines = [
             format!(
                 "This window has {} × {} cells; {w} × {h} are needed.",
@@ -356,7 +414,7 @@ impl Widget for &Page<'_> {
         if area.is_empty() {
             return;
         }
-        if Page::too_small(area) {
+        if self.is_small(area) {
             self.small(area, buf);
             return;
         }
@@ -402,7 +460,7 @@ impl Widget for &Page<'_> {
             line: &self.view.line,
             text: self.state.is_text(),
             own: self.own(),
-            live: self.live,
+            live: self.live || self.desk.is_some(),
             unsaved: self.content.kind == Kind::SaveTrouble,
             words: &self.view.words,
             theme: self.theme,

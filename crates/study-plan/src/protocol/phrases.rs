@@ -2,7 +2,8 @@
 //!
 //! English is in this file, the others are in `phrases/*.toml` under the same keys. A
 //! protocol chooses a language by `[text] lang` and may replace single sentences by key
-//! in `[text.words]`. What only the experimenter reads is English.
+//! in `[text.words]`. What only the experimenter reads is English, but for the desk beside a page of the
+//! participant's own, whose sentences the program has.
 
 use super::ScaleDirection;
 use std::collections::BTreeMap;

@@ -23,6 +23,7 @@ fn view(screen: Screen) -> View {
             mirror: None,
         },
         device: DeviceKind::Simulated,
+        course: Default::default(),
         banner: None,
         notice: None,
         entry: Entry::Participant,

@@ -50,6 +50,7 @@ impl Session {
         self.clock = at;
         self.participant = claim.participant.to_string();
         self.claim = Some(ClaimFacts {
+            session: claim.session,
             seat: claim.seat,
             device_kind: claim.device_kind,
             device_id: claim.device_id.clone(),

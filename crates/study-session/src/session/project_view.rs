@@ -21,6 +21,7 @@ impl Session {
         View {
             progress: self.progress(),
             line: self.line(at),
+            course: self.course(),
             device: self.current_device(),
             banner: self.claim.as_ref().and_then(|c| banner(c.seat)),
             notice: self.notice.clone().or_else(|| self.problem_in_form()),

@@ -99,6 +99,7 @@ impl Retrace<'_> {
         session.opened = Some(at);
         session.take_part(&start.assigned);
         session.claim = Some(ClaimFacts {
+            session: start.session,
             seat: start.seat,
             device_kind: start.device_kind,
             device_id: start.device_id.clone(),

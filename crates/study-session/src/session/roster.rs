@@ -130,18 +130,25 @@ impl Roster {
         self.recent.iter().map(move |id| (id, who(id)))
     }
 
-    /// An id for the next participant: that of the last one, or P00, with the next free
-    /// number.
     fn next_id(&self) -> Option<ParticipantId> {
+        self.next_ids().next()
+    }
+
+    /// Ids for the next participants, in their order: that of the last one, or P00, with the next free
+    /// numbers. None if that id does not end with a number.
+    pub fn next_ids(&self) -> impl Iterator<Item = ParticipantId> {
         let last = self.recent.first().map_or("P00", ParticipantId::as_str);
         let name = last.trim_end_matches(|c: char| c.is_ascii_digit());
         let digits = &last[name.len()..];
-        let number: u32 = digits.parse().ok()?;
         let width = digits.len();
-        (number..number.saturating_add(1000))
-            .filter_map(|n| ParticipantId::new(format!("{name}{:0width$}", n.checked_add(1)?)).ok())
-            .filter(|id| !self.was_searcher(id))
-            .find(|id| !self.known.keys().any(|k| k == id || k.collides_with(id)))
+        let number = digits.parse::<u32>().ok();
+        let numbers = number.map(|number| number..number.saturating_add(1000));
+        let id =
+            move |n: u32| ParticipantId::new(format!("{name}{:0width$}", n.checked_add(1)?)).ok();
+        (numbers.into_iter().flatten())
+            .filter_map(id)
+            .filter(move |id| !self.was_searcher(id))
+            .filter(move |id| !self.known.keys().any(|k| k == id || k.collides_with(id)))
     }
 
     /// Who a typed id is; `None` if it is no id.

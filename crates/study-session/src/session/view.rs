@@ -16,6 +16,8 @@ pub struct View {
     pub progress: Option<Progress>,
     /// The experimenter's status line.
     pub line: StatusLine,
+    /// How far the session is, for the experimenter's desk.
+    pub course: Course,
     /// Kind of the device of the trial under way, or else of the study. A
     /// [`DeviceKind::Manual`] one cannot be stopped, made limp or report counts.
     pub device: DeviceKind,
@@ -143,6 +145,26 @@ pub struct StatusLine {
     pub all_saved: bool,
     /// The state of the mirror; `None` without one.
     pub mirror: Option<Mirror>,
+}
+
+/// How far a session is. Nothing in it depends on what was felt or answered, except by the time that
+/// it took.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Course {
+    /// Session of the participant, from 1; 0 before it is claimed.
+    pub session: u32,
+    /// The part of the trial under way or to come: its place in the session, from 1, and the number of
+    /// parts. `None` without parts, and where they alternate, since the place would tell something of each trial.
+    pub part: Option<(u32, u32)>,
+    /// Number of closed trials, without practice.
+    pub done: u32,
+    /// Number of trials, without practice; `None` before the session has started, and if it depends on
+    /// the answers.
+    pub total: Option<u32>,
+    /// Full strokes that the trial under way requires.
+    pub minimum_strokes: u32,
+    /// Time until the last trial is closed at the pace so far, s; `None` while it is not known.
+    pub left_s: Option<f64>,
 }
 
 /// Which of results folder and mirror are up to date.

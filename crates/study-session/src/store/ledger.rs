@@ -451,9 +451,13 @@ fn next_seat(request: &ClaimRequest, all: &[SessionData]) -> Result<Seat, StoreE
 /// The row that the next participant would get, from all sessions of a study: the lowest
 /// that no participant keeps, of a range or of all.
 pub fn next_row(rows: Option<&RangeInclusive<u32>>, sessions: &[SessionData]) -> Option<u32> {
-    let held: BTreeSet<u32> = deciding(sessions)
-        .filter_map(SessionData::held_row)
-        .collect();
+    let held: BTreeSet<u32> = held_rows(sessions).collect();
     let (from, to) = rows.map_or((1, u32::MAX), |rows| (*rows.start(), *rows.end()));
     (from.max(1)..=to).find(|row| !held.contains(row))
+}
+
+/// The rows that participants keep, by participant. A row stands here twice if it was assigned again
+/// before somebody who had it was reinstated.
+pub fn held_rows(sessions: &[SessionData]) -> impl Iterator<Item = u32> {
+    deciding(sessions).filter_map(SessionData::held_row)
 }

@@ -4,7 +4,7 @@
 use super::error::{StoreError, when};
 use super::sessions::SessionData;
 use crate::outcome::State;
-use chrono::{DateTime, FixedOffset};
+use chrono::{DateTime, FixedOffset, TimeDelta};
 use study_base::text::{PartId, ParticipantId};
 use study_plan::protocol::{Assign, Assigned, Confirms, Groups, Protocol, Seat, SessionPlan};
 
@@ -128,7 +128,7 @@ pub fn next_session(own: &[&SessionData], plan: &Plan) -> Next {
         };
     }
     if gap_h < next.min_gap_h {
-        let wait = chrono::TimeDelta::milliseconds((next.min_gap_h * 3.6e6).round() as i64);
+        let wait = TimeDelta::milliseconds((next.min_gap_h * 3.6e6).round() as i64);
         return Next::TooEarly {
             session,
             from: ended + wait,
@@ -146,6 +146,78 @@ pub fn next_session(own: &[&SessionData], plan: &Plan) -> Next {
             gap_h: Some(gap_h),
         },
     }
+}
+
+/// When somebody who has finished a session comes again: the window of the next session.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Return {
+    /// Identifier of the next session.
+    pub session: PartId,
+    /// The earliest time.
+    pub from: DateTime<FixedOffset>,
+    /// The latest time; `None` if no longest gap is planned.
+    pub until: Option<DateTime<FixedOffset>>,
+}
+
+/// Where a moment lies in the window of a session. The most urgent comes first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Due {
+    /// After its end.
+    Overdue,
+    /// In it.
+    Now,
+    /// Before it.
+    Later,
+}
+
+impl Due {
+    /// The word for it.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Overdue => "overdue",
+            Self::Now => "due",
+            Self::Later => "later",
+        }
+    }
+}
+
+impl Return {
+    /// Where a moment lies in the window.
+    pub fn due(&self, now: DateTime<FixedOffset>) -> Due {
+        match self.until {
+            Some(until) if now > until => Due::Overdue,
+            _ if now < self.from => Due::Later,
+            _ => Due::Now,
+        }
+    }
+}
+
+/// The window of the next session of a participant with these sessions, who has finished one
+/// and begun no other since; `None` of anybody else, and if [`Plan::now`] is not known.
+pub fn comes_again(own: &[&SessionData], plan: &Plan) -> Option<Return> {
+    let session = match next_session(own, plan) {
+        Next::Session {
+            session: Some(session),
+            gap_h: Some(_),
+        }
+        | Next::TooEarly { session, .. }
+        | Next::Late { session, .. } => session,
+        Next::Session { .. } | Next::Nothing => return None,
+    };
+    let planned = plan.sessions.iter().find(|s| s.id == session)?;
+    let before = own.iter().rfind(|s| s.is_done())?;
+    let ended = before.history.last_activity?.wall;
+    Some(Return {
+        session,
+        from: later(ended, planned.min_gap_h)?,
+        until: planned.max_gap_h.and_then(|gap_h| later(ended, gap_h)),
+    })
+}
+
+/// The time so many hours later; `None` beyond the calendar.
+fn later(at: DateTime<FixedOffset>, hours: f64) -> Option<DateTime<FixedOffset>> {
+    let gap = TimeDelta::try_milliseconds((hours * 3.6e6).round() as i64)?;
+    at.checked_add_signed(gap)
 }
 
 impl Next {

@@ -2,10 +2,20 @@
 
 use crate::store::disk::{Disk, ItemKind, RealDisk};
 use crate::store::error::{At as _, StoreError, plain};
+use crate::store::head::{Head, HeadFile};
 use crate::store::verify::Finding;
 use crate::store::{StudyFolder, layout};
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::time::Duration;
+use study_base::text::ParticipantId;
+
+/// How often sessions that seem apart are looked at again, and the time between.
+const MORE_LOOKS: u32 = 2;
+const BETWEEN_LOOKS: Duration = Duration::from_millis(50);
+
+/// A session of a participant, by its number.
+type Numbered = (ParticipantId, u32);
 
 impl StudyFolder {
     /// Compares every file with a copy of the study in the folder `copy`, except
@@ -31,6 +41,45 @@ impl StudyFolder {
         let sides = [(self.disk.as_ref(), self.path.as_path()), (disk, copy)];
         compare(&sides, "", &mut found)?;
         Ok(found)
+    }
+
+    /// The sessions whose last acknowledged record is another one in a copy of the study, such as
+    /// the mirror of `study run --mirror`, and those that only one of both has. Only `head.json` is read,
+    /// where [`StudyFolder::verify_against`] compares every file. Sessions under way are looked at again,
+    /// since their records reach one disk after the other.
+    ///
+    /// # Errors
+    /// [`StoreError`] if the copy is no study, or a folder or a head cannot be read.
+    pub fn heads_apart(&self, copy: &Path) -> Result<Vec<(ParticipantId, u32)>, StoreError> {
+        let copy = Self::open(copy)?;
+        let mut apart = self.apart(&copy)?;
+        for _ in 0..MORE_LOOKS {
+            if apart.is_empty() {
+                break;
+            }
+            std::thread::sleep(BETWEEN_LOOKS);
+            let again = self.apart(&copy)?;
+            apart.retain(|session| again.contains(session));
+        }
+        Ok(apart)
+    }
+
+    /// The same at one moment.
+    fn apart(&self, copy: &Self) -> Result<Vec<Numbered>, StoreError> {
+        let mut heads: BTreeMap<Numbered, [Option<HeadFile>; 2]> = BTreeMap::new();
+        for (side, study) in [self, copy].into_iter().enumerate() {
+            let disk = study.disk.as_ref();
+            for id in study.participant_ids()? {
+                for number in study.session_numbers(&layout::participant(&study.path, &id))? {
+                    let head = Head::read(disk, &layout::session(&study.path, &id, number))?;
+                    heads.entry((id.clone(), number)).or_default()[side] = Some(head);
+                }
+            }
+        }
+        let differ = |(session, [here, there]): (Numbered, [Option<HeadFile>; 2])| {
+            (here != there).then_some(session)
+        };
+        Ok(heads.into_iter().filter_map(differ).collect())
     }
 }
 
