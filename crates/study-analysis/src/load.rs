@@ -32,6 +32,7 @@ mod errors;
 mod families;
 mod frozen;
 mod join;
+mod media;
 mod recordings;
 mod spaces;
 
@@ -297,6 +298,7 @@ fn open(path: &Path, purpose: Purpose<'_>) -> (Option<Loaded>, Vec<Findings>) {
     }
     others.assign(&protocol);
     others.turn(protocol.device.lever_mm);
+    media::pin(&mut protocol, &others, &spans, &mut findings);
     join::vaf(&mut protocol, &others, &spans, &mut findings);
     join::too_close(&protocol, &others, &mut findings);
     if data.is_none() {
@@ -356,6 +358,8 @@ struct OtherFiles<'f> {
     orders: Option<FileOrders>,
     /// The text of the consent document.
     consent: Option<String>,
+    /// Bytes of all media.
+    media_bytes: usize,
     /// Realization → index in `opened`.
     models: BTreeMap<ModelId, usize>,
     /// The same for the ends of families and for spaces.
@@ -379,6 +383,7 @@ impl<'f> OtherFiles<'f> {
             opened: Vec::new(),
             orders: None,
             consent: None,
+            media_bytes: 0,
             models: BTreeMap::new(),
             ends: BTreeMap::new(),
         }
@@ -387,14 +392,18 @@ impl<'f> OtherFiles<'f> {
     /// Reads a file that the protocol names, once. The returned fault concerns the
     /// protocol; the faults of the file itself are kept with the file.
     fn open(&mut self, name: &Named) -> Result<(), Fault> {
-        if self.opened.iter().any(|o| o.file == name.file) {
-            return Ok(());
+        if let Some(known) = self.opened.iter().find(|o| o.file == name.file) {
+            return match name.content {
+                Content::Media(medium) => media::check(&known.bytes, medium),
+                _ => Ok(()),
+            };
         }
         let (most, what) = match name.content {
             Content::Orders => (MAX_ORDERS_BYTES, "orders"),
             Content::Model => (MAX_MODEL_BYTES, "model"),
             Content::Text => (MAX_TEXT_BYTES, "consent"),
             Content::Bundle(_) => (archive::MAX_BYTES, "bundle"),
+            Content::Media(medium) => (media::MAX_BYTES, medium.as_str()),
         };
         let path = self.folder.join(&name.file);
         let bytes = read_capped(&path, most).map_err(|problem| {
@@ -402,6 +411,7 @@ impl<'f> OtherFiles<'f> {
                 .hint("paths are relative to the protocol")
         })?;
         let model = match &name.content {
+            Content::Media(medium) => return self.keep(&name.file, bytes, *medium),
             Content::Bundle(address) => Some(model_of(&bytes, address.as_deref())?),
             Content::Model | Content::Orders | Content::Text => None,
         };
@@ -549,46 +559,4 @@ fn text_of(bytes: &[u8]) -> Result<&str, Fault> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use std::fs;
-
-    /// The order of row 1 is valid, that of row 2 is not.
-    const PROTOCOL: &str = r#"
-format = "study-protocol/1"
-study = { id = "example", title = "An example", seed = 2007 }
-design = { participants = 1, repetitions = 3, order = "williams", min_distance = 3 }
-device = { kind = "manual", limits = { force_n = 12.0, velocity_mm_s = 1000.0 } }
-trial = { reference = "Operate the real switch." }
-models = [{ id = "A" }, { id = "B" }, { id = "C" }, { id = "D" }, { id = "E" }]
-analysis = { primary = "realism" }
-
-[[questions]]
-id = "realism"
-kind = "rating"
-prompt = "How realistic did it feel?"
-from = 1
-to = 7
-labels = { 1 = "not at all realistic", 7 = "very realistic" }
-"#;
-
-    #[test]
-    fn a_study_that_has_started_goes_on_even_if_some_of_its_orders_are_invalid() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(FILE_NAME);
-        fs::write(&path, PROTOCOL).unwrap();
-        assert!(load(&path).is_err());
-        let results = folder.path().join("results");
-        assert!(load_for(&path, &results).is_err());
-
-        let study = results.join("example");
-        fs::create_dir_all(&study).unwrap();
-        fs::write(study.join(layout::MANIFEST), "").unwrap();
-        for results in [&results, &study] {
-            let loaded = load_for(&path, results).unwrap();
-            let mut faults = loaded.findings.iter().flat_map(|f| &f.faults);
-            assert!(faults.any(|f| f.message.starts_with("row 2, position 12: ")));
-        }
-        assert!(load_frozen(&path).is_ok());
-    }
-}
+mod tests;
