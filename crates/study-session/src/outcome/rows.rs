@@ -7,7 +7,7 @@ use chrono::{DateTime, FixedOffset};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use study_base::text::{ModelId, PartId, ParticipantId, QuestionId};
-use study_plan::protocol::{Answer, DeviceKind, Role};
+use study_plan::protocol::{Answer, DeviceKind, Medium, Role};
 
 study_base::named! {
     /// The outcome of a trial.
@@ -85,6 +85,9 @@ pub struct RatingRow {
     pub paused_s: Option<f64>,
     pub felt_again_after_s: Option<f64>,
     pub answer_before_feedback: Option<Answer>,
+    pub media_offset_ms: Option<f64>,
+    pub media_uncertainty_ms: Option<f64>,
+    pub media_jitter_ms: Option<f64>,
 }
 
 impl RatingRow {
@@ -148,6 +151,9 @@ impl RatingRow {
             paused_s: None,
             felt_again_after_s: None,
             answer_before_feedback: None,
+            media_offset_ms: None,
+            media_uncertainty_ms: None,
+            media_jitter_ms: None,
         }
     }
 }
@@ -192,6 +198,7 @@ study_base::named! {
         State = "state",
         Reveal = "reveal",
         SelfWeighed = "self-weighed",
+        Media = "media",
     }
 }
 
@@ -209,6 +216,7 @@ impl AttemptEvent {
             Event::StateSet { .. } => Self::State,
             Event::Revealed { .. } => Self::Reveal,
             Event::SelfWeighed(_) => Self::SelfWeighed,
+            Event::MediaShown { .. } => Self::Media,
             _ => return None,
         })
     }
@@ -234,6 +242,9 @@ pub struct AttemptRow {
     pub text: String,
     pub at: DateTime<FixedOffset>,
     pub input_channel: Option<Channel>,
+    pub medium: Option<Medium>,
+    pub media_offset_ms: Option<f64>,
+    pub media_uncertainty_ms: Option<f64>,
 }
 
 /// One row of `participants.csv`.

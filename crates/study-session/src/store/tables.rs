@@ -36,7 +36,7 @@ mod tests {
     use study_plan::protocol::columns::{
         AttemptColumn, Column, IntervalColumn, Kind, ParticipantColumn, RatingColumn, Repeats,
     };
-    use study_plan::protocol::{Answer, DeviceKind, Role};
+    use study_plan::protocol::{Answer, DeviceKind, Medium, Role};
 
     /// Values for the fields of a row, drawn from a list.
     struct Draws<'a>(std::iter::Cycle<std::slice::Iter<'a, u32>>);
@@ -200,6 +200,9 @@ mod tests {
             paused_s: d.maybe(Draws::number),
             felt_again_after_s: d.maybe(Draws::number),
             answer_before_feedback: d.maybe(|d| Answer::Choice(vec![d.text()])),
+            media_offset_ms: d.maybe(Draws::number),
+            media_uncertainty_ms: d.maybe(Draws::number),
+            media_jitter_ms: d.maybe(Draws::number),
         }
     }
 
@@ -251,6 +254,7 @@ mod tests {
                 AttemptEvent::State,
                 AttemptEvent::Reveal,
                 AttemptEvent::SelfWeighed,
+                AttemptEvent::Media,
             ]),
             question: d.maybe(|_| question("realism")),
             from: d.maybe(|d| Answer::Choice(vec![d.text(), "b".to_owned()])),
@@ -262,12 +266,17 @@ mod tests {
                     Failure::MarkedBad,
                     Failure::Stopped,
                     Failure::Interrupted,
+                    Failure::Rendering,
+                    Failure::Media,
                 ])
             }),
             by: d.maybe(|d| d.of(&[Author::Participant, Author::Experimenter])),
             text: d.text(),
             at: d.time(),
             input_channel: d.maybe(|d| d.of(&[Channel::Terminal, Channel::Plain, Channel::Page])),
+            medium: d.maybe(|d| d.of(&Medium::ALL)),
+            media_offset_ms: d.maybe(Draws::number),
+            media_uncertainty_ms: d.maybe(Draws::number),
         }
     }
 

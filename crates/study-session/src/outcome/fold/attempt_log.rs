@@ -43,6 +43,9 @@ pub fn attempt_rows(
             text: String::new(),
             at: entry.at.wall,
             input_channel: None,
+            medium: None,
+            media_offset_ms: None,
+            media_uncertainty_ms: None,
         };
         match &entry.event {
             Event::AttemptStarted {
@@ -103,6 +106,20 @@ pub fn attempt_rows(
                         " [the order without it breaks its constraint]"
                     });
                 }
+            }
+            Event::MediaShown {
+                trial,
+                attempt,
+                interval,
+                medium,
+                offset_ms,
+                uncertainty_ms,
+            } => {
+                (row.trial, row.attempt) = (Some(*trial), Some(*attempt));
+                row.text = interval.map_or(String::new(), |n| format!("interval {n}"));
+                row.medium = Some(*medium);
+                row.media_offset_ms = Some(*offset_ms);
+                row.media_uncertainty_ms = Some(*uncertainty_ms);
             }
             Event::TrialClosed { trial, attempt } => {
                 (row.trial, row.attempt) = (Some(*trial), Some(*attempt));

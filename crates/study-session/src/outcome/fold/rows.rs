@@ -85,6 +85,7 @@ impl History {
         let finite = |x: f64| Some(x).filter(|x| x.is_finite());
         let done = counted.and_then(|a| a.done);
         let sitting = shown.map_or(&self.sitting, |a| &a.sitting);
+        let media = shown.and_then(|a| self.in_step(trial.trial, a));
         RatingRow {
             study: start.study.clone(),
             participant: start.participant.clone(),
@@ -151,6 +152,9 @@ impl History {
             paused_s: done.and_then(|d| d.paused_s),
             felt_again_after_s: felt.again_after_s,
             answer_before_feedback: before_feedback,
+            media_offset_ms: media.map(|m| m.onset.offset_ms),
+            media_uncertainty_ms: media.map(|m| m.onset.uncertainty_ms),
+            media_jitter_ms: media.and_then(|m| m.jitter_ms),
         }
     }
 
