@@ -216,7 +216,7 @@ mod tests {
     fn a_format_is_known_by_its_bytes_and_what_only_looks_like_one_is_none() {
         let png: &[u8] = b"\x89PNG\r\n\x1a\n\0\0\0\x0dIHDR\0\0\0\x01";
         let webm: &[u8] = b"\x1a\x45\xdf\xa3\x9fB\x86\x81\x01B\xf7\x81\x01B\xf2\x81\x04B\xf3\x81\x08B\x82\x84webm";
-        for (bytes, format) in [
+        let known: [(&[u8], MediaFormat); 8] = [
             (png, MediaFormat::Png),
             (b"\xff\xd8\xff\xe0\0\x10JFIF", MediaFormat::Jpeg),
             (webm, MediaFormat::WebM),
@@ -226,12 +226,13 @@ mod tests {
             (b"ID3\x04\0", MediaFormat::Mp3),
             // MPEG-1 layer III, 128 kbit/s, 44.1 kHz.
             (b"\xff\xfb\x90\x64", MediaFormat::Mp3),
-        ] {
+        ];
+        for (bytes, format) in known {
             assert_eq!(MediaFormat::of(bytes), Some(format), "{format:?}");
         }
         let matroska: &[u8] = b"\x1a\x45\xdf\xa3\x9fB\x82\x88matroska";
-        for other in [
-            b"".as_slice(),
+        let others: [&[u8]; 13] = [
+            b"",
             b"\x89PNG\r\n\x1a\n",
             b"GIF89a",
             b"RIFF\x24\0\0\0WEBPVP8 ",
@@ -245,7 +246,8 @@ mod tests {
             b"<?xml version=\"1.0\"?><svg/>",
             b"<html><script>",
             b"fmt study-model/1",
-        ] {
+        ];
+        for other in others {
             assert_eq!(MediaFormat::of(other), None, "{other:?}");
         }
     }
