@@ -1,6 +1,7 @@
 //! Pictures and sounds beside what is felt: nothing is answered about what nobody is known to have seen.
 
 use super::device::{failures, screen};
+use super::part_rig::pairs;
 use super::rig::{DeviceMood, Rig, start};
 use super::studies::{MODELS, plain};
 use chrono::TimeDelta;
@@ -448,6 +449,41 @@ fn a_resumed_session_asks_only_about_what_was_seen() {
     finish(&mut rig);
     rig.assert_whole();
     assert_eq!(rig.closed()[&1], Some(1));
+}
+
+#[test]
+fn each_interval_has_its_own_onsets_and_all_have_to_be_seen() {
+    let media = [Medium::Picture];
+    let mut rig = Rig::with_config(pairs(""), with(&media), Vec::new(), start());
+    rig.until("Reference").send(here(true)).send(Input::Advance);
+    assert_eq!((screen(&rig), cue(&rig)), ("Playing", 1));
+    came(&mut rig, Medium::Picture, 20.0, 1.0);
+    rig.send(here(true)).send(Input::Advance);
+    assert_eq!(
+        rig.view().cue,
+        None,
+        "between the intervals nothing is shown"
+    );
+    for _ in 0..50 {
+        if screen(&rig) != "Playing" {
+            rig.send(here(true)).wait(0.2);
+        }
+    }
+    assert_eq!((screen(&rig), cue(&rig)), ("Playing", 2));
+    came(&mut rig, Medium::Picture, 40.0, 1.0);
+    let intervals: Vec<Option<u32>> = (rig.events())
+        .filter_map(|event| match event {
+            Event::MediaShown { interval, .. } => Some(*interval),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(intervals, [Some(1), Some(2)]);
+    assert!(failures(&rig).is_empty());
+    // The page wakes up and says that the first one was not seen to its end.
+    lost(&mut rig, 1, Loss::Asleep);
+    let failed: Vec<Failure> = failures(&rig).into_iter().map(|(_, _, why)| why).collect();
+    assert_eq!(failed, [Failure::Media]);
+    assert_eq!(screen(&rig), "Reference");
 }
 
 #[test]
