@@ -1,15 +1,19 @@
 // Plays a session on the participant's page in headless Chromium, in three languages, two by
 // touch and one by keys alone, and has axe-core check every page in light and dark for WCAG 2.2 AA.
+// Then it plays one whose trials have a picture and a sound, and prints how late and how evenly they came in 200 onsets;
+// a page out of sight and a slow network have to fail or to wait.
 //
 //   node .ci/page.mjs STUDY MODULES [PICTURES]
 //
 // STUDY is the program, MODULES a folder in which `npm install puppeteer-core axe-core`
-// was run, PICTURES a folder for pictures of every page at six sizes.
+// was run, PICTURES a folder for pictures of every page at six sizes. Sounds go to the system's sound device; without one
+// Chromium plays them to nobody, at the same pace.
 import { spawn } from "node:child_process";
 import { cpSync, existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
+import { deflateSync } from "node:zlib";
 
 const [study, modules, pictures] = process.argv.slice(2).map((path) => path && resolve(path));
 const require = createRequire(join(modules, "x.js"));
@@ -250,9 +254,191 @@ async function play(lang, browser, keyboard) {
   return seen.size;
 }
 
+/** Onsets that are measured: half of them pictures, half of them sounds. */
+const ONSETS = 200;
+
+/** A picture of one color. */
+function png(width, height, [r, g, b]) {
+  const table = Array.from({ length: 256 }, (_, n) => {
+    for (let k = 0; k < 8; k += 1) n = n & 1 ? 0xedb88320 ^ (n >>> 1) : n >>> 1;
+    return n >>> 0;
+  });
+  const crc = (bytes) => (bytes.reduce((c, byte) => table[(c ^ byte) & 255] ^ (c >>> 8), 0xffffffff) ^ 0xffffffff) >>> 0;
+  const chunk = (name, data) => {
+    const body = Buffer.concat([Buffer.from(name), data]);
+    const out = Buffer.alloc(body.length + 8);
+    out.writeUInt32BE(data.length, 0);
+    body.copy(out, 4);
+    out.writeUInt32BE(crc(body), body.length + 4);
+    return out;
+  };
+  const head = Buffer.alloc(13);
+  head.writeUInt32BE(width, 0);
+  head.writeUInt32BE(height, 4);
+  head.set([8, 2, 0, 0, 0], 8);
+  const line = Buffer.concat([Buffer.from([0]), ...Array.from({ length: width }, () => Buffer.from([r, g, b]))]);
+  const pixels = Buffer.concat(Array.from({ length: height }, () => line));
+  return Buffer.concat([Buffer.from([0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a]), chunk("IHDR", head), chunk("IDAT", deflateSync(pixels)), chunk("IEND", Buffer.alloc(0))]);
+}
+
+/** A tenth of a second of 440 Hz, mono, 16 bits. */
+function wav() {
+  const rate = 44100, n = rate / 10;
+  const out = Buffer.alloc(44 + 2 * n);
+  out.write("RIFF", 0); out.writeUInt32LE(36 + 2 * n, 4); out.write("WAVEfmt ", 8);
+  out.writeUInt32LE(16, 16); out.writeUInt16LE(1, 20); out.writeUInt16LE(1, 22);
+  out.writeUInt32LE(rate, 24); out.writeUInt32LE(2 * rate, 28); out.writeUInt16LE(2, 32); out.writeUInt16LE(16, 34);
+  out.write("data", 36); out.writeUInt32LE(2 * n, 40);
+  for (let k = 0; k < n; k += 1) out.writeInt16LE(Math.round(12000 * Math.sin(2 * Math.PI * 440 * k / rate)), 44 + 2 * k);
+  return out;
+}
+
+/** The rows of a CSV, by the names of its columns. */
+function table(text) {
+  const cells = (line) => [...line.matchAll(/("(?:[^"]|"")*"|[^,]*)(?:,|$)/g)].map((m) => m[1].replace(/^"|"$/g, "").replaceAll('""', '"'));
+  const [header, ...rows] = text.trim().split(/\r?\n/).map(cells);
+  return rows.map((row) => Object.fromEntries(header.map((name, at) => [name, row[at]])));
+}
+
+function withMedia(trials) {
+  const model = (id) => `[[models]]\nid = "${id}"\nfile = "models/lambda-0.9991.toml"\npicture = "media/${id}.png"\nalt = "A colored square."\nsound = "media/click.wav"\ncaption = "A click."\n`;
+  return `format = "study-protocol/3"
+[study]
+id = "media"
+title = "Media"
+seed = 1
+[design]
+participants = 2
+repetitions = ${trials / 2}
+order = "blocked"
+max_attempts = 50
+[device]
+kind = "simulated"
+limits = { force_n = 12.0, velocity_mm_s = 1000.0 }
+uncertified = { play = true, force_n = 9.0, reason = "a test" }
+[trial]
+media_within_ms = 1000
+${model("one")}${model("two")}[[questions]]
+id = "realism"
+kind = "rating"
+prompt = "How realistic did it feel?"
+from = 1
+to = 7
+[analysis]
+primary = "realism"
+`;
+}
+
+/** Plays a session with a picture and a sound in each trial; prints how they came. */
+async function measure(browser) {
+  const folder = mkdtempSync(join(tmpdir(), "media-"));
+  cpSync("protocols/turn-signal", folder, { recursive: true });
+  writeFileSync(join(folder, "protocol.toml"), withMedia(ONSETS / 2));
+  mkdirSync(join(folder, "media"));
+  writeFileSync(join(folder, "media/one.png"), png(600, 400, [200, 40, 40]));
+  writeFileSync(join(folder, "media/two.png"), png(600, 400, [40, 40, 200]));
+  writeFileSync(join(folder, "media/click.wav"), wav());
+  const child = spawn(study, ["run", folder, "--plain", "--screen"], { cwd: folder });
+  let said = "";
+  child.stdout.on("data", (data) => { said += data; });
+  child.stderr.on("data", (data) => { said += data; });
+  const ended = new Promise((done) => child.on("exit", done));
+  child.stdin.write("P01\nx\n");
+  for (let n = 0; n < 200 && !/http:\S+/.test(said); n += 1) await sleep(50);
+  const context = await browser.createBrowserContext();
+  const page = await context.newPage();
+  page.on("console", (m) => { if (m.type() === "error" && !/favicon|ERR_ABORTED/.test(m.text() + (m.location().url ?? ""))) found(`media: console: ${m.text()}`); });
+  page.on("pageerror", (e) => found(`media: ${e}`));
+  await page.setViewport({ width: 768, height: 1024 });
+  await page.goto(said.match(/http:\S+/)[0]);
+  await page.evaluate(axe.source);
+  const shown = () => page.evaluate(() => ({
+    playing: !!document.querySelector(".stage img"), enabled: !!document.querySelector(".buttons .main:not(:disabled)"),
+    form: !!document.querySelector("[type=radio]"), wait: document.querySelector(".wait")?.textContent ?? "",
+  }));
+  const until = async (what, fine) => {
+    for (let n = 0; n < 600; n += 1) {
+      if (fine(await shown())) return true;
+      await sleep(50);
+    }
+    found(`media: never ${what}: ${JSON.stringify(await shown())}: ${said}`);
+    return false;
+  };
+  // Sounds wait for a touch.
+  await sleep(1500);
+  const locked = await page.$eval("#state", (line) => line.textContent);
+  console.log(`media: before a touch the page says: ${locked || "nothing"}`);
+  await page.mouse.click(5, 5);
+  await until("ready", (now) => now.enabled && !now.wait);
+  await sleep(450);
+  await page.click(".buttons .main");
+  await until("playing", (now) => now.playing);
+  await check(page, "media-playing");
+  const stop = await page.evaluate(() => { const r = document.querySelector(".stop").getBoundingClientRect(); return r.top >= 0 && r.bottom <= innerHeight; });
+  if (!stop) found("media: Stop is out of sight beside a picture");
+  await page.setViewport({ width: 768, height: 1024 });
+  // Out of sight while it plays: the attempt fails, and nothing begins until it is back.
+  const sight = (state) => page.evaluate((s) => {
+    Object.defineProperty(document, "visibilityState", { value: s, configurable: true });
+    document.dispatchEvent(new Event("visibilitychange"));
+  }, state);
+  if ((await shown()).playing) await sight("hidden");
+  await until("waiting out of sight", (now) => !now.playing && !now.enabled && now.wait);
+  await sight("visible");
+  await until("ready again", (now) => now.enabled && !now.wait);
+  // A slow network: no trial begins.
+  await page.emulateNetworkConditions({ download: -1, upload: -1, latency: 2500 });
+  await sleep(6000);
+  if ((await shown()).enabled) found("media: a trial could begin over a slow network");
+  await page.emulateNetworkConditions(null);
+  await until("ready after the slow network", (now) => now.enabled && !now.wait);
+  // From here on the page plays by itself.
+  await page.evaluate(() => {
+    setInterval(() => {
+      const box = document.querySelector("[type=radio]");
+      if (box) box.checked = true;
+      document.querySelector(".buttons .main:not(:disabled)")?.click();
+    }, 60);
+  });
+  for (let n = 0; n < 1800; n += 1) {
+    const over = await page.evaluate(async () => (await (await fetch("/view?after=0")).json()).over);
+    if (over) break;
+    await sleep(500);
+  }
+  const latency = await page.evaluate(() => { const a = new AudioContext(); return `${a.sampleRate} Hz, base ${(a.baseLatency * 1e3).toFixed(1)} ms`; });
+  child.stdin.write("\n");
+  child.stdin.end();
+  const code = await Promise.race([ended, sleep(20000)]);
+  if (code !== 0) found(`media: the session ended with ${code}: ${said}`);
+  const results = join(folder, "results/media");
+  const attempts = table(readFileSync(join(results, "attempts.csv"), "utf8"));
+  const ratings = table(readFileSync(join(results, "ratings.csv"), "utf8"));
+  const failed = attempts.filter((row) => row.what === "failure" && row.failure === "media");
+  if (!failed.length) found("media: a page out of sight failed no attempt");
+  let onsets = 0;
+  for (const medium of ["picture", "sound"]) {
+    const own = attempts.filter((row) => row.what === "media" && row.medium === medium);
+    const at = own.map((row) => Number(row.media_offset_ms)).sort((a, b) => a - b);
+    onsets += at.length;
+    if (!at.length) continue;
+    const mean = at.reduce((a, b) => a + b, 0) / at.length;
+    const sd = Math.sqrt(at.reduce((a, b) => a + (b - mean) ** 2, 0) / (at.length - 1));
+    const share = (p) => at[Math.min(at.length - 1, Math.floor(p * at.length))];
+    const wrong = Math.max(...own.map((row) => Number(row.media_uncertainty_ms)));
+    console.log(`media: ${at.length} onsets of a ${medium}: offset ${mean.toFixed(1)} ms, jitter ${sd.toFixed(1)} ms, from ${at[0].toFixed(1)} to ${at.at(-1).toFixed(1)} ms, 95 % below ${share(.95).toFixed(1)} ms; uncertainty at most ${wrong.toFixed(2)} ms`);
+  }
+  console.log(`media: ${failed.length} attempts failed (${[...new Set(failed.map((row) => row.text))].join("; ")}); sound: ${latency}`);
+  const rated = ratings.filter((row) => row.status === "ok");
+  if (onsets < ONSETS || rated.length !== ONSETS / 2) found(`media: ${onsets} onsets, ${rated.length} rated trials`);
+  if (rated.some((row) => !row.media_offset_ms || !row.media_uncertainty_ms)) found("media: a rated trial has no onset");
+  await context.close();
+  rmSync(folder, { recursive: true });
+}
+
 if (pictures) mkdirSync(pictures, { recursive: true });
 const browser = await puppeteer.launch({ executablePath: chromium, args: ["--no-sandbox"] });
 for (const lang of Object.keys(TEXTS)) console.log(`${lang}: ${await play(lang, browser, lang === "ja")} pages checked`);
+await measure(browser);
 await browser.close();
 console.log(`findings: ${findings}`);
 process.exit(findings ? 1 : 0);

@@ -145,7 +145,12 @@ pub fn rehearse(
     refuse_occupied(&study)?;
 
     let tables = loaded.tables();
-    let (deliveries, notices) = deliveries(&loaded)?;
+    let (deliveries, mut notices) = deliveries(&loaded)?;
+    if loaded.protocol.has_media() {
+        notices.push(
+            "pictures, videos and sounds are neither shown nor played in a rehearsal".to_owned(),
+        );
+    }
     let percepts = Percepts::of(&loaded.protocol, &tables);
     let seed = options.seed.unwrap_or(loaded.protocol.study.seed);
     let protocol = Arc::new(loaded.protocol);

@@ -9,17 +9,21 @@ mod board;
 mod code;
 mod connections;
 mod http;
+mod media;
 mod server;
 
 pub use access::secret;
+pub use media::Gallery;
 
 use crate::runner::beside::Own;
 use board::Board;
+use media::Stage;
 use server::Server;
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 use study_plan::protocol::phrases::Words;
+use study_session::session::cue::Shows;
 use study_session::session::{Input, View};
 
 /// A page that asks for nothing in this time has lost its connection.
@@ -92,17 +96,33 @@ impl std::str::FromStr for Address {
 pub struct Screen {
     server: Server,
     board: Arc<Board>,
+    stage: Arc<Stage>,
 }
 
 impl Screen {
-    /// Serves the page at an address, in the language of the study.
+    /// Serves the page at an address, in the language of the study, with its media.
     ///
     /// # Errors
     /// [`ScreenError`].
-    pub fn open(at: Address, lang: Option<&str>, words: &Words) -> Result<Self, ScreenError> {
+    pub fn open(
+        at: Address,
+        lang: Option<&str>,
+        words: &Words,
+        gallery: Gallery,
+    ) -> Result<Self, ScreenError> {
         let board = Arc::new(Board::new(secret()?));
-        let server = Server::open(at, lang, words, board.clone())?;
-        Ok(Self { server, board })
+        let stage = Arc::new(Stage::new(gallery));
+        let server = Server::open(at, lang, words, (board.clone(), stage.clone()))?;
+        Ok(Self {
+            server,
+            board,
+            stage,
+        })
+    }
+
+    /// What the page shows and plays of each realization; `None` if the study has no media.
+    pub fn shows(&self) -> Option<Arc<Shows>> {
+        self.stage.shows()
     }
 
     /// The link that opens the page, once.
@@ -128,13 +148,17 @@ impl Own for Screen {
 
     fn inputs(&mut self, view: &View) -> Vec<Input> {
         let input = self.board.with(|exchange| exchange.input(view));
-        input.into_iter().collect()
+        // A reply is about what was shown: what is said of the media comes after it.
+        input.into_iter().chain(self.stage.inputs()).collect()
     }
 
     fn notice(&self) -> Option<String> {
         let silent = self.board.silent_for().is_some_and(|s| s > SILENCE);
         if silent {
             return Some("the participant's page has no connection".to_owned());
+        }
+        if let Some(what) = self.stage.notice() {
+            return Some(what);
         }
         // A line that seldom changes: a power of ten.
         let refused = 10_u64.pow(self.server.refused_now()?.checked_ilog10()?);

@@ -92,6 +92,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     // error message stays on the screen.
     let participant = check_ids(args)?;
     loaded.check_playable(kind)?;
+    page::can_present(&loaded.protocol, args.screen.is_some())?;
     let times = hurry::hurry(std::env::var(hurry::VARIABLE).ok(), kind)?;
     let clock: Box<dyn Clock> = match times {
         1 => Box::new(RealClock::default()),
@@ -149,8 +150,13 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let plain = args.plain || wants_plain(|name| std::env::var(name).ok());
     let mut simulated = false;
     let mut front_name = None;
+    let mut media = None;
     let own: Option<Box<dyn Own>> = match (args.screen, &args.front) {
-        (Some(at), _) => Some(Box::new(page::open(at, &loaded.protocol, plain, console)?)),
+        (Some(at), _) => {
+            let screen = page::open(at, &loaded, plain, console)?;
+            media = screen.shows();
+            Some(Box::new(screen))
+        }
         (None, Some(command)) => {
             let front = page::start(command, &loaded.protocol)?;
             simulated = front.hello().is_some_and(|hello| hello.simulated);
@@ -254,6 +260,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         operator: args.operator.clone().unwrap_or_default(),
         front: front_name,
         roster: Some(Arc::new(roster)),
+        media,
         auto_identify: args.participant.is_some() && args.operator.is_some(),
     };
     let study = setup.study.clone();

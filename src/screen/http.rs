@@ -2,6 +2,7 @@
 
 use std::io::{self, Read as _, Write as _};
 use std::net::TcpStream;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Longest request line with headers, bytes.
@@ -40,6 +41,10 @@ pub(super) struct Response {
     /// Name and value of a cookie.
     pub(super) cookie: Option<String>,
     pub(super) body: Vec<u8>,
+    /// Instead of a body: the content of a file, which other requests share.
+    pub(super) file: Option<Arc<[u8]>>,
+    /// Whether it is a document that shows and plays what its script has loaded.
+    pub(super) shows_media: bool,
 }
 
 impl Response {
@@ -56,26 +61,32 @@ impl Response {
         Self {
             status: 200,
             content_type,
-            cookie: None,
             body: body.into(),
+            ..Self::default()
         }
     }
 
     /// Sends the response.
     pub(super) fn send(&self, stream: &mut TcpStream) -> io::Result<()> {
+        let body: &[u8] = self.file.as_deref().unwrap_or(&self.body);
+        // The script makes these addresses of what it has loaded; no server has any.
+        let media = match self.shows_media {
+            true => " img-src blob:; media-src blob:;",
+            false => "",
+        };
         let mut head = format!(
             "HTTP/1.1 {} {}\r\n\
              Content-Length: {}\r\n\
              Connection: close\r\n\
              Cache-Control: no-store\r\n\
              Content-Security-Policy: default-src 'none'; script-src 'self'; style-src 'self'; \
-             connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'\r\n\
+             connect-src 'self';{media} base-uri 'none'; form-action 'none'; frame-ancestors 'none'\r\n\
              Cross-Origin-Resource-Policy: same-origin\r\n\
              Referrer-Policy: no-referrer\r\n\
              X-Content-Type-Options: nosniff\r\n",
             self.status,
             reason(self.status),
-            self.body.len(),
+            body.len(),
         );
         if !self.content_type.is_empty() {
             head.push_str(&format!("Content-Type: {}\r\n", self.content_type));
@@ -88,7 +99,12 @@ impl Response {
         head.push_str("\r\n");
         stream.set_write_timeout(Some(DEPARTURE))?;
         let mut bytes = head.into_bytes();
-        bytes.extend_from_slice(&self.body);
+        if self.file.is_some() {
+            stream.write_all(&bytes)?;
+            stream.write_all(body)?;
+            return stream.flush();
+        }
+        bytes.extend_from_slice(body);
         stream.write_all(&bytes)?;
         stream.flush()
     }

@@ -5,6 +5,8 @@
   const $ = (id) => document.getElementById(id);
   const words = document.body.dataset;
   const main = $("page");
+  /** Pictures, videos and sounds, if the study has them (media.js). */
+  const media = window.studyMedia ?? null;
   /** Taps within this time after a page appeared are meant for the page before, ms. */
   const UNREAD = 400;
   let page = null;      // what is shown
@@ -247,6 +249,7 @@
     if (!isNew) { update(now); return; }
     since = performance.now();
     fields = [];
+    const stage = media ? media.render(now.media ?? null) : null;
     // A pause or a fault hides a form; whatever can be acted on has taken its place.
     if (!now.questions.length && (now.buttons.length || now.stop)) draft = null;
     const nodes = [];
@@ -260,6 +263,7 @@
       const clock = make("p", { className: "clock", ariaHidden: "true" });
       const wait = make("p", { className: "wait" });
       wait.setAttribute("role", "timer");
+      if (stage) nodes.push(stage);
       nodes.push(body, clock, wait);
       const row = make("div", { className: "buttons" });
       now.buttons.forEach((b, at) => row.append(button(b.does, b.label, at === 0 ? "main" : "")));
@@ -290,10 +294,12 @@
     document.title = head ? head.textContent.split("\n")[0].slice(0, 80) : "";
     if (head) head.focus({ preventScroll: true });
     scrollTo(0, 0);
+    if (stage) stage.scrollIntoView({ block: "nearest" });
   }
 
   function closed() {
     page = null;
+    if (media) media.render(null);
     main.replaceChildren(make("h1", { tabIndex: -1, textContent: words.closed }));
     state("");
     document.title = words.closed;
@@ -326,6 +332,7 @@
       } catch { state(words.lost); }
       if (!opened) await sleep(500);
     }
+    if (media) media.begin();
     let revision = 0, lost = false;
     for (;;) {
       try {

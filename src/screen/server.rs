@@ -4,6 +4,7 @@ use super::access::{Access, secret};
 use super::board::Board;
 use super::connections::Connections;
 use super::http::{self, Request, Response};
+use super::media::Stage;
 use super::{Address, ScreenError};
 use maud::{DOCTYPE, html};
 use std::io;
@@ -21,6 +22,7 @@ const STACK: usize = 256 * 1024;
 
 const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
+const MEDIA_SCRIPT: &str = include_str!("media.js");
 
 /// A running server; it ends when it is dropped.
 #[derive(Debug)]
@@ -33,6 +35,7 @@ pub(super) struct Server {
 #[derive(Debug)]
 struct Shared {
     board: Arc<Board>,
+    stage: Arc<Stage>,
     access: Mutex<Access>,
     /// The document, which holds nothing of the session.
     document: String,
@@ -45,7 +48,7 @@ impl Server {
         at: Address,
         lang: Option<&str>,
         words: &Words,
-        board: Arc<Board>,
+        (board, stage): (Arc<Board>, Arc<Stage>),
     ) -> Result<Self, ScreenError> {
         let failed = |source| ScreenError::Listen {
             at: at.socket(),
@@ -62,7 +65,8 @@ impl Server {
                 (format!("study-{}", address.port()), secret()?),
                 hosts(address),
             )),
-            document: document(lang, words),
+            document: document(lang, words, stage.is_needed()),
+            stage,
             begun: Instant::now(),
             open: Mutex::default(),
         });
@@ -119,7 +123,8 @@ fn hosts(address: SocketAddr) -> Vec<String> {
     hosts
 }
 
-fn document(lang: Option<&str>, words: &Words) -> String {
+fn document(lang: Option<&str>, words: &Words, media: bool) -> String {
+    let of_media = |phrase| media.then(|| words.get(phrase));
     let lang = lang.unwrap_or("en");
     let dir = match is_right_to_left(lang) {
         true => "rtl",
@@ -134,6 +139,7 @@ fn document(lang: Option<&str>, words: &Words) -> String {
                 meta name="color-scheme" content="light dark";
                 title { (words.get(Phrase::OneMoment)) }
                 link rel="stylesheet" href="/page.css";
+                @if media { script src="/media.js" defer {} }
                 script src="/page.js" defer {}
             }
             body
@@ -142,6 +148,8 @@ fn document(lang: Option<&str>, words: &Words) -> String {
                 data-saving=(words.get(Phrase::Saving))
                 data-saved=(words.get(Phrase::Saved))
                 data-needed=(words.get(Phrase::PlainNeeded))
+                data-tap=[of_media(Phrase::PageTap)]
+                data-moving=[of_media(Phrase::PageMoving)]
             {
                 header { p id="where" {} progress id="bar" hidden aria-hidden="true" {} p id="banner" {} }
                 main id="page" { h1 { (words.get(Phrase::OneMoment)) } }
@@ -193,10 +201,11 @@ impl Shared {
         // Only a response that leaves late is the consequence.
         let _ = stream.set_nodelay(true);
         let request = http::read(&mut stream, |head| self.recognize(id, head));
+        let arrived = Instant::now();
         match request {
             // A browser that is gone asks again.
             Ok(request) => {
-                let _ = self.answer(id, &request).send(&mut stream);
+                let _ = self.answer(id, &request, arrived).send(&mut stream);
             }
             // No browser sends this. It is told so as long as strangers have requests left.
             Err(status) => {
@@ -219,7 +228,7 @@ impl Shared {
         }
     }
 
-    fn answer(&self, id: u64, request: &Request) -> Response {
+    fn answer(&self, id: u64, request: &Request, arrived: Instant) -> Response {
         let known = {
             let mut access = self.access();
             let named = access.knows_host(&request.host);
@@ -237,8 +246,16 @@ impl Shared {
             }
             known
         };
+        if self.stage.is_needed()
+            && let Some(response) = self.media(request, known, arrived)
+        {
+            return response;
+        }
         match (request.method.as_str(), request.path.as_str()) {
-            ("GET", "/") => Response::body("text/html; charset=utf-8", self.document.as_str()),
+            ("GET", "/") => Response {
+                shows_media: self.stage.is_needed(),
+                ..Response::body("text/html; charset=utf-8", self.document.as_str())
+            },
             ("GET", "/page.css") => Response::body("text/css; charset=utf-8", STYLE),
             ("GET", "/page.js") => Response::body("text/javascript; charset=utf-8", SCRIPT),
             ("GET", "/view") if known => {
@@ -256,6 +273,40 @@ impl Shared {
             }
             _ => Response::empty(404),
         }
+    }
+
+    /// The answer to a request that is about media.
+    fn media(&self, request: &Request, known: bool, arrived: Instant) -> Option<Response> {
+        let path = request.path.as_str();
+        let id = path.strip_prefix("/media/");
+        if id.is_none() && !matches!(path, "/media" | "/media.js" | "/clock") {
+            return None;
+        }
+        let json = |text: String| Response::body("application/json", text);
+        Some(match (request.method.as_str(), path, id) {
+            ("GET", "/media.js", _) => {
+                Response::body("text/javascript; charset=utf-8", MEDIA_SCRIPT)
+            }
+            ("POST", "/clock" | "/media", _) if !self.is_own(request) => Response::empty(403),
+            _ if !known => Response::empty(401),
+            ("GET", "/media", _) => json(self.stage.list()),
+            ("GET", _, Some(id)) => match self.stage.file(id) {
+                Some((content_type, file)) => Response {
+                    file: Some(file),
+                    ..Response::body(content_type, Vec::new())
+                },
+                None => Response::empty(404),
+            },
+            ("POST", "/clock", _) => match self.stage.here(&request.body, arrived) {
+                Ok(times) => json(times),
+                Err(status) => Response::empty(status),
+            },
+            ("POST", "/media", _) => {
+                let told = self.stage.told(&request.body);
+                Response::empty(told.err().unwrap_or(200))
+            }
+            _ => Response::empty(405),
+        })
     }
 
     /// Whether a request was made by a page of this server: no form of another site can

@@ -37,6 +37,40 @@ the planned participants, VAFs and covariates can be made while a study runs, wi
 A whole protocol is in [protocols/turn-signal](../protocols/turn-signal/protocol.toml).
 ";
 
+const MEDIA: &str = r#"
+## Media: an example
+
+A drawer is felt while its picture is seen; in one of two realizations a click is heard as well. The page shows and plays the
+media of an interval when the device confirms its start ([screen.md](screen.md#pictures-videos-and-sounds)).
+
+```toml
+format = "study-protocol/3"
+
+[trial]
+media_within_ms = 60
+
+[[models]]
+id = "silent"
+file = "models/drawer.toml"
+picture = "media/drawer.jpg"
+alt = "A drawer of dark wood, half open."
+
+[[models]]
+id = "click"
+file = "models/drawer.toml"
+picture = "media/drawer.jpg"
+alt = "A drawer of dark wood, half open."
+sound = "media/click.wav"
+caption = "A click."
+```
+
+The files lie in the folder of the protocol, have at most 16 MiB each and 128 MiB together, and are frozen with it; their SHA-256 is part of
+the stimulus. Their first bytes decide what they are, not their names. An SVG is refused, because it can carry programs. Realizations
+that look the same need the same `alt`, and those that sound the same, too, the same `caption`: what is read must not tell them apart. A
+hidden duplicate has the media of its original. Levels of families and points of spaces have none. `study run` needs `--screen`;
+`study rehearse` goes on without media and says so.
+"#;
+
 fn page() -> String {
     let mut out = HEAD.to_owned();
     table(&mut out, "The top level", "", &ROOT[..1]);
@@ -74,6 +108,7 @@ fn page() -> String {
         let _ = writeln!(out, "* `[[{}]]`: {}", key.name, key.effect);
     }
     alternatives(&mut out, questions[0].1);
+    out.push_str(MEDIA);
     out
 }
 

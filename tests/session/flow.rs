@@ -16,6 +16,7 @@ mod identification;
 mod initials;
 mod interpreters;
 mod late_forms;
+mod media;
 mod part_rig;
 mod parts;
 mod pauses;

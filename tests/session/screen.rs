@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod guarded;
+mod media;
 mod strangers;
 mod tap;
 

@@ -142,6 +142,8 @@ pub(crate) fn view(screen: Screen) -> View {
         has_reference: false,
         numbered: false,
         adjusting: None,
+        cue: None,
+        awaits_page: false,
         progress: before.then_some(Progress {
             practice: false,
             current: 7,

@@ -60,6 +60,7 @@ pub(crate) fn design(models: usize, repetitions: u32, order: Order) -> Protocol 
             reference_min_s: 0.0,
             minimum_strokes: 0,
             exposure: Default::default(),
+            media_within_ms: MEDIA_WITHIN_MS,
         },
         models: (b'A'..=b'Z')
             .chain(b'a'..=b'z')
@@ -121,5 +122,6 @@ pub(crate) fn model(id: &str) -> ModelEntry {
         device: None,
         covariates: BTreeMap::new(),
         levels: BTreeMap::new(),
+        media: Default::default(),
     }
 }

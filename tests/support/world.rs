@@ -41,6 +41,7 @@ pub fn protocol() -> Protocol {
         device: None,
         covariates: BTreeMap::from([("lambda".to_owned(), 0.9 + 0.01 * i as f64)]),
         levels: BTreeMap::new(),
+        media: Default::default(),
     };
     let mut small = design(0, 1, Order::Blocked);
     "small".clone_into(&mut small.study.id);

@@ -31,6 +31,7 @@ mod errors;
 mod families;
 mod frozen;
 mod join;
+mod media;
 mod prose;
 mod recordings;
 mod spaces;
@@ -294,6 +295,7 @@ fn open(path: &Path, purpose: Purpose<'_>) -> (Option<Loaded>, Vec<Findings>) {
     others.texts.fill(&mut protocol);
     others.assign(&protocol);
     others.turn(protocol.device.lever_mm);
+    media::pin(&mut protocol, &others, &spans, &mut findings);
     join::vaf(&mut protocol, &others, &spans, &mut findings);
     join::too_close(&protocol, &others, &mut findings);
     if data.is_none() {
@@ -353,6 +355,8 @@ struct OtherFiles<'f> {
     orders: Option<FileOrders>,
     /// What participants read.
     texts: prose::Texts,
+    /// Bytes of all media.
+    media_bytes: usize,
     /// Realization → index in `opened`.
     models: BTreeMap<ModelId, usize>,
     /// The same for the ends of families and for spaces.
@@ -376,6 +380,7 @@ impl<'f> OtherFiles<'f> {
             opened: Vec::new(),
             orders: None,
             texts: prose::Texts::default(),
+            media_bytes: 0,
             models: BTreeMap::new(),
             ends: BTreeMap::new(),
         }
@@ -385,17 +390,24 @@ impl<'f> OtherFiles<'f> {
     /// protocol; the faults of the file itself are kept with the file.
     fn open(&mut self, name: &Named) -> Result<(), Fault> {
         if let Some(opened) = self.opened.iter().find(|o| o.file == name.file) {
-            // One file may have two texts; its faults are known.
-            if let (Content::Text(which), Ok(text)) = (&name.content, text_of(&opened.bytes)) {
-                self.texts.read(*which, String::new(), text);
-            }
-            return Ok(());
+            return match &name.content {
+                Content::Media(medium) => media::check(&opened.bytes, *medium),
+                // One file may have two texts; its faults are known.
+                Content::Text(which) => {
+                    if let Ok(text) = text_of(&opened.bytes) {
+                        self.texts.read(*which, String::new(), text);
+                    }
+                    Ok(())
+                }
+                Content::Model | Content::Orders | Content::Bundle(_) => Ok(()),
+            };
         }
         let (most, what) = match name.content {
             Content::Orders => (MAX_ORDERS_BYTES, "orders"),
             Content::Model => (MAX_MODEL_BYTES, "model"),
             Content::Text(which) => (prose::MAX_BYTES, prose::name(which)),
             Content::Bundle(_) => (archive::MAX_BYTES, "bundle"),
+            Content::Media(medium) => (media::MAX_BYTES, medium.as_str()),
         };
         let path = self.folder.join(&name.file);
         let bytes = read_capped(&path, most).map_err(|problem| {
@@ -403,6 +415,7 @@ impl<'f> OtherFiles<'f> {
                 .hint("paths are relative to the protocol")
         })?;
         let model = match &name.content {
+            Content::Media(medium) => return self.keep(&name.file, bytes, *medium),
             Content::Bundle(address) => Some(model_of(&bytes, address.as_deref())?),
             Content::Model | Content::Orders | Content::Text(_) => None,
         };
@@ -419,7 +432,7 @@ impl<'f> OtherFiles<'f> {
                     findings
                 }
                 Content::Text(which) => self.texts.read(which, shown, text),
-                Content::Model | Content::Bundle(_) => {
+                Content::Model | Content::Bundle(_) | Content::Media(_) => {
                     let (read, findings) = study_haptics::model::file::parse(&shown, text);
                     realization = read;
                     findings
@@ -548,46 +561,4 @@ fn text_of(bytes: &[u8]) -> Result<&str, Fault> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use std::fs;
-
-    /// The order of row 1 is valid, that of row 2 is not.
-    const PROTOCOL: &str = r#"
-format = "study-protocol/1"
-study = { id = "example", title = "An example", seed = 2007 }
-design = { participants = 1, repetitions = 3, order = "williams", min_distance = 3 }
-device = { kind = "manual", limits = { force_n = 12.0, velocity_mm_s = 1000.0 } }
-trial = { reference = "Operate the real switch." }
-models = [{ id = "A" }, { id = "B" }, { id = "C" }, { id = "D" }, { id = "E" }]
-analysis = { primary = "realism" }
-
-[[questions]]
-id = "realism"
-kind = "rating"
-prompt = "How realistic did it feel?"
-from = 1
-to = 7
-labels = { 1 = "not at all realistic", 7 = "very realistic" }
-"#;
-
-    #[test]
-    fn a_study_that_has_started_goes_on_even_if_some_of_its_orders_are_invalid() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(FILE_NAME);
-        fs::write(&path, PROTOCOL).unwrap();
-        assert!(load(&path).is_err());
-        let results = folder.path().join("results");
-        assert!(load_for(&path, &results).is_err());
-
-        let study = results.join("example");
-        fs::create_dir_all(&study).unwrap();
-        fs::write(study.join(layout::MANIFEST), "").unwrap();
-        for results in [&results, &study] {
-            let loaded = load_for(&path, results).unwrap();
-            let mut faults = loaded.findings.iter().flat_map(|f| &f.faults);
-            assert!(faults.any(|f| f.message.starts_with("row 2, position 12: ")));
-        }
-        assert!(load_frozen(&path).is_ok());
-    }
-}
+mod tests;

@@ -24,6 +24,7 @@ pub mod groups;
 pub mod identification;
 pub mod keys;
 pub mod kinds;
+pub mod media;
 pub mod outcomes;
 pub mod pairs;
 mod part_design;
@@ -54,6 +55,7 @@ pub use factors::{Crossing, Factor};
 pub use groups::{Assign, Assigned, GroupRules, Groups, SessionPlan};
 pub use identification::{Criterion, Drawn, Feedback, Identification, Label};
 pub use kinds::QuestionKind;
+pub use media::{MEDIA_WITHIN_MS, Media, MediaFile, MediaFormat, Medium};
 pub use outcomes::{
     Answers, BetterEnd, Clock, Measure, OutcomeFamily, OutcomeRules, Telemetry, Transform,
 };
@@ -444,6 +446,9 @@ pub struct TrialRules {
     pub minimum_strokes: u32,
     /// How long a realization is felt; of a part that does not say it, too.
     pub exposure: Exposure,
+    /// Largest time between the device's confirmed start and the onset of a medium, ms; beyond it the
+    /// attempt fails. In the fingerprints of protocols with media only.
+    pub media_within_ms: f64,
 }
 
 /// One of `[[models]]`: a realization.
@@ -466,6 +471,9 @@ pub struct ModelEntry {
     /// Its level in each of `[[factors]]`.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub levels: BTreeMap<String, String>,
+    /// What the participant's page shows and plays of it.
+    #[serde(skip_serializing_if = "Media::is_empty")]
+    pub media: Media,
 }
 
 words! {

@@ -10,6 +10,7 @@ pub mod cell;
 pub mod event;
 pub mod fidelity;
 pub mod fold;
+pub mod media;
 pub mod motion;
 pub mod ratings;
 pub mod rows;
@@ -19,6 +20,7 @@ pub use event::{
     SelfWeighed, Start, State, TelemetryFile, TrackLevel,
 };
 pub use fidelity::{Defect, Fidelity, Verdict};
+pub use media::{Onset, Onsets};
 pub use rows::{AttemptEvent, AttemptRow, IntervalRow, ParticipantRow, RatingRow, Status};
 
 /// A row says what its realization is; readers of rows need no protocol for it.

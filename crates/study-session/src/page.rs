@@ -17,6 +17,7 @@ pub mod reply;
 pub use of_view::{ago, attending, page};
 pub use question::{Asked, Field};
 
+use crate::session::cue::Cue;
 use crate::session::{Screen, View};
 use serde::{Deserialize, Serialize};
 use study_base::text::{Untrusted, capital, cut_end};
@@ -59,6 +60,9 @@ pub struct Page {
     /// The course of a playback.
     #[serde(skip)]
     pub playback: Option<PlaybackWords>,
+    /// What the participant's page shows and plays beside what is felt.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub media: Option<Cue>,
     /// The questions.
     pub questions: Vec<Asked>,
     /// What can be done.
@@ -324,6 +328,7 @@ impl Page {
             title: words.get(Phrase::OneMoment).to_owned(),
             text: String::new(),
             advice: None,
+            media: None,
             questions: Vec::new(),
             buttons: Vec::new(),
             decline: None,
@@ -348,6 +353,11 @@ impl Page {
         self.stop.iter_mut().for_each(sentence);
         self.title = safe(&self.title);
         self.text = safe(&self.text);
+        for shown in self.media.iter_mut().flat_map(|cue| &mut cue.media) {
+            for text in [&mut shown.alt, &mut shown.caption].into_iter().flatten() {
+                *text = safe(text);
+            }
+        }
         // In a word: a phone is narrow.
         if let Some((short, _)) = self.banner.as_ref().and_then(|b| b.split_once(" — ")) {
             self.banner = Some(short.to_owned());

@@ -19,6 +19,7 @@
 //!   [`Effect::Limp`].
 //! * After a stop, a pause or a fault nothing is loaded or started until somebody
 //!   requests it again.
+//! * Nothing is answered about a picture, video or sound that did not come in time, or that nobody is known to have seen.
 //! * Nothing is answered after a longer pause than the protocol allows, nor compared over one: it is
 //!   felt again.
 //!
@@ -30,10 +31,12 @@ mod away;
 mod between;
 mod consenting;
 mod course;
+pub mod cue;
 mod failures;
 mod flow;
 mod forms;
 pub mod input;
+mod media;
 mod opening;
 mod own_answers;
 mod phase;
@@ -74,6 +77,8 @@ pub struct Config {
     pub front: Option<String>,
     /// Who is known already, for a line on the first screen.
     pub roster: Option<Arc<Roster>>,
+    /// What the participant's page shows and plays beside what is felt; `None` if nobody presents media.
+    pub media: Option<Arc<cue::Shows>>,
     /// Use the presets without showing the first screen.
     pub auto_identify: bool,
 }
@@ -109,6 +114,8 @@ pub struct Session {
     running: Vec<tracks::Running>,
     /// The last pair of a search, with the answers from which it follows.
     searching: Option<search::Searching>,
+    /// What the participant's page shows and plays.
+    media: media::MediaState,
     /// Whether the last answer was correct, until the participant is told.
     feedback: Option<Told>,
     /// Remarks of this process.
@@ -170,6 +177,7 @@ impl Session {
             parts_shown: BTreeSet::new(),
             running: Vec::new(),
             searching: None,
+            media: media::MediaState::new(config.media),
             feedback: None,
             remarks: Vec::new(),
             channel: None,
@@ -244,6 +252,7 @@ impl Session {
             Input::PlaybackLost(what) => self.playback_lost(&what, at),
             Input::DeviceReady => self.device_ready(),
             Input::StoodStill { seconds } => self.did_not_run(seconds, at),
+            Input::Media(report) => self.media_report(report, at),
             Input::Identify {
                 participant,
                 operator,
@@ -310,5 +319,6 @@ fn is_deliberate(input: &Input) -> bool {
             | Input::DeviceStopped(_)
             | Input::DeviceReady
             | Input::StoodStill { .. }
+            | Input::Media(_)
     )
 }

@@ -3,7 +3,7 @@
 use super::super::run::wants_plain;
 use super::system;
 use crate::doctor::{Machine, Page, Terminal};
-use crate::screen::{Address, Screen};
+use crate::screen::{Address, Gallery, Screen};
 use crate::tui::ColorDepth;
 use crate::tui::views::MINIMUM;
 use std::collections::BTreeMap;
@@ -74,7 +74,7 @@ pub(super) fn page() -> Page {
     let at = SocketAddr::new(ip.unwrap_or(Ipv4Addr::LOCALHOST.into()), 0).ip();
     let served = at.to_string().parse::<Address>().and_then(|at| {
         let words = Words::new(None, &BTreeMap::new());
-        Screen::open(at, None, &words)
+        Screen::open(at, None, &words, Gallery::default())
     });
     Page {
         address: ip.map(|ip| ip.to_string()),

@@ -66,11 +66,14 @@ const HIDDEN: &[&str] = &[
     "finished",
     "intervals",
     "level",
+    "medium",
     "model",
+    "offset_ms",
     "part",
     "point",
     "rendering",
     "track",
+    "uncertainty_ms",
 ];
 
 /// Fields of a playback that tell nothing of a realization.
@@ -194,6 +197,16 @@ pub(super) fn words(event: &Event, revealed: bool) -> String {
             let felt = felt(playback);
             format!("{} ends{felt}{by_hand}{verdict}", of_interval(*interval))
         }
+        Event::MediaShown {
+            medium,
+            offset_ms,
+            uncertainty_ms,
+            ..
+        } if revealed => format!(
+            "the {} comes {offset_ms:.1} ms after the start, ± {uncertainty_ms:.1} ms",
+            medium.as_str()
+        ),
+        Event::MediaShown { .. } => "the participant's page shows or plays it".to_owned(),
         Event::Adjusted { standard: true, .. } => "the standard is asked for".to_owned(),
         Event::Adjusted { to, .. } if revealed => format!("{to} comes next"),
         // A step away, or after the standard the same.

@@ -2,10 +2,11 @@
 
 use super::super::{Console, Failure, Kind, command_line};
 use crate::front::Front;
-use crate::screen::{Address, Screen, ScreenError, secret};
+use crate::screen::{Address, Gallery, Screen, ScreenError, secret};
 use crossterm::event::{self, Event, KeyCode};
 use std::io::IsTerminal as _;
 use std::time::Duration;
+use study_analysis::load::Loaded;
 use study_plan::protocol::{Entry, Protocol};
 
 /// How often it is checked whether the page was opened.
@@ -15,13 +16,16 @@ const CHECK: Duration = Duration::from_millis(100);
 /// the link is hidden during the session.
 pub(super) fn open(
     at: Address,
-    protocol: &Protocol,
+    loaded: &Loaded,
     plain: bool,
     console: &mut Console,
 ) -> Result<Screen, Failure> {
+    let protocol = &loaded.protocol;
     has_use(protocol, "--screen")?;
     let words = protocol.text.phrases();
-    let opened = Screen::open(at, protocol.text.lang.as_deref(), &words);
+    let gallery = Gallery::of(protocol, &loaded.files);
+    let opened = gallery
+        .and_then(|gallery| Screen::open(at, protocol.text.lang.as_deref(), &words, gallery));
     let screen = opened.map_err(|e| unusable(&e))?;
     if plain {
         console.out(format!("The participant's page: {}\n", screen.link()))?;
@@ -51,6 +55,17 @@ pub(super) fn start(command: &str, protocol: &Protocol) -> Result<Front, Failure
         Failure::new(Kind::Usage, &error)
             .hint("--front \"PROGRAM ARGUMENTS\" names a program that speaks docs/page.md")
     })
+}
+
+/// Refuses a study with media where no page shows and plays them.
+pub(super) fn can_present(protocol: &Protocol, on_page: bool) -> Result<(), Failure> {
+    if on_page || !protocol.has_media() {
+        return Ok(());
+    }
+    Err(Failure::input(
+        "this study has pictures, videos or sounds, which only the participant's page shows and plays",
+    )
+    .hint("run it with --screen, or with --screen=ADDRESS for a tablet; docs/screen.md"))
 }
 
 /// Refuses a screen of the participant's own where the experimenter types the answers.

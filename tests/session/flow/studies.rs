@@ -46,6 +46,7 @@ pub(crate) fn plain() -> Protocol {
         device: None,
         covariates: BTreeMap::new(),
         levels: BTreeMap::new(),
+        media: Default::default(),
     };
     let mut models: Vec<_> = MODELS[..3].iter().map(|id| model(id, Role::Test)).collect();
     models.push(model(PRACTICE, Role::Practice));

@@ -5,6 +5,13 @@
 //! each column; a column without a cell does not compile, and a field of a row without
 //! a column is an unused variable.
 
+mod reserved;
+
+pub use reserved::{
+    are_of_parts, is_participants_column, is_participants_column_of_parts, is_parts_column,
+    is_ratings_column,
+};
+
 /// What the cells of a column hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
@@ -203,6 +210,7 @@ const INPUT_CHANNEL: Column = level(
 .optional();
 const NEVER_PRESENTED: &str = "the trial was never presented";
 const NO_TELEMETRY: &str = "no playback ended, or the device sent no telemetry";
+const NO_MEDIA: &str = "the page showed and played nothing, or did not confirm it";
 
 /// Declares the columns of a table, in the order of its header.
 macro_rules! table {
@@ -366,6 +374,12 @@ table! {
             .unit("s").empty("less than 1 s, of unknown length, or none was asked").optional(),
         QuestionnaireLate: flag("questionnaire_late", "whether these pauses were longer than the protocol allows between feeling and answering (`longest_pause_s`): the questionnaires were answered from memory")
             .empty("they were not, or none was asked").optional(),
+        MediaOffsetMs: number("media_offset_ms", "onset of a picture, video or sound on the participant's page after the confirmed start; of several the one that is farthest from it")
+            .unit("ms").empty(NO_MEDIA).optional(),
+        MediaUncertaintyMs: number("media_uncertainty_ms", "by how much the clocks of page and program may make that offset wrong: half a round trip between them")
+            .unit("ms").empty(NO_MEDIA).optional(),
+        MediaJitterMs: number("media_jitter_ms", "standard deviation of the offsets of the session up to this attempt, pooled within pictures, videos and sounds")
+            .unit("ms").empty("fewer than two media of a kind were presented by then").optional(),
     }
 }
 
@@ -442,6 +456,7 @@ table! {
 
 const NO_SENSOR: &str = "the device has no force sensor, or the force did not vary";
 
+const OTHER_EVENT: &str = "the event is no onset of a medium";
 const OUTSIDE_TRIALS: &str = "the event belongs to no trial";
 
 table! {
@@ -467,6 +482,7 @@ table! {
             ("state", "the participant's state was set"),
             ("reveal", "the order was revealed"),
             ("self-weighed", "the motor weighed itself before the session"),
+            ("media", "a picture, video or sound came on the participant's page"),
         ], "what happened"),
         Question: text("question", "question that was answered or corrected")
             .empty("the event is neither an answer nor a correction"),
@@ -481,6 +497,7 @@ table! {
             ("stopped", "stopped, and played again instead of rated"),
             ("interrupted", "the program ended or stood still during the attempt, or paused too long before its answer or its next interval"),
             ("rendering", "the force was not that of the table"),
+            ("media", "a picture, video or sound was not shown or played in step"),
         ], "why the attempt failed").empty("the event is no failure"),
         By: level("by", &[
             ("participant", "the participant"),
@@ -489,6 +506,14 @@ table! {
         Text: text("text", "reason, remark or detail").empty("none was given"),
         At: time("at", "when it happened"),
         InputChannel: INPUT_CHANNEL.empty("no person answered or corrected anything"),
+        Medium: level("medium", &[
+            ("picture", "a picture"),
+            ("video", "a video"),
+            ("sound", "a sound"),
+        ], "what came on the participant's page").empty(OTHER_EVENT).optional(),
+        MediaOffsetMs: number("media_offset_ms", "its onset after the confirmed start").unit("ms")
+            .empty(OTHER_EVENT).optional(),
+        MediaUncertaintyMs: RatingColumn::MediaUncertaintyMs.column().empty(OTHER_EVENT),
     }
 }
 
@@ -559,40 +584,6 @@ table! {
         Included: flag("included", "whether the analysis used the rating"),
         Reason: text("reason", "why the rating was not used").empty("it was used"),
     }
-}
-
-/// Whether `ratings.csv` of a study without parts has a fixed column of this name, in any
-/// case.
-pub fn is_ratings_column(name: &str) -> bool {
-    let all = RatingColumn::ALL.iter().map(|c| c.column());
-    all.filter(|c| c.is_in(false, false))
-        .any(|c| c.reserves(name))
-}
-
-/// The same for a study with parts.
-pub fn is_parts_column(name: &str) -> bool {
-    (RatingColumn::ALL.iter()).any(|c| c.column().reserves(name))
-}
-
-/// Whether a header of `ratings.csv` is that of a study with parts. A covariate of a study
-/// without may have the name of one of their columns, but not of all, one after the other.
-pub fn are_of_parts(header: &[String]) -> bool {
-    let all = RatingColumn::ALL.iter().map(|c| c.column());
-    let own = all.filter(|c| !c.is_in(false, false) && !c.optional);
-    let own: Vec<&str> = own.map(|c| c.name).collect();
-    header.windows(own.len()).any(|w| w == own)
-}
-
-/// Whether `participants.csv` of a study without parts has a fixed column of this name, in
-/// any case.
-pub fn is_participants_column(name: &str) -> bool {
-    let all = ParticipantColumn::ALL.iter().map(|c| c.column());
-    (all.filter(|c| c.is_in(false, false))).any(|c| c.reserves(name))
-}
-
-/// The same for a study with parts.
-pub fn is_participants_column_of_parts(name: &str) -> bool {
-    (ParticipantColumn::ALL.iter()).any(|c| c.column().reserves(name))
 }
 
 #[cfg(test)]

@@ -73,6 +73,7 @@ impl At {
             ("", "participants") => "design.participants".to_owned(),
             ("", "rendering") => "device.rendering".to_owned(),
             ("", "orders") => "design.order".to_owned(),
+            ("", "media") => "models".to_owned(),
             ("", name) => name.to_owned(),
             (path, "sha256") => format!("{path}.file"),
             (path, name) => format!("{path}.{name}"),
@@ -111,7 +112,8 @@ impl At {
                 self.compare_by_id(before, after, found);
             }
             (old, new) => {
-                let is_file = self.key.ends_with(".file");
+                let contents = [".file", ".picture", ".video", ".sound"];
+                let is_file = contents.iter().any(|end| self.key.ends_with(*end));
                 found.push(Change {
                     key: self.key.clone(),
                     place: self.place.clone(),

@@ -1,6 +1,6 @@
 //! A small protocol without a file, for tests and examples.
 
-use super::{ModelEntry, Protocol, Role, file};
+use super::{Media, ModelEntry, Protocol, Role, file};
 use std::collections::BTreeMap;
 use study_base::text::ModelId;
 
@@ -48,6 +48,7 @@ pub fn model(id: &str) -> ModelEntry {
         device: None,
         covariates: BTreeMap::new(),
         levels: BTreeMap::new(),
+        media: Media::default(),
     }
 }
 

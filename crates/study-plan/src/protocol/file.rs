@@ -20,6 +20,7 @@ mod general;
 mod grids;
 mod groups;
 mod looked;
+mod media;
 mod models;
 mod orders;
 mod outcomes;
@@ -42,7 +43,7 @@ pub use orders::parse_orders;
 
 use super::keys::{Key, Kind, Variants, Word, keys};
 use super::section::Section;
-use super::{FORMAT, FORMAT_2, FORMAT_3, Protocol, Question};
+use super::{FORMAT, FORMAT_2, FORMAT_3, Medium, Protocol, Question};
 use agree::Sections;
 use models::PartialModel;
 use questions::PartialQuestion;
@@ -137,7 +138,7 @@ const FORMATS: &[Word] = &[
 const OF_FORMAT_2: [&str; 5] = ["parts", "families", "tracks", "groups", "sessions"];
 
 /// Keys that need [`FORMAT_3`], without the places in lists.
-pub const OF_FORMAT_3: [&str; 21] = [
+pub const OF_FORMAT_3: [&str; 27] = [
     "confirms",
     "consent.text",
     "consent.initials",
@@ -147,6 +148,11 @@ pub const OF_FORMAT_3: [&str; 21] = [
     "outcomes",
     "spaces",
     "models.levels",
+    "models.picture",
+    "models.video",
+    "models.sound",
+    "models.alt",
+    "models.caption",
     "parts.answers",
     "parts.confirm",
     "parts.different",
@@ -155,6 +161,7 @@ pub const OF_FORMAT_3: [&str; 21] = [
     "analysis.model",
     "device.commissioned_within_days",
     "device.self_weigh",
+    "trial.media_within_ms",
     "tracks.relative",
     "tracks.condition",
     "questionnaires.after",
@@ -208,6 +215,8 @@ pub enum Content {
     Text(Prose),
     /// A bundle with a realization; with the SHA-256 that it has to have, if the protocol says it.
     Bundle(Option<String>),
+    /// A picture, video or sound.
+    Media(Medium),
 }
 
 /// Reads a protocol file; `path` is only for messages.
@@ -442,8 +451,11 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
     if !broken {
         sections.agree(document);
         questionnaires::agree(&questionnaires, &raw.parts, document);
+        media::agree(&sections.models, session.as_ref(), document);
         outcomes::agree(&outcomes, &sections, document);
     }
+    // After the others: a file of another kind is read as what it is.
+    named.extend(media::files(&sections.models));
     let resolved = raw.resolve(&sections, document, broken);
     if let (Some(sessions), Some(parts), Some(families), false) =
         (&sessions, &resolved.parts, &resolved.families, broken)
@@ -460,6 +472,7 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
         factors::agree(factors, &sections.models, known, rules, document);
     }
     sections.fill_duplicates();
+    media::fill_duplicates(&mut sections.models);
     let Sections {
         models,
         questions,

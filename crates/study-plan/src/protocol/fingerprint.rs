@@ -11,7 +11,7 @@
 //! * stimulus: study id and seed; the design without the planned number of
 //!   participants (more of them change no order); device kind, limits,
 //!   `uncertified`; each realization's id, role, device, `duplicate_of` and the
-//!   SHA-256 of its file; minimum strokes, exposure, duration of the reference; id,
+//!   SHA-256 of its file and its media; minimum strokes, exposure, duration of the reference; id,
 //!   scale and `required` of the questions after a trial and of the questionnaires between trials; the orders file; parts
 //!   without their texts, tracks, groups, repeated sessions, and families and spaces with the SHA-256 of their
 //!   files; of spaces also which points are certified; the search that is confirmed.
@@ -137,6 +137,7 @@ pub fn parts(
         reference_min_s,
         minimum_strokes,
         exposure,
+        media_within_ms,
     } = trial;
     let order = match order {
         Order::File(_) => json!("file"),
@@ -147,13 +148,15 @@ pub fn parts(
     let stimuli: Vec<Value> = models
         .iter()
         .map(|m| {
-            json!({
+            let mut own = json!({
                 "id": m.id,
                 "role": m.role,
                 "device": m.device,
                 "duplicate_of": m.duplicate_of,
                 "sha256": model_bytes.get(&m.id).map(sha256),
-            })
+            });
+            m.media.pin(&mut own);
+            own
         })
         .collect();
     let mut stimulus = json!({
@@ -174,6 +177,9 @@ pub fn parts(
         "questions": questions.iter().map(scale).collect::<Vec<_>>(),
     });
     // Absent from the fingerprints of protocols without it.
+    if protocol.has_media() {
+        stimulus["trial"]["media_within_ms"] = json!(media_within_ms);
+    }
     if *exposure != super::Exposure::default() {
         stimulus["trial"]["exposure"] = json!(exposure);
     }
@@ -228,6 +234,9 @@ pub fn parts(
     if debriefing.is_some() {
         wording["debriefing"] = json!(debriefing);
     }
+    if protocol.has_media() {
+        wording["media"] = super::media::texts(models);
+    }
     if !parts.is_empty() {
         wording["parts"] = parts.iter().map(texts).collect();
     }
@@ -235,22 +244,17 @@ pub fn parts(
         let items = between.iter().flat_map(|own| &own.questions);
         wording["questionnaires"] = items.map(words).collect();
     }
-    let known: Vec<Value> = models
-        .iter()
-        .map(|m| json!({ "id": m.id, "vaf": m.vaf, "covariates": m.covariates }))
-        .collect();
+    let known = |m: &ModelEntry| json!({ "id": m.id, "vaf": m.vaf, "covariates": m.covariates });
     let mut analysis = json!({
         "analysis": analysis,
         "participants": participants,
-        "models": known,
+        "models": models.iter().map(known).collect::<Vec<_>>(),
     });
     // Absent from the fingerprints of protocols without them.
     if !factors.is_empty() {
         analysis["factors"] = json!(factors);
-        let levels = models
-            .iter()
-            .map(|m| json!({ "id": m.id, "levels": m.levels }));
-        analysis["levels"] = levels.collect();
+        let levels = |m: &ModelEntry| json!({ "id": m.id, "levels": m.levels });
+        analysis["levels"] = models.iter().map(levels).collect();
     }
     if device.rendering != super::RenderingRules::default() {
         analysis["rendering"] = json!(device.rendering);

@@ -189,6 +189,9 @@ phrases! {
     TextCut "text-cut" "The text is too long: at most {kib} KiB are stored, the rest was removed.";
     PageLost "page-lost" "The connection is lost. Trying again …";
     PageClosed "page-closed" "This page is closed. Please tell the experimenter.";
+    PageMedia "page-media" "Pictures and sounds are being loaded.";
+    PageTap "page-tap" "Tap the page once, so that sounds can be played.";
+    PageMoving "page-moving" "Videos are played in this study, also where less motion is asked for.";
     OnceMore "once-more" "The pause was long: once more, please.";
     CorrectTitle "correct-title" "Correct an answer";
     CorrectIt "correct-it" "correct";

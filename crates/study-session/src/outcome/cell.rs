@@ -10,7 +10,7 @@ use study_base::text::{ModelId, PartId, ParticipantId, QuestionId};
 use study_plan::protocol::columns::{
     AttemptColumn, Column, IntervalColumn, ParticipantColumn, RatingColumn, Repeats, SampleColumn,
 };
-use study_plan::protocol::{Answer, DeviceKind, Protocol, Role};
+use study_plan::protocol::{Answer, DeviceKind, Medium, Protocol, Role};
 
 /// A cell of a table. Its `Display` is the cell's text in a CSV, not yet quoted.
 #[derive(Debug, Clone, PartialEq)]
@@ -94,6 +94,7 @@ fields! {
     Verdict: |verdict, _| Cell::text(verdict.as_str());
     Author: |author, _| Cell::text(author.as_str());
     Channel: |channel, _| Cell::text(channel.as_str());
+    Medium: |medium, _| Cell::text(medium.as_str());
     Answer: |answer, _| match answer {
         Answer::Rating(n) => Cell::Whole((*n).into()),
         Answer::Number(x) => Cell::Number(*x),
@@ -314,6 +315,9 @@ row! {
         AnswerBeforeFeedback: answer_before_feedback,
         QuestionnairePausedS: questionnaire_paused_s,
         QuestionnaireLate: questionnaire_late,
+        MediaOffsetMs: media_offset_ms,
+        MediaUncertaintyMs: media_uncertainty_ms,
+        MediaJitterMs: media_jitter_ms,
         ..fidelity {
             Rendering: verdict,
             RenderedVaf: rendered_vaf,
@@ -397,6 +401,9 @@ row! {
         Text: text,
         At: at,
         InputChannel: input_channel,
+        Medium: medium,
+        MediaOffsetMs: media_offset_ms,
+        MediaUncertaintyMs: media_uncertainty_ms,
     }
 }
 

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use study_base::named;
 use study_base::text::{ModelId, PartId, ParticipantId, QuestionId};
 use study_plan::protocol::fingerprint::Fingerprints;
-use study_plan::protocol::{Answer, Assigned, DeviceKind, Seat, Trial};
+use study_plan::protocol::{Answer, Assigned, DeviceKind, Medium, Seat, Trial};
 
 /// A point in time by both clocks. Durations come from the monotonic clock; the
 /// wall clock, which gives the date, may step.
@@ -120,6 +120,8 @@ named! {
         Interrupted = "interrupted",
         /// The force was not that of the table.
         Rendering = "rendering",
+        /// A picture, video or sound was not shown or played in step. Since `study-protocol/3`.
+        Media = "media",
     }
 }
 
@@ -411,6 +413,19 @@ pub enum Event {
         /// Which interval, from 1, if the trial has several.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         interval: Option<u32>,
+    },
+    /// The participant's page showed or played a medium of what plays. Since `study-protocol/3`.
+    MediaShown {
+        trial: u32,
+        attempt: u32,
+        /// Which interval, from 1, if the trial has several.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        interval: Option<u32>,
+        medium: Medium,
+        /// Its onset after the confirmed start, ms, by the page's clock.
+        offset_ms: f64,
+        /// By how much the clocks may make that wrong, ms.
+        uncertainty_ms: f64,
     },
     /// What is felt was changed in a trial of adjustment; it is loaded once what plays has stopped. Since `study-protocol/3`.
     Adjusted {

@@ -20,6 +20,7 @@ mod adjusting;
 mod attempt_log;
 mod facts;
 mod interval_log;
+mod media;
 mod rows;
 mod search;
 mod tracks;
@@ -30,6 +31,8 @@ pub use interval_log::interval_rows;
 pub use trial::{Attempt, AttemptStart, Completion, Ended, FormDelay, Presentation, Sitting};
 
 use super::event::{Channel, Choice, Entry, Event, Failure, FormId, Moment, Start, State};
+use super::media::Onset;
+use media::Came;
 use search::Failing;
 use std::collections::{BTreeMap, BTreeSet};
 use study_base::text::{PartId, ParticipantId, QuestionId};
@@ -73,6 +76,8 @@ pub struct History {
     told: Vec<(u32, u32)>,
     /// What the device failed at in the searches, and what they present no more.
     failing: Failing,
+    /// The media that came.
+    came: Vec<Came>,
     /// Numbers of closed trials after which a break began.
     pub breaks: BTreeSet<u32>,
     /// When the break under way began.
@@ -142,7 +147,8 @@ impl Failure {
     /// the trial is simply felt again.
     pub fn counts(self) -> bool {
         match self {
-            Self::DeviceFault | Self::PlaybackLost | Self::MarkedBad | Self::Rendering => true,
+            Self::DeviceFault | Self::PlaybackLost | Self::MarkedBad => true,
+            Self::Rendering | Self::Media => true,
             Self::Stopped | Self::Interrupted => false,
         }
     }
@@ -267,6 +273,21 @@ impl History {
                     };
                     attempt.interval_ended(interval.unwrap_or(1), ended, rendering.as_deref(), at);
                 }
+            }
+            Event::MediaShown {
+                trial,
+                attempt,
+                interval,
+                medium,
+                offset_ms,
+                uncertainty_ms,
+            } => {
+                let onset = Onset {
+                    offset_ms: *offset_ms,
+                    uncertainty_ms: *uncertainty_ms,
+                };
+                let interval = interval.unwrap_or(1);
+                self.came((*trial, *attempt), interval, (*medium, onset));
             }
             Event::Adjusted {
                 trial,

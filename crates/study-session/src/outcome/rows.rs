@@ -7,7 +7,7 @@ use chrono::{DateTime, FixedOffset};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use study_base::text::{ModelId, PartId, ParticipantId, QuestionId};
-use study_plan::protocol::{Answer, DeviceKind, Role};
+use study_plan::protocol::{Answer, DeviceKind, Medium, Role};
 
 study_base::named! {
     /// The outcome of a trial.
@@ -87,6 +87,9 @@ pub struct RatingRow {
     pub answer_before_feedback: Option<Answer>,
     pub questionnaire_paused_s: Option<f64>,
     pub questionnaire_late: Option<bool>,
+    pub media_offset_ms: Option<f64>,
+    pub media_uncertainty_ms: Option<f64>,
+    pub media_jitter_ms: Option<f64>,
 }
 
 impl RatingRow {
@@ -152,6 +155,9 @@ impl RatingRow {
             answer_before_feedback: None,
             questionnaire_paused_s: None,
             questionnaire_late: None,
+            media_offset_ms: None,
+            media_uncertainty_ms: None,
+            media_jitter_ms: None,
         }
     }
 }
@@ -196,6 +202,7 @@ study_base::named! {
         State = "state",
         Reveal = "reveal",
         SelfWeighed = "self-weighed",
+        Media = "media",
     }
 }
 
@@ -213,6 +220,7 @@ impl AttemptEvent {
             Event::StateSet { .. } => Self::State,
             Event::Revealed { .. } => Self::Reveal,
             Event::SelfWeighed(_) => Self::SelfWeighed,
+            Event::MediaShown { .. } => Self::Media,
             _ => return None,
         })
     }
@@ -238,6 +246,9 @@ pub struct AttemptRow {
     pub text: String,
     pub at: DateTime<FixedOffset>,
     pub input_channel: Option<Channel>,
+    pub medium: Option<Medium>,
+    pub media_offset_ms: Option<f64>,
+    pub media_uncertainty_ms: Option<f64>,
 }
 
 /// One row of `participants.csv`.

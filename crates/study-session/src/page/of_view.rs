@@ -69,6 +69,9 @@ pub fn page(view: &View) -> Page {
                 words.get(Phrase::AtLeisure).clone_into(&mut page.text);
             }
             page.waits(*wait_s, words);
+            if view.awaits_page {
+                page.wait = Some(words.get(Phrase::PageMedia).to_owned());
+            }
             page.button(Does::Advance, Phrase::Ready, view.can_advance, words);
         }
         Screen::Loading { interval: None } => {
@@ -184,6 +187,7 @@ impl Page {
             wait_clock: None,
             clock: None,
             playback: None,
+            media: view.cue.clone(),
             questions: Vec::new(),
             buttons: Vec::new(),
             // A sample felt by hand cannot be stopped, but the attempt can.

@@ -38,6 +38,8 @@ fn view(screen: Screen) -> View {
         has_reference: false,
         numbered: false,
         adjusting: None,
+        cue: None,
+        awaits_page: false,
         remarks: Vec::new(),
         can_advance: true,
         words: Arc::new(Words::default()),

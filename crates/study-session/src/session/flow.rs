@@ -233,6 +233,8 @@ impl Session {
                     self.notify("wait for the prompt to end");
                 } else if self.device_lost {
                     self.show_device_lost();
+                } else if self.waits_for_media(at) {
+                    self.notify("the participant's page is not open and in sight, or has not loaded its pictures and sounds");
                 } else {
                     self.begin_attempt(shown_s, at);
                 }

@@ -1,5 +1,6 @@
 //! The inputs and effects of a session.
 
+use super::cue::MediaReport;
 use crate::outcome::{Author, Choice, Entry, Event, Fidelity, FormId, Playback, SelfWeighed};
 use study_base::text::{ModelId, ParticipantId, QuestionId};
 use study_plan::protocol::fingerprint::Fingerprints;
@@ -107,6 +108,8 @@ pub enum Input {
         /// For how long, s.
         seconds: f64,
     },
+    /// What the participant's page says of its media.
+    Media(MediaReport),
     /// More events are on disk.
     Saved {
         /// Number of events of this process on disk, counted from the first.

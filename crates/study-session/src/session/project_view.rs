@@ -18,6 +18,7 @@ impl Session {
     /// What the screen shows at this moment.
     pub fn view(&self, at: Moment) -> View {
         let screen = self.screen(at);
+        let awaits_page = matches!(screen, Screen::Reference { .. }) && self.waits_for_media(at);
         View {
             progress: self.progress(),
             line: self.line(at),
@@ -44,7 +45,9 @@ impl Session {
             has_reference: self.has_reference(),
             numbered: self.is_numbered(),
             adjusting: self.shown_adjustment(),
-            can_advance: can_advance(&screen),
+            cue: self.cue(),
+            awaits_page,
+            can_advance: can_advance(&screen) && !awaits_page,
             words: self.words.clone(),
             screen,
         }

@@ -126,6 +126,11 @@ impl Retrace<'_> {
             | Event::Revealed { .. }
             | Event::TrialClosed { .. }
             | Event::PointLeftOut { .. } => self.take(),
+            // Beside what plays.
+            Event::MediaShown { .. } => {
+                self.show(at);
+                self.take();
+            }
             Event::Adjusted { .. } => {
                 // The steps on the page are those from the level before.
                 self.show(at);

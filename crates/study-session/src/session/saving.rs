@@ -203,6 +203,7 @@ impl Session {
         }
         self.end_gap(at);
         self.end_exposure(at);
+        self.watch_media(at);
         self.device_deadlines(at);
         self.watch_clock(at);
     }

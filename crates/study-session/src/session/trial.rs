@@ -97,6 +97,9 @@ impl Session {
     }
 
     fn start_playback(&mut self, at: Moment) {
+        if self.lacks_page(at) {
+            return;
+        }
         self.out.push(Effect::Start);
         self.phase = Phase::Ready { since: at };
     }
@@ -157,6 +160,7 @@ impl Session {
                     strokes: 0,
                     telemetry,
                 };
+                self.present_media(at);
             }
             (Phase::Playing { .. }, _) => {}
             (Phase::Loading { .. } | Phase::Mounting { .. } | Phase::Gap { .. }, _) => {
@@ -245,13 +249,16 @@ impl Session {
 
     /// Enters the rating, or the choice if the playback was stopped or too short.
     pub(super) fn after_playback(&mut self, at: Moment) {
-        let Some(open) = self.history.open() else {
-            return self.proceed(at);
-        };
         if self.comes_too_late() {
             self.feel_again(at);
             return self.proceed(at);
         }
+        if self.ended_without_media(at) {
+            return;
+        }
+        let Some(open) = self.history.open() else {
+            return self.proceed(at);
+        };
         if open.attempt.is_adjusted() && !self.history.any_answer(open.form()) {
             return self.after_level(at);
         }
@@ -281,7 +288,8 @@ impl Session {
                 return self.can_settle(open.attempt);
             }
             let mut ended = open.attempt.presentations.iter();
-            open.attempt.ended.is_some() && ended.all(|p| self.suffices(p))
+            let felt = open.attempt.ended.is_some() && ended.all(|p| self.suffices(p));
+            felt && !self.lacks_media()
         })
     }
 
@@ -400,6 +408,9 @@ impl Session {
         }
         if self.too_little(felt_s, strokes) {
             return self.notify("keep exploring");
+        }
+        if self.awaits_media() {
+            return self.notify("the participant's page has not shown and played everything yet");
         }
         if self.adjusting().is_some() {
             return self.leave_level(at);

@@ -1,5 +1,6 @@
 //! What a session shows. Nothing here identifies a realization.
 
+use super::cue::Cue;
 use super::roster::Roster;
 use crate::outcome::FormId;
 use std::sync::Arc;
@@ -54,6 +55,10 @@ pub struct View {
     pub numbered: bool,
     /// The adjustment under way, until its level is confirmed.
     pub adjusting: Option<Adjusting>,
+    /// What the participant's page shows and plays now. Its names are of contents and tell nothing of what is felt.
+    pub cue: Option<Cue>,
+    /// Whether a trial waits until the participant's page has its media and is in sight.
+    pub awaits_page: bool,
     /// The experimenter's last remarks in this sitting, newest first.
     pub remarks: Vec<String>,
     /// Whether Enter has an effect now.

@@ -36,7 +36,7 @@ mod tests {
     use study_plan::protocol::columns::{
         AttemptColumn, Column, IntervalColumn, Kind, ParticipantColumn, RatingColumn, Repeats,
     };
-    use study_plan::protocol::{Answer, DeviceKind, Role};
+    use study_plan::protocol::{Answer, DeviceKind, Medium, Role};
 
     /// Values for the fields of a row, drawn from a list.
     struct Draws<'a>(std::iter::Cycle<std::slice::Iter<'a, u32>>);
@@ -202,6 +202,9 @@ mod tests {
             answer_before_feedback: d.maybe(|d| Answer::Choice(vec![d.text()])),
             questionnaire_paused_s: d.maybe(Draws::number),
             questionnaire_late: d.maybe(Draws::flag),
+            media_offset_ms: d.maybe(Draws::number),
+            media_uncertainty_ms: d.maybe(Draws::number),
+            media_jitter_ms: d.maybe(Draws::number),
         }
     }
 
@@ -253,6 +256,7 @@ mod tests {
                 AttemptEvent::State,
                 AttemptEvent::Reveal,
                 AttemptEvent::SelfWeighed,
+                AttemptEvent::Media,
             ]),
             question: d.maybe(|_| question("realism")),
             from: d.maybe(|d| Answer::Choice(vec![d.text(), "b".to_owned()])),
@@ -264,12 +268,17 @@ mod tests {
                     Failure::MarkedBad,
                     Failure::Stopped,
                     Failure::Interrupted,
+                    Failure::Rendering,
+                    Failure::Media,
                 ])
             }),
             by: d.maybe(|d| d.of(&[Author::Participant, Author::Experimenter])),
             text: d.text(),
             at: d.time(),
             input_channel: d.maybe(|d| d.of(&[Channel::Terminal, Channel::Plain, Channel::Page])),
+            medium: d.maybe(|d| d.of(&Medium::ALL)),
+            media_offset_ms: d.maybe(Draws::number),
+            media_uncertainty_ms: d.maybe(Draws::number),
         }
     }
 

@@ -102,6 +102,10 @@ pub(super) const TRIAL: &[Key] = keys! {
     /// How long a realization is felt. Enter goes on after the least time; a trial that was
     /// felt for less cannot be answered.
     "exposure": Kind::Table(EXPOSURE), "{ min_s = 3, max_s = 20, replays = 1 }";
+    /// The largest time between the device's confirmed start and the onset of a picture, video or sound, by the page's
+    /// clock and with what it may be wrong. Beyond it the attempt fails and the trial comes again. Needs the format
+    /// `study-protocol/3`.
+    "media_within_ms": Kind::positive("ms"), "60", default("100");
 };
 
 pub(super) fn study(mut section: Section<'_, '_>) -> Option<Study> {
@@ -209,5 +213,6 @@ pub(super) fn trial(mut section: Section<'_, '_>) -> Option<TrialRules> {
         reference_min_s: section.number("reference_min_s")?,
         minimum_strokes: section.whole("minimum_strokes")?,
         exposure: section.section("exposure").and_then(exposure)?,
+        media_within_ms: section.number("media_within_ms")?,
     })
 }

@@ -3,7 +3,7 @@
 use super::Content;
 use crate::protocol::keys::{Id, Key, Kind, NumberRange, Words as _, keys};
 use crate::protocol::section::{Section, text};
-use crate::protocol::{DeviceKind, ModelEntry, Role};
+use crate::protocol::{DeviceKind, Media, MediaFile, ModelEntry, Role};
 use std::collections::BTreeMap;
 use std::ops::Bound;
 use study_base::diagnostic::Fault;
@@ -34,6 +34,17 @@ pub(super) const MODELS: &[Key] = keys! {
     "covariates": Kind::Numbers, "{ lambda = 0.9995, dx_mm = 1.0 }";
     /// Its level in each of `[[factors]]`. A realization under study has one in each; no other has any.
     "levels": Kind::TextsByName, r#"{ friction = "low", detent = "crisp" }"#;
+    /// A picture that the participant's page shows while it is felt: a PNG or JPEG of at most 16 MiB. A study with media
+    /// needs `study run --screen`. Needs the format `study-protocol/3`, as do the next four.
+    "picture": Kind::Path, r#""media/wood.png""#;
+    /// A video that the page plays once, from the device's start on: WebM or MP4.
+    "video": Kind::Path, r#""media/drawer.webm""#;
+    /// A sound that the page plays once, from the device's start on: WAV, Ogg or MP3.
+    "sound": Kind::Path, r#""media/click.wav""#;
+    /// What is seen on its picture or video, for screen readers.
+    "alt": Kind::Text, r#""A drawer of dark wood.""#, derived("required with `picture` or `video`");
+    /// What is heard in its sound or video, as text that the page shows with it.
+    "caption": Kind::Text, r#""A click.""#;
 };
 
 /// An entry that may be faulty in part.
@@ -53,6 +64,7 @@ pub(super) struct PartialModel {
     pub(super) device: Option<DeviceKind>,
     pub(super) covariates: BTreeMap<String, f64>,
     pub(super) levels: BTreeMap<String, String>,
+    pub(super) media: Media,
 }
 
 impl PartialModel {
@@ -60,7 +72,7 @@ impl PartialModel {
     pub(super) fn key(&self) -> &'static str {
         match self.content {
             Content::Bundle(_) => "bundle",
-            Content::Model | Content::Orders | Content::Text(_) => "file",
+            Content::Model | Content::Orders | Content::Text(_) | Content::Media(_) => "file",
         }
     }
 
@@ -75,6 +87,7 @@ impl PartialModel {
             device: self.device,
             covariates: self.covariates,
             levels: self.levels,
+            media: self.media,
         })
     }
 }
@@ -95,6 +108,7 @@ pub(super) fn read(mut section: Section<'_, '_>) -> PartialModel {
         device: section.word("device"),
         covariates: covariates(&mut section),
         levels: levels(&mut section),
+        media: media(&mut section),
     }
 }
 
@@ -121,6 +135,20 @@ fn file(section: &mut Section<'_, '_>) -> (Option<String>, Content) {
     }
     let file = format!("bundles/{hash}.tar");
     (Some(file), Content::Bundle(Some(hash.to_owned())))
+}
+
+fn media(section: &mut Section<'_, '_>) -> Media {
+    let mut of = |name: &str| {
+        let file = section.path_of(name)?;
+        Some(MediaFile { file, sha256: None })
+    };
+    Media {
+        picture: of("picture"),
+        video: of("video"),
+        sound: of("sound"),
+        alt: section.text("alt"),
+        caption: section.text("caption"),
+    }
 }
 
 fn levels(section: &mut Section<'_, '_>) -> BTreeMap<String, String> {

@@ -574,6 +574,7 @@ mod factors;
 mod fits;
 mod identification;
 mod keys;
+mod media;
 mod outcomes;
 mod parts;
 mod questionnaires;

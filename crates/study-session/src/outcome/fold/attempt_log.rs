@@ -43,6 +43,9 @@ pub fn attempt_rows(
             text: String::new(),
             at: entry.at.wall,
             input_channel: None,
+            medium: None,
+            media_offset_ms: None,
+            media_uncertainty_ms: None,
         };
         match &entry.event {
             Event::AttemptStarted {
@@ -113,6 +116,20 @@ pub fn attempt_rows(
                 (row.trial, row.attempt) = (Some(*trial), Some(*attempt));
                 row.failure = Some(*failure);
                 row.text = format!("{detail} [the level before is felt again]");
+            }
+            Event::MediaShown {
+                trial,
+                attempt,
+                interval,
+                medium,
+                offset_ms,
+                uncertainty_ms,
+            } => {
+                (row.trial, row.attempt) = (Some(*trial), Some(*attempt));
+                row.text = interval.map_or(String::new(), |n| format!("interval {n}"));
+                row.medium = Some(*medium);
+                row.media_offset_ms = Some(*offset_ms);
+                row.media_uncertainty_ms = Some(*uncertainty_ms);
             }
             Event::TrialClosed { trial, attempt } => {
                 (row.trial, row.attempt) = (Some(*trial), Some(*attempt));

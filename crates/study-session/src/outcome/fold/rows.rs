@@ -85,6 +85,7 @@ impl History {
         let finite = |x: f64| Some(x).filter(|x| x.is_finite());
         let done = counted.and_then(|a| a.done);
         let sitting = shown.map_or(&self.sitting, |a| &a.sitting);
+        let media = shown.and_then(|a| self.in_step(trial.trial, a));
         RatingRow {
             study: start.study.clone(),
             participant: start.participant.clone(),
@@ -153,6 +154,9 @@ impl History {
             answer_before_feedback: before_feedback,
             questionnaire_paused_s: counted.and_then(|a| a.delay?.paused_s),
             questionnaire_late: counted.and_then(|a| a.delay?.late.then_some(true)),
+            media_offset_ms: media.map(|m| m.onset.offset_ms),
+            media_uncertainty_ms: media.map(|m| m.onset.uncertainty_ms),
+            media_jitter_ms: media.and_then(|m| m.jitter_ms),
         }
     }
 

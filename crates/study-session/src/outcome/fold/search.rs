@@ -87,7 +87,7 @@ impl History {
             Failure::DeviceFault | Failure::PlaybackLost => attempt.interval(),
             // It was judged after the interval had ended.
             Failure::Rendering => attempt.presentations.last().map(|p| p.interval),
-            Failure::MarkedBad | Failure::Stopped | Failure::Interrupted => None,
+            Failure::MarkedBad | Failure::Stopped | Failure::Interrupted | Failure::Media => None,
         };
         let index = interval.and_then(|interval| (interval as usize).checked_sub(1));
         if let Some(point) = index.and_then(|index| attempt.models.get(index)) {

@@ -2,8 +2,9 @@
 
 use crate::outcome::event::{Moment, Playback, TrackLevel};
 use crate::outcome::fidelity::Fidelity;
+use crate::outcome::media::{Onset, Onsets};
 use study_base::text::ModelId;
-use study_plan::protocol::Answer;
+use study_plan::protocol::{Answer, Medium};
 
 /// What the events say of one trial.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -106,6 +107,8 @@ pub struct Presentation {
     pub gap_s: Option<f64>,
     /// Which entry of [`Attempt::rendering`] judges it, if one does.
     pub judged: Option<usize>,
+    /// When the participant's page showed and played its media.
+    pub media: Onsets,
 }
 
 impl Presentation {
@@ -237,7 +240,16 @@ impl Attempt {
                 .filter(|_| interval > 1)
                 .map(|(ended, _)| at.seconds_since(&ended)),
             judged: None,
+            media: Onsets::default(),
         });
+    }
+
+    /// A medium of an interval came.
+    pub(super) fn came(&mut self, interval: u32, medium: Medium, onset: Onset) {
+        let mut played = self.presentations.iter_mut();
+        if let Some(last) = played.rfind(|p| p.interval == interval) {
+            last.media.set(medium, onset);
+        }
     }
 
     /// The confirmed end of an interval. The attempt ends with its last interval.
@@ -267,6 +279,7 @@ impl Attempt {
                 ended: Some((at, ended)),
                 gap_s: None,
                 judged,
+                media: Onsets::default(),
             }),
         }
         if interval >= self.intervals() {
