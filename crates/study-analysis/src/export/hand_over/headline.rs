@@ -135,6 +135,11 @@ pub(super) fn of_part(part: &PartAnalysis) -> Vec<Number> {
     let interaction = ["F", "df1", "df2", "p", "eps_gg", "p_gg"];
     let profiles = &over.again.groups_conditions;
     numbers.add("groups_conditions", profiles, &interaction, CLOSED);
+    if let Some(own) = &over.again.groups_sessions {
+        numbers.add("groups_sessions", own, &interaction, CLOSED);
+        let change = ["difference", "ratio", "t", "df", "p"];
+        numbers.each("groups_sessions", &own.changes, &change, CLOSED);
+    }
     let retest = ["icc_agreement", "icc_consistency", "sem"];
     numbers.add("retest", &over.again.retest, &retest, CLOSED);
     let mut all = numbers.0;
