@@ -75,7 +75,8 @@ fn one(
     let design = Design::of(&cells);
     let means = adjusted::adjusted(&cells, &adjusted);
     let differences = effects::ranks_and_anova(&cells);
-    let tests = factorial::factorial(&cells, &adjusted, rules);
+    // The margin of equivalence is in points of the primary scale.
+    let tests = factorial::factorial(&cells, &adjusted, rules, None);
     let mut findings = findings::compared(&Compared {
         design,
         rules,

@@ -118,7 +118,8 @@ if (has_ratings) {
 #'
 #' The participants' means in each combination of levels, of those who rated every realization.
 #' Each effect is tested by orthonormal contrasts of these means, in a multivariate linear model
-#' with Greenhouse and Geisser's correction; with groups, sums of squares are of type III.
+#' with Greenhouse and Geisser's correction; with groups, sums of squares are of type III. Levels of a factor
+#' are compared by t tests over participants and, if a margin of equivalence was stated, by two one-sided ones.
 
 # F, degrees of freedom and p of one effect; `y` has a column for each contrast.
 spherical <- function(y, group, of_group) {
@@ -136,6 +137,13 @@ spherical <- function(y, group, of_group) {
   }
   found <- anova(full, less, X = ~0, test = "Spherical")
   c(F = found$F[2], df1 = found[["num Df"]][2], df2 = found[["den Df"]][2], p_gg = found[["G-G Pr"]][2])
+}
+# A name in an identifier: what separates names there is written as its number.
+in_id <- function(name) {
+  for (mark in c("%", "/", "|", "=", "@", ",")) {
+    name <- gsub(mark, sprintf("%%%02X", utf8ToInt(mark)), name, fixed = TRUE)
+  }
+  name
 }
 factors <- kept("factor")
 if (has_ratings && length(factors) > 0) {
@@ -163,6 +171,26 @@ if (has_ratings && length(factors) > 0) {
       found <- spherical(wide %*% contrasts, group, of_group)
       print(c(effect = name, signif(found, 6)), quote = FALSE)
       value[paste0("factorial/", name, "/", names(found))] <- found
+    }
+  }
+  margin <- as.numeric(setting("equivalence margin"))
+  for (i in seq_along(factors)) {
+    named_levels <- levels(ratings[[factors[i]]])
+    for (a in seq_along(named_levels)) for (b in seq_along(named_levels)) if (b > a) {
+      weights <- matrix(1)
+      for (j in seq_along(factors)) {
+        at <- seq_len(sizes[j])
+        weights <- kronecker(weights, matrix(if (j == i) (at == a) - (at == b) else rep(1 / sizes[j], sizes[j])))
+      }
+      d <- as.vector(wide %*% weights)
+      fit <- if (length(group) == 0) lm(d ~ 1) else lm(d ~ group, contrasts = list(group = "contr.sum"))
+      own <- suppressWarnings(summary(fit))$coefficients[1, ]
+      found <- c(difference = own[[1]], t = own[[3]], df = fit$df.residual, p = own[[4]],
+                 p_tost = max(pt((own[[1]] + margin) / own[[2]], fit$df.residual, lower.tail = FALSE),
+                              pt((own[[1]] - margin) / own[[2]], fit$df.residual)))
+      pair <- paste0(in_id(factors[i]), "=", in_id(named_levels[a]), "|", in_id(named_levels[b]))
+      print(c(contrast = pair, signif(found, 6)), quote = FALSE)
+      value[paste0("factorial_contrast/", pair, "/", names(found))] <- found
     }
   }
 }

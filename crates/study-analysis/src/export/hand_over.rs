@@ -302,6 +302,11 @@ fn settings(
         if !crossing.groups.is_empty() {
             put("group is a factor", "true");
         }
+        if let Some(margin) = (protocol.analysis.equivalence_margin)
+            .filter(|_| protocol.analysis.primary.as_str() == question)
+        {
+            put("equivalence margin", &margin.to_string());
+        }
     }
     for (outcome, column) in modeled(protocol) {
         let id = &outcome.id;

@@ -1,7 +1,7 @@
 //! The effects within participants, over everybody who rated two realizations or more: where
 //! many did not rate everything.
 
-use super::{ClusteredEffect, Compared, FactorialMean, FactorialTests, Layout};
+use super::{ClusteredEffect, Compared, FactorialMean, FactorialTests, Layout, Margin};
 use crate::analyze::adjusted::Adjusted;
 use crate::analyze::cells::Cells;
 use crate::analyze::record::{Number as _, Stat, Why};
@@ -24,8 +24,9 @@ impl<'a> Incomplete<'a> {
         cells: &Cells<'_>,
         adjusted: &'a Adjusted,
         crossing: &'a Crossing,
+        margin: Option<Margin>,
     ) -> Result<Self, Why> {
-        let layout = Layout::of(cells, crossing, &adjusted.models)?;
+        let layout = Layout::of(cells, crossing, margin, &adjusted.models)?;
         let why = "more realizations or participants than are compared within participants";
         let clustered = adjusted.clustered.as_ref().ok_or(why)?;
         let means = adjusted.means.as_ref().map_err(|e| e.to_string())?;
@@ -64,6 +65,7 @@ impl<'a> Incomplete<'a> {
             let found = self.clustered.contrast(&self.over_realizations(weights))?;
             Some(Compared {
                 estimate: found.estimate,
+                se: found.se,
                 ci95: found.ci95,
                 t: found.t,
                 df: found.df,

@@ -38,6 +38,14 @@ pub(super) fn of_ratings(analysis: &Analysis) -> Vec<Number> {
             &["F", "df1", "df2", "p_gg"],
             CLOSED,
         );
+        // Those of levels over all others, where they are over the participants who rated everything.
+        let is_complete = tests.effects.values().all(|e| e.clustered.is_none());
+        let pairs: BTreeMap<_, _> = (tests.contrasts.iter())
+            .filter(|(name, _)| is_complete && name.at.0.is_empty())
+            .map(|(name, contrast)| (name.clone(), contrast.clone()))
+            .collect();
+        let compared = ["difference", "t", "df", "p", "p_tost"];
+        numbers.each("factorial_contrast", &pairs, &compared, CLOSED);
     }
     let correlation = ["n_models", "pearson/r", "pearson/p_t"];
     numbers.add("corr", &evidence.corr, &correlation, CLOSED);
