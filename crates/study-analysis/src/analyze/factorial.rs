@@ -1,9 +1,12 @@
 //! Factorial designs: `factorial/*`, `factorial_mean/*`, `factorial_contrast/*`. Over the
 //! participants who rated every realization ([`complete`]); where these are too few, over all,
-//! within participants ([`incomplete`]).
+//! within participants ([`incomplete`]). The latter can be repeated with means that are moved ([`moved`]).
 
 mod complete;
 mod incomplete;
+mod moved;
+
+pub(super) use moved::{Movable, movable};
 
 use super::Rules;
 use super::adjusted::Adjusted;
@@ -262,6 +265,39 @@ impl<'a> Layout<'a> {
             levels.iter().all(|(factor, level)| own[*factor] == *level)
         };
         (0..self.columns.len()).filter(is_at).collect()
+    }
+
+    /// What is 0 without an effect within participants, by weights of the combinations: products of differences of two
+    /// levels of each of its factors, the second less the first, over the levels of the others.
+    fn contrasts_of(&self, effect: &[usize]) -> Vec<Vec<f64>> {
+        let sizes = self.crossing.sizes();
+        let mut all: Vec<Vec<Pair>> = vec![Vec::new()];
+        for &factor in effect {
+            let size = sizes[factor];
+            let pairs = (0..size).flat_map(|second| {
+                (second + 1..size).map(move |first| Pair {
+                    factor,
+                    first,
+                    second,
+                })
+            });
+            all = (all.iter())
+                .flat_map(|start| pairs.clone().map(|pair| [&start[..], &[pair]].concat()))
+                .collect();
+        }
+        let weights = |pairs: &Vec<Pair>| product(&sizes, pairs, &[]);
+        all.iter().map(weights).collect()
+    }
+
+    /// Weights of combinations as weights of so many realizations.
+    fn over_realizations(&self, weights: &[f64], realizations: usize) -> Vec<f64> {
+        let mut all = vec![0.0; realizations];
+        for (own, weight) in self.columns.iter().zip(weights) {
+            for &j in own {
+                all[j] = weight / own.len() as f64;
+            }
+        }
+        all
     }
 
     /// Names of levels.

@@ -6,7 +6,7 @@ use study_session::outcome::ratings::Ratings;
 
 /// Nine participants rate each combination of friction (low, high) and grain (fine, medium,
 /// coarse) twice; made with random numbers, so that no effect is exact.
-const RATINGS: [(&str, &str); 9] = [
+pub(super) const RATINGS: [(&str, &str); 9] = [
     ("novices", "343233433555"),
     ("experts", "557555666677"),
     ("novices", "545454656767"),
@@ -18,8 +18,8 @@ const RATINGS: [(&str, &str); 9] = [
     ("experts", "233433432566"),
 ];
 
-const FRICTION: [&str; 2] = ["low", "high"];
-const GRAIN: [&str; 3] = ["fine", "medium", "coarse"];
+pub(super) const FRICTION: [&str; 2] = ["low", "high"];
+pub(super) const GRAIN: [&str; 3] = ["fine", "medium", "coarse"];
 
 fn factor(id: &str, levels: &[&str]) -> Factor {
     Factor {
@@ -28,7 +28,7 @@ fn factor(id: &str, levels: &[&str]) -> Factor {
     }
 }
 
-fn crossing(groups: &[&str], effects: &[&[usize]]) -> Crossing {
+pub(super) fn crossing(groups: &[&str], effects: &[&[usize]]) -> Crossing {
     let combinations = (0..2).flat_map(|a| (0..3).map(move |b| (a, b)));
     Crossing {
         factors: vec![factor("friction", &FRICTION), factor("grain", &GRAIN)],
@@ -40,7 +40,7 @@ fn crossing(groups: &[&str], effects: &[&[usize]]) -> Crossing {
     }
 }
 
-const ALL: [&[usize]; 3] = [&[0], &[1], &[0, 1]];
+pub(super) const ALL: [&[usize]; 3] = [&[0], &[1], &[0, 1]];
 
 /// The table without some cells; each a participant and the number of a rating.
 fn table(missing: &[(usize, usize)]) -> Ratings {
@@ -60,7 +60,7 @@ fn table(missing: &[(usize, usize)]) -> Ratings {
     ratings
 }
 
-fn analyzed(ratings: &Ratings, crossing: Crossing) -> Analysis {
+pub(super) fn analyzed(ratings: &Ratings, crossing: Crossing) -> Analysis {
     let rules = Rules {
         crossing: Some(crossing),
         ..Rules::default()
