@@ -386,7 +386,9 @@ impl Runner {
         for report in self.setup.device.poll(at) {
             self.last_report = match &report {
                 Report::Started if self.has_telemetry => Some(at),
-                Report::Telemetry(_) | Report::Progress { .. } => self.last_report.map(|_| at),
+                Report::Telemetry(_) | Report::Progress { .. } | Report::Numbers { .. } => {
+                    self.last_report.map(|_| at)
+                }
                 _ => None,
             };
             if let Report::Stopped(_) | Report::Fault(_) | Report::Lost(_) = &report {
@@ -411,6 +413,7 @@ impl Runner {
                     Input::DeviceSampled
                 }
                 Report::Progress { strokes, .. } => Input::DeviceProgress { strokes },
+                Report::Numbers { numbers, outside } => Input::DeviceNumbers { numbers, outside },
                 Report::Stopped(playback) => Input::DeviceStopped(playback),
                 Report::Fault(what) => Input::DeviceFault(what),
                 Report::Lost(what) => Input::DeviceLost(what),

@@ -12,6 +12,7 @@ mod exposure;
 mod forms;
 mod identification;
 mod interpreters;
+mod numbers;
 mod part_rig;
 mod parts;
 mod pauses;

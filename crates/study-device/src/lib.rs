@@ -30,7 +30,7 @@ pub mod virtual_device;
 use std::time::Duration;
 use study_base::limits::Limits;
 use study_haptics::model::Realization;
-use study_session::outcome::{Playback, Sample};
+use study_session::outcome::{Playback, Sample, SentNumber};
 use study_wire::servo::{self, Law, ServoSettings};
 
 /// Identity and limits of a device.
@@ -154,6 +154,13 @@ pub enum Report {
         /// Clamps.
         clamps: u64,
     },
+    /// A controller program sends numbers, such as the time that a task took.
+    Numbers {
+        /// As they were sent.
+        numbers: Vec<SentNumber>,
+        /// Whether they belong to no playback under way: they came before or after it.
+        outside: bool,
+    },
     /// The playback has stopped and the device is limp.
     Stopped(Playback),
     /// The device has tripped and is limp until the next load.
@@ -166,9 +173,12 @@ pub enum Report {
 
 impl Report {
     /// Whether the report is still valid after [`Device::limp`]; reports about the
-    /// interrupted playback are not.
+    /// interrupted playback are not, but for numbers, which are recorded whatever became of it.
     fn survives_limp(&self) -> bool {
-        matches!(self, Self::Fault(_) | Self::Lost(_) | Self::Ready)
+        matches!(
+            self,
+            Self::Fault(_) | Self::Lost(_) | Self::Ready | Self::Numbers { .. }
+        )
     }
 }
 

@@ -55,7 +55,8 @@ pub use groups::{Assign, Assigned, GroupRules, Groups, SessionPlan};
 pub use identification::{Criterion, Drawn, Feedback, Identification, Label};
 pub use kinds::QuestionKind;
 pub use outcomes::{
-    Answers, BetterEnd, Clock, Measure, OutcomeFamily, OutcomeRules, Telemetry, Transform,
+    Answers, BetterEnd, Clock, DeviceNumber, Measure, OutcomeFamily, OutcomeRules, Telemetry,
+    Transform,
 };
 pub use pairs::{IntervalOrder, Pairs};
 pub use parts::{

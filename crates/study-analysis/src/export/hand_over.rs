@@ -164,6 +164,7 @@ fn modeled(protocol: &Protocol) -> Vec<(&OutcomeRules, &str)> {
             (_, OutcomeFamily::Gamma) | (Measure::Clock(_) | Measure::Questionnaire(_), _) => None,
             (Measure::Telemetry(what), _) => (*what == Telemetry::Strokes).then_some("strokes"),
             (Measure::Answers(answers), _) => answers.questions.first().map(QuestionId::as_str),
+            (Measure::Device(_), _) => Some(outcome.id.as_str()),
         }
     }
     (protocol.outcomes.iter())

@@ -129,6 +129,7 @@ fn header<C: Copy>(all: &[C], declaration: fn(C) -> Column, repeated: &Repeated<
         Repeats::Question => repeated.questions.clone(),
         Repeats::Covariate => repeated.covariates.clone(),
         Repeats::Factor => repeated.factors.clone(),
+        Repeats::Sent => repeated.sent.clone(),
     };
     (all.iter())
         .filter(|c| declaration(**c).is_in(repeated.has_parts, repeated.has_replays))
@@ -145,6 +146,8 @@ struct Repeated<'a> {
     questions: Vec<&'a str>,
     covariates: Vec<&'a str>,
     factors: Vec<&'a str>,
+    /// Outcomes that the device sends.
+    sent: Vec<&'a str>,
     /// Whether the study has parts.
     has_parts: bool,
     /// Whether its trials can be felt again.
@@ -153,7 +156,8 @@ struct Repeated<'a> {
 
 impl RatingRow {
     /// The header of `ratings.csv`: questions in the protocol's order, those of questionnaires
-    /// between the trials last, covariates sorted by name, factors in the protocol's order.
+    /// between the trials last, covariates sorted by name, factors and
+    /// numbers of the device in the protocol's order.
     pub fn header(protocol: &Protocol) -> Header<RatingColumn> {
         let models = protocol.models.iter();
         let covariates: BTreeSet<&str> = models
@@ -165,6 +169,9 @@ impl RatingRow {
                 .collect(),
             covariates: covariates.into_iter().collect(),
             factors: protocol.factors.iter().map(|f| f.id.as_str()).collect(),
+            sent: (protocol.numbers_of_device())
+                .map(|(id, _)| id.as_str())
+                .collect(),
             has_parts: !protocol.parts.is_empty(),
             has_replays: protocol.trial.exposure.replays > 0,
         };
@@ -296,6 +303,7 @@ row! {
         RatedAt: rated_at,
         Attempt: attempt,
         Status: status,
+        Sent: sent,
         Vaf: vaf,
         Covariates: covariates,
         Levels: levels,

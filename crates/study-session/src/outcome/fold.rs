@@ -164,6 +164,7 @@ impl History {
             | Event::ClockStepped { .. }
             | Event::Revealed { .. }
             | Event::TelemetryLost { .. }
+            | Event::NumbersSent { .. }
             | Event::IdCorrected { .. }
             | Event::StateSet { .. } => {}
             _ => self.last_activity = Some(at),
@@ -266,6 +267,15 @@ impl History {
                     attempt.interval_ended(interval.unwrap_or(1), ended, rendering.as_deref(), at);
                 }
             }
+            Event::NumbersSent {
+                trial: Some(trial),
+                attempt: Some(attempt),
+                numbers,
+            } => {
+                if let Some(attempt) = self.attempt_mut(*trial, *attempt) {
+                    attempt.sent(numbers);
+                }
+            }
             Event::Adjusted {
                 trial,
                 attempt,
@@ -339,6 +349,7 @@ impl History {
             }
             Event::StateSet { state, reason } => self.set_state(*state, reason),
             Event::Remark { trial: None, .. }
+            | Event::NumbersSent { .. }
             | Event::Paused
             | Event::Unpaused { .. }
             | Event::ClockStepped { .. }

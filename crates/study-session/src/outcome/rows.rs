@@ -85,6 +85,8 @@ pub struct RatingRow {
     pub paused_s: Option<f64>,
     pub felt_again_after_s: Option<f64>,
     pub answer_before_feedback: Option<Answer>,
+    /// Outcome → the number that the device sent.
+    pub sent: BTreeMap<String, f64>,
 }
 
 impl RatingRow {
@@ -148,6 +150,7 @@ impl RatingRow {
             paused_s: None,
             felt_again_after_s: None,
             answer_before_feedback: None,
+            sent: BTreeMap::new(),
         }
     }
 }
@@ -192,6 +195,7 @@ study_base::named! {
         State = "state",
         Reveal = "reveal",
         SelfWeighed = "self-weighed",
+        NumberSent = "number-sent",
     }
 }
 
@@ -209,6 +213,10 @@ impl AttemptEvent {
             Event::StateSet { .. } => Self::State,
             Event::Revealed { .. } => Self::Reveal,
             Event::SelfWeighed(_) => Self::SelfWeighed,
+            // Only those that do not count; the others are in `ratings.csv`.
+            Event::NumbersSent { numbers, .. } if numbers.iter().any(|n| n.fault.is_some()) => {
+                Self::NumberSent
+            }
             _ => return None,
         })
     }

@@ -118,6 +118,7 @@ impl Retrace<'_> {
             | Event::Reopened { .. }
             | Event::SelfWeighed(_)
             | Event::TelemetryLost { .. }
+            | Event::NumbersSent { .. }
             | Event::ClockStepped { .. }
             | Event::Remark { .. }
             | Event::Revealed { .. }

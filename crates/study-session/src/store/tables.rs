@@ -200,6 +200,7 @@ mod tests {
             paused_s: d.maybe(Draws::number),
             felt_again_after_s: d.maybe(Draws::number),
             answer_before_feedback: d.maybe(|d| Answer::Choice(vec![d.text()])),
+            sent: BTreeMap::from([("duration".to_owned(), d.number())]),
         }
     }
 
@@ -251,6 +252,7 @@ mod tests {
                 AttemptEvent::State,
                 AttemptEvent::Reveal,
                 AttemptEvent::SelfWeighed,
+                AttemptEvent::NumberSent,
             ]),
             question: d.maybe(|_| question("realism")),
             from: d.maybe(|d| Answer::Choice(vec![d.text(), "b".to_owned()])),
@@ -310,6 +312,7 @@ mod tests {
                 Repeats::Question => questions.iter().map(|q| (*c, (*q).to_owned())).collect(),
                 Repeats::Covariate => vec![(*c, "lambda".to_owned())],
                 Repeats::Factor => vec![(*c, "friction".to_owned())],
+                Repeats::Sent => vec![(*c, "duration".to_owned())],
             })
             .collect()
     }

@@ -4,6 +4,7 @@ use super::trial::TrialHistory;
 use super::{Attempt, GivenAnswer, History};
 use crate::outcome::event::{FormId, Start};
 use crate::outcome::rows::{ParticipantRow, RatingRow, Status};
+use crate::outcome::sent::counted as counted_numbers;
 use std::collections::BTreeMap;
 use study_base::text::{ParticipantId, QuestionId};
 use study_plan::protocol::{Answer, Part, Protocol, Role, Stimuli, TrackRules, Trial};
@@ -151,6 +152,7 @@ impl History {
             paused_s: done.and_then(|d| d.paused_s),
             felt_again_after_s: felt.again_after_s,
             answer_before_feedback: before_feedback,
+            sent: shown.map_or_else(BTreeMap::new, |a| counted_numbers(&a.numbers, protocol)),
         }
     }
 
