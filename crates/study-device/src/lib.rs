@@ -9,7 +9,7 @@
 //! - [`virtual_device`] is the simulated device in virtual time, [`firmware`] its
 //!   device side, and [`faults`] the faults that can be injected.
 //! - [`process`] is a controller program of the lab, [`manual`] an experimenter who
-//!   mounts samples.
+//!   mounts samples, [`sending`] a simulated program that sends numbers of a study.
 //! - [`table`] checks tables before they are sent, [`commission`] has what a person checks of a
 //!   device, [`check`] tests a device against
 //!   `docs/wire.md`, and [`probe`] records with a probe.
@@ -23,6 +23,7 @@ pub mod link;
 pub mod manual;
 pub mod probe;
 pub mod process;
+pub mod sending;
 pub mod serial;
 pub mod table;
 pub mod virtual_device;
