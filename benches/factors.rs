@@ -2,15 +2,15 @@
 //! with one.
 //!
 //! `cargo bench --bench factors -- --studies 10000 --power 2000` simulates this many studies
-//! without an effect in each design, and so many with one; `--missing 2000` so many with missing cells, each of which takes the whole
-//! analysis. The seed is fixed: the same numbers
+//! without an effect in each design, and so many with one; `--missing 2000` so many with missing cells, lost at random or
+//! because they would have been low, each of which takes the whole analysis. The seed is fixed: the same numbers
 //! of studies print the same tables for any number of threads. docs/calibration.md has the
 //! results.
 #![allow(clippy::print_stdout)]
 
 use rayon::prelude::*;
 use std::fmt::Write as _;
-use study_analysis::analyze::{Question, Rules, all_findings};
+use study_analysis::analyze::{Finding, Question, Rules, all_findings};
 use study_analysis::study::factor;
 use study_base::rng::Stream;
 use study_plan::protocol::Crossing;
@@ -248,13 +248,43 @@ fn power(design: &Design, term: &Term, participants: usize, studies: u32) -> [f6
     shares(studies, of_study)
 }
 
-/// Shares of studies in which `study analyze` finds any effect, and in which one has no test, if every fifth cell is missing at random.
+/// Which cells are missing.
+#[derive(Clone, Copy, PartialEq)]
+enum Lost {
+    /// Every fifth, at random.
+    AtRandom,
+    /// Two fifths of what is below the participant's mean in the second half of the combinations, and nothing else: what
+    /// is missing would have been low, and depends on the levels.
+    LowAtLevels,
+}
+
+impl Lost {
+    fn name(self) -> &'static str {
+        match self {
+            Self::AtRandom => "every fifth cell missing at random",
+            Self::LowAtLevels => "two fifths of the low cells of half of the combinations missing",
+        }
+    }
+
+    fn is_lost(self, row: &[f64], cell: usize, noise: &mut Stream) -> bool {
+        let drawn = noise.below(5);
+        let mean = row.iter().sum::<f64>() / row.len() as f64;
+        match self {
+            Self::AtRandom => drawn == 0,
+            Self::LowAtLevels => drawn < 2 && cell >= row.len() / 2 && row[cell] < mean,
+        }
+    }
+}
+
+/// Shares of studies in which `study analyze` finds any effect, in which it finds one and does not say that missing ratings turn it,
+/// and in which one has no test.
 fn null_with_missing(
     design: &Design,
     errors: Errors,
+    lost: Lost,
     participants: usize,
     studies: u32,
-) -> [f64; 2] {
+) -> [f64; 3] {
     let factors = (design.levels.iter().enumerate()).map(|(i, levels)| {
         let levels: Vec<String> = (0..*levels).map(|level| format!("l{level}")).collect();
         factor(&format!("f{i}={}", levels.join(","))).expect("a factor")
@@ -278,20 +308,25 @@ fn null_with_missing(
             &participants.to_string(),
             &number.to_string(),
         ];
-        let mut lost = Stream::new(2012, &[&["factors", "missing"], &place[..]].concat());
+        let mut noise = Stream::new(2012, &[&["factors", "missing"], &place[..]].concat());
         let mut csv = "subject,model,rating\n".to_owned();
         for (p, row) in rows.iter().enumerate() {
             for (cell, rating) in row.iter().enumerate() {
-                if lost.below(5) > 0 {
-                    let _ = writeln!(csv, "P{p:02},m{cell},{rating}");
-                }
+                // An empty rating: the presentation was planned.
+                let rating = match lost.is_lost(row, cell, &mut noise) {
+                    true => String::new(),
+                    false => rating.to_string(),
+                };
+                let _ = writeln!(csv, "P{p:02},m{cell},{rating}");
             }
         }
         let ratings = Ratings::read_csv("study.csv", csv.as_bytes(), None).expect("a table");
         let (findings, _) = all_findings(&ratings, &rules);
         let effects = || (findings.iter()).filter(|f| matches!(f.question, Question::Effect(_)));
+        let turns = |f: &Finding| f.caveats.iter().any(|c| c.code == "missing-turns-it");
         [
-            effects().any(|f| f.is_yes()),
+            effects().any(Finding::is_yes),
+            effects().any(|f| f.is_yes() && !turns(f)),
             effects().any(|f| f.reason().is_some()),
         ]
     };
@@ -352,18 +387,22 @@ fn main() {
         }
     }
     let of_analysis = argument("--missing", 2000);
-    println!(
-        "\n**No effect: every fifth cell missing, as `study analyze` decides / no test** ({of_analysis} studies each)\n"
-    );
-    head("design | errors");
-    for design in DESIGNS.iter().filter(|d| d.second.is_none()) {
-        for errors in [Errors::Normal, Errors::NotSpherical, Errors::Ratings] {
-            let cell = |n: usize| {
-                let [any, none] = null_with_missing(design, errors, n, of_analysis);
-                format!("{any:.4} / {none:.3}")
-            };
-            let cells = PARTICIPANTS.map(cell).join(" | ");
-            println!("| {} | {} | {cells} |", design.name, errors.name());
+    for lost in [Lost::AtRandom, Lost::LowAtLevels] {
+        println!(
+            "\n**No effect: {}, as `study analyze` decides / of these not said to turn / no test** ({of_analysis} studies each)\n",
+            lost.name()
+        );
+        head("design | errors");
+        for design in DESIGNS.iter().filter(|d| d.second.is_none()) {
+            for errors in [Errors::Normal, Errors::NotSpherical, Errors::Ratings] {
+                let cell = |n: usize| {
+                    let [any, holds, none] =
+                        null_with_missing(design, errors, lost, n, of_analysis);
+                    format!("{any:.4} / {holds:.4} / {none:.3}")
+                };
+                let cells = PARTICIPANTS.map(cell).join(" | ");
+                println!("| {} | {} | {cells} |", design.name, errors.name());
+            }
         }
     }
     println!(

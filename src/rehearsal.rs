@@ -19,6 +19,7 @@ use study_device::Device;
 use study_device::faults::FaultPlan;
 use study_device::firmware::{Wrong, WrongLoads};
 use study_device::manual::{Manual, WithManual};
+use study_device::sending::{Drawn, Sending};
 use study_device::virtual_device::{Options as DeviceOptions, VirtualDevice};
 use study_plan::protocol::{DeviceKind, Protocol, Seat, SessionPlan};
 use study_session::store::{Derived, Frozen, SeatKind, StoreError, StudyFolder};
@@ -182,9 +183,12 @@ pub fn rehearse(
                 rows: None,
                 group: None,
                 device_kind: kind,
-                device: match kind {
-                    DeviceKind::Manual | DeviceKind::Process => Box::new(Manual::default()),
-                    _ => with_manual_samples(simulated(device_seed, options), &protocol),
+                device: {
+                    let device: Box<dyn Device> = match kind {
+                        DeviceKind::Manual | DeviceKind::Process => Box::new(Manual::default()),
+                        _ => with_manual_samples(simulated(device_seed, options), &protocol),
+                    };
+                    with_numbers(device, &protocol, device_seed)
                 },
                 device_check: None,
                 self_weighed: None,
@@ -225,6 +229,20 @@ pub fn with_manual_samples(device: Box<dyn Device>, protocol: &Protocol) -> Box<
         Box::new(WithManual::new(device))
     } else {
         device
+    }
+}
+
+/// Adds the numbers that the protocol expects of its controller program, drawn.
+fn with_numbers(device: Box<dyn Device>, protocol: &Protocol, seed: u64) -> Box<dyn Device> {
+    let numbers: Vec<Drawn> = (protocol.numbers_of_device())
+        .map(|(_, number)| Drawn {
+            key: number.key(),
+            is_count: number.unit == "1",
+        })
+        .collect();
+    match numbers.is_empty() {
+        true => device,
+        false => Box::new(Sending::new(device, numbers, seed)),
     }
 }
 

@@ -396,7 +396,9 @@ impl Runner {
         for report in self.setup.device.poll(at) {
             self.last_report = match &report {
                 Report::Started if self.has_telemetry => Some(at),
-                Report::Telemetry(_) | Report::Progress { .. } => self.last_report.map(|_| at),
+                Report::Telemetry(_) | Report::Progress { .. } | Report::Numbers { .. } => {
+                    self.last_report.map(|_| at)
+                }
                 _ => None,
             };
             if let Report::Stopped(_) | Report::Fault(_) | Report::Lost(_) = &report {
@@ -425,6 +427,7 @@ impl Runner {
                     self.faded_from_s = Some(from_s);
                     continue;
                 }
+                Report::Numbers { numbers, outside } => Input::DeviceNumbers { numbers, outside },
                 Report::Stopped(playback) => Input::DeviceStopped(playback),
                 Report::Fault(what) => Input::DeviceFault(what),
                 Report::Lost(what) => Input::DeviceLost(what),

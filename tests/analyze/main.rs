@@ -36,6 +36,7 @@ mod report_support;
 mod rows;
 mod rules;
 mod schema;
+mod shipped_designs;
 mod similarity;
 mod study;
 mod told_apart;

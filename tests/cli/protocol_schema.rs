@@ -251,6 +251,18 @@ fn the_templates_of_parts_are_valid_and_broken_ones_are_not() {
         "protocols/cloth/protocol.toml",
         "protocols/sounds/protocol.toml",
         "protocols/yes-no/protocol.toml",
+        "protocols/designs/codec.toml",
+        "protocols/designs/comfort-3x2.toml",
+        "protocols/designs/cues-2x2x2.toml",
+        "protocols/designs/delay.toml",
+        "protocols/designs/expertise.toml",
+        "protocols/designs/fitts.toml",
+        "protocols/designs/icons.toml",
+        "protocols/designs/materials.toml",
+        "protocols/designs/patterns.toml",
+        "protocols/designs/roughness.toml",
+        "protocols/designs/texture-2x2.toml",
+        "protocols/designs/training.toml",
     ] {
         let file = match name.contains('/') {
             true => name.to_owned(),

@@ -117,6 +117,58 @@ fn another_device_does_not_go_on_after_a_restart() {
     assert!(why.contains("other"), "{why}");
 }
 
+/// Numbers of the study come with the outcome or by themselves; one that is late, or no number, is reported, and the
+/// program goes on.
+#[test]
+fn numbers_of_the_study_are_reported_and_end_nothing() {
+    let say = |message: &str| format!("echo '{{\"say\":{message}}}';");
+    let playback = r#""duration_s":1,"strokes":0,"least_energy_j":0,"switches_per_s":0,"clamps":0"#;
+    let script = [
+        HELLO.to_owned(),
+        "while read line; do case \"$line\" in ".to_owned(),
+        format!("*'\"do\":\"load\"'*) {};", say(r#""loaded","load":1"#)),
+        "*'\"do\":\"start\"'*) ".to_owned(),
+        say(r#""started","load":1"#),
+        say(r#""outcome","time_s":3.2"#),
+        say(r#""outcome","load":1,"errors":NaN"#),
+        say(&format!(r#""outcome","load":1,"errors":2,{playback}"#)),
+        say(r#""outcome","load":1,"time_s":9"#),
+        "; esac; done".to_owned(),
+    ]
+    .concat();
+    let mut bench = Bench::shell(&script);
+    bench.load().unwrap();
+    bench.until("table", |r| *r == Report::Loaded);
+    let at = bench.at();
+    bench.device.start(at).unwrap();
+    bench.until("the late number", |r| {
+        matches!(r, Report::Numbers { outside: true, .. })
+    });
+    let numbers: Vec<(String, Option<f64>, bool)> = (bench.heard.iter())
+        .filter_map(|report| match report {
+            Report::Numbers { numbers, outside } => {
+                let [number] = &numbers[..] else {
+                    panic!("{numbers:?}")
+                };
+                Some((number.key.clone(), number.value, *outside))
+            }
+            _ => None,
+        })
+        .collect();
+    let expected = [
+        ("time_s", Some(3.2), false),
+        ("errors", None, false),
+        ("errors", Some(2.0), false),
+        ("time_s", Some(9.0), true),
+    ];
+    let expected = expected.map(|(key, value, outside)| (key.to_owned(), value, outside));
+    assert_eq!(numbers, expected);
+    let ended = |r: &Report| matches!(r, Report::Stopped(_));
+    assert_eq!(bench.heard.iter().filter(|r| ended(r)).count(), 1);
+    let lost = |r: &Report| matches!(r, Report::Lost(_) | Report::Fault(_));
+    assert!(!bench.heard.iter().any(lost), "{:?}", bench.heard);
+}
+
 #[test]
 fn the_documented_example_plays() {
     let Some(command) = example() else { return };

@@ -191,6 +191,7 @@ fn the_headline_of_groups_and_sessions_is_that_of_the_analysis() {
                 "groups/F",
                 "groups_conditions/p_gg",
                 "sessions/p",
+                "groups_sessions/p_gg",
                 "retest/sem",
             ][..],
         ),

@@ -167,7 +167,24 @@ fn analyzed(folder: &Path) {
         .iter()
         .map(|f| f["question"].as_str().unwrap())
         .collect();
-    assert_eq!(asked, ["groups", "groups-conditions", "sessions"]);
+    assert_eq!(
+        asked,
+        ["groups", "groups-conditions", "sessions", "groups-sessions"]
+    );
+    // The interaction of two groups and two sessions is the t test of the participants' changes.
+    let mut change: BTreeMap<String, BTreeMap<String, f64>> = BTreeMap::new();
+    for row in table(&folder.join("out"), "ratings.csv") {
+        if ["lambda-0.9991", "lambda-0.9995"].contains(&row["model"].as_str()) {
+            let rating: f64 = row["realism"].parse().unwrap();
+            let sign = if row["session"] == "1" { -1.0 } else { 1.0 };
+            let group = change.entry(row["group"].clone()).or_default();
+            *group.entry(row["participant"].clone()).or_default() += sign * rating;
+        }
+    }
+    let of = |group: &str| -> Vec<f64> { change[group].values().copied().collect() };
+    let test = study_stats::between::difference(&of("all"), &of("few")).unwrap();
+    assert!((number("groups_sessions/F") - test.t * test.t).abs() < 1e-9);
+    assert!((number("groups_sessions/p_gg") - test.p.unwrap()).abs() < 1e-9);
     assert_eq!(number("groups_conditions/n_conditions"), 2.0);
     assert_eq!(number("groups_conditions/df2"), 4.0);
     let (code, page, err) = study(&["analyze", "out"], folder);

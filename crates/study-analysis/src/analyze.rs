@@ -75,6 +75,7 @@ pub use warning::Warning;
 
 use adjusted::Adjusted;
 use cells::Cells;
+use factorial::Margin;
 use results::{Correlation, Evidence, LmmVafCrossed, Results};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -107,8 +108,8 @@ pub struct Rules {
     pub primary: bool,
     /// The preregistered exclusion rules.
     pub exclude: Vec<Exclusion>,
-    /// Equivalence margin for differences between realizations and from a hidden reference,
-    /// and for the effect of VAF, in rating points.
+    /// Equivalence margin for differences between realizations or levels of a factor and from a
+    /// hidden reference, and for the effect of VAF, in rating points.
     pub equivalence_margin: Option<f64>,
     /// Equivalence margin for the correlation with VAF.
     pub equivalence_r: Option<f64>,
@@ -547,7 +548,7 @@ fn evidence(
         order,
         differences,
         references,
-        factorial: factorial::factorial(cells, adjusted, rules),
+        factorial: factorial::factorial(cells, adjusted, rules, Margin::of_ratings(rules)),
         cells: adjusted::adjusted(cells, adjusted),
         pairs: pairs::pairs(cells, adjusted, rules),
         sites: sites::sites(cells, rules),

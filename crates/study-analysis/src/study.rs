@@ -38,13 +38,17 @@ use crate::analyze::{
     analyze_with_progress,
 };
 use crate::load::{self, Loaded};
+use std::collections::BTreeMap;
 use std::io::BufRead;
 use std::path::Path;
-use study_base::text::{ParticipantId, QuestionId};
+use study_base::text::{ParticipantId, QuestionId, Untrusted, counted};
 use study_plan::protocol::{Factor, Protocol, Task, Transform};
-use study_session::outcome::RatingRow;
 use study_session::outcome::ratings::Ratings;
+use study_session::outcome::{Event, RatingRow, SentFault};
 use study_session::store::{Derived, SessionData, StudyFolder, one_study};
+
+/// Most kinds of refused numbers that a warning names.
+const MAX_TOLD: usize = 8;
 
 /// What is analyzed.
 #[derive(Debug, Clone, Copy, Default)]
@@ -299,10 +303,53 @@ impl Study {
                 }
             ),
         });
-        analysis
-            .warnings
-            .splice(0..0, shares.into_iter().chain(measured));
+        let warnings = shares.into_iter().chain(measured);
+        let warnings = warnings.chain(self.refused_numbers(options.include));
+        analysis.warnings.splice(0..0, warnings);
         Ok(analysis)
+    }
+
+    /// How many numbers that a controller program sent do not count, and why.
+    fn refused_numbers(&self, include: Include) -> Option<Warning> {
+        let included = |session: &&SessionData| {
+            session.history.start().is_some_and(|start| {
+                (include.pilot || !start.seat.is_pilot())
+                    && (include.simulated || !start.seat.is_simulated())
+            })
+        };
+        let mut counts: BTreeMap<(String, &str), usize> = BTreeMap::new();
+        let sessions = self.sessions.iter().filter(included);
+        for entry in sessions.flat_map(|session| &session.entries) {
+            let Event::NumbersSent { numbers, .. } = &entry.event else {
+                continue;
+            };
+            for number in numbers {
+                let own = number.fault.filter(|fault| match fault {
+                    // It may have been declared since.
+                    SentFault::Undeclared | SentFault::OtherUnit => {
+                        number.declared_in(&self.loaded.protocol).is_err()
+                    }
+                    SentFault::NoNumber | SentFault::OutsidePlayback | SentFault::Twice => true,
+                });
+                if let Some(fault) = own {
+                    let key = Untrusted(&number.key).to_string();
+                    *counts.entry((key, fault.in_words())).or_default() += 1;
+                }
+            }
+        }
+        let all: usize = counts.values().sum();
+        let told: Vec<String> = (counts.into_iter().take(MAX_TOLD))
+            .map(|((key, why), n)| format!("{key} {why} ({n})"))
+            .collect();
+        (all > 0).then(|| Warning {
+            code: "numbers-refused",
+            text: format!(
+                "{} that the device sent {} not count: {} (see attempts.csv)",
+                counted(all, "number", "numbers"),
+                if all == 1 { "does" } else { "do" },
+                told.join("; ")
+            ),
+        })
     }
 
     /// The answers to a question, with what the protocol and the model files say of the

@@ -9,7 +9,7 @@
 //! - [`virtual_device`] is the simulated device in virtual time, [`firmware`] its
 //!   device side, and [`faults`] the faults that can be injected.
 //! - [`process`] is a controller program of the lab, [`manual`] an experimenter who
-//!   mounts samples.
+//!   mounts samples, [`sending`] a simulated program that sends numbers of a study.
 //! - [`table`] checks tables before they are sent, [`commission`] has what a person checks of a
 //!   device, [`check`] tests a device against
 //!   `docs/wire.md`, and [`probe`] records with a probe.
@@ -23,6 +23,7 @@ pub mod link;
 pub mod manual;
 pub mod probe;
 pub mod process;
+pub mod sending;
 pub mod serial;
 pub mod table;
 pub mod virtual_device;
@@ -30,7 +31,7 @@ pub mod virtual_device;
 use std::time::Duration;
 use study_base::limits::Limits;
 use study_haptics::model::Realization;
-use study_session::outcome::{Playback, Sample};
+use study_session::outcome::{Playback, Sample, SentNumber};
 use study_wire::servo::{self, Law, ServoSettings};
 
 /// Identity and limits of a device.
@@ -159,6 +160,13 @@ pub enum Report {
         /// From when it fell, in the time of the samples, s.
         from_s: f64,
     },
+    /// A controller program sends numbers, such as the time that a task took.
+    Numbers {
+        /// As they were sent.
+        numbers: Vec<SentNumber>,
+        /// Whether they belong to no playback under way: they came before or after it.
+        outside: bool,
+    },
     /// The playback has stopped and the device is limp.
     Stopped(Playback),
     /// The device has tripped and is limp until the next load.
@@ -171,9 +179,12 @@ pub enum Report {
 
 impl Report {
     /// Whether the report is still valid after [`Device::limp`]; reports about the
-    /// interrupted playback are not.
+    /// interrupted playback are not, but for numbers, which are recorded whatever became of it.
     fn survives_limp(&self) -> bool {
-        matches!(self, Self::Fault(_) | Self::Lost(_) | Self::Ready)
+        matches!(
+            self,
+            Self::Fault(_) | Self::Lost(_) | Self::Ready | Self::Numbers { .. }
+        )
     }
 }
 

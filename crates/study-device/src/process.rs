@@ -225,7 +225,7 @@ impl ProcessDevice {
         }
     }
 
-    fn handle(&mut self, message: ChildMessage, at: Duration) -> Result<(), MessageError> {
+    fn handle(&mut self, mut message: ChildMessage, at: Duration) -> Result<(), MessageError> {
         if let Phase::Opening { .. } = self.phase {
             let told = message.hello()?;
             if told.identity.id != self.told.identity.id {
@@ -240,6 +240,21 @@ impl ProcessDevice {
         if let ChildMessage::Free { load, .. } = message {
             self.freed.retain(|(earlier, _)| *earlier > load);
             return Ok(());
+        }
+        if let ChildMessage::Outcome { load, outcome } = &mut message {
+            let is_own = load.is_none_or(|load| load == self.load);
+            let plays = matches!(self.phase, Phase::Playing | Phase::Stopping);
+            let numbers = std::mem::take(&mut outcome.numbers);
+            if !numbers.is_empty() {
+                let outside = !(is_own && plays);
+                self.reports.push(Report::Numbers { numbers, outside });
+            }
+            match (load, &outcome.playback) {
+                // Numbers alone end nothing, and come when they come.
+                (_, None) => return Ok(()),
+                (None, Some(_)) => return Err(MessageError::NoLoad),
+                (Some(_), Some(_)) => {}
+            }
         }
         if message.load().is_some_and(|load| load != self.load) {
             return Ok(());
@@ -281,13 +296,16 @@ impl ProcessDevice {
                 },
                 Phase::Playing | Phase::Stopping,
             ) => self.reports.push(Report::Progress { strokes, clamps }),
-            (ChildMessage::Stopped { outcome, .. }, Phase::Playing | Phase::Stopping) => {
+            (ChildMessage::Outcome { outcome, .. }, Phase::Playing | Phase::Stopping) => {
                 self.phase = Phase::Idle;
-                self.reports.push(Report::Stopped(Playback {
-                    samples: self.samples,
-                    time_ratio: self.arrivals.time_ratio(),
-                    ..outcome.into()
-                }));
+                let stopped = outcome.playback.map(|playback| {
+                    Report::Stopped(Playback {
+                        samples: self.samples,
+                        time_ratio: self.arrivals.time_ratio(),
+                        ..playback.into()
+                    })
+                });
+                self.reports.extend(stopped);
             }
             (message, phase) => {
                 return Err(MessageError::WrongState {

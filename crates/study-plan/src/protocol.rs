@@ -57,7 +57,8 @@ pub use identification::{Criterion, Drawn, Feedback, Identification, Label};
 pub use kinds::QuestionKind;
 pub use media::{MEDIA_WITHIN_MS, Media, MediaFile, MediaFormat, Medium};
 pub use outcomes::{
-    Answers, BetterEnd, Clock, Measure, OutcomeFamily, OutcomeRules, Telemetry, Transform,
+    Answers, BetterEnd, Clock, DeviceNumber, Measure, OutcomeFamily, OutcomeRules, Telemetry,
+    Transform,
 };
 pub use pairs::{IntervalOrder, Pairs};
 pub use parts::{

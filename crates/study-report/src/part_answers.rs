@@ -1,11 +1,14 @@
 //! What was found of a part that is no rating, in sentences: for the terminal page, the
 //! report and a paper. Names in them are untrusted.
 
+mod again;
+
 use super::answers::Answer;
 use super::{apa, sentences, wording};
+use again::{changes, retest};
 use study_analysis::analyze::psychophysics::results::LabelPair;
 use study_analysis::analyze::psychophysics::{LevelData, PartAnalysis, PartFinding, PartQuestion};
-use study_analysis::analyze::results::{Interval, Number as _, Stat};
+use study_analysis::analyze::results::Number as _;
 use study_analysis::analyze::{Pair, Verdict};
 use study_base::sort::SmallSort as _;
 use study_base::text::counted;
@@ -61,6 +64,10 @@ fn answer(part: &PartAnalysis, f: &PartFinding) -> Option<Answer> {
     }
     if f.question == PartQuestion::Sessions {
         answer.main.extend(retest(part));
+    }
+    // Of two groups and two sessions the answer has it.
+    if f.question == PartQuestion::GroupsSessions && f.estimate.is_none() {
+        answer.main.extend(changes(part));
     }
     if matches!(
         f.question,
@@ -159,22 +166,6 @@ fn ci(ends: Option<(f64, f64)>, format: fn(f64) -> String) -> String {
     ends.map_or_else(String::new, |ends| {
         format!(", 95 % CI {}", apa::interval(ends, format))
     })
-}
-
-/// How alike the sessions are.
-fn retest(part: &PartAnalysis) -> Option<String> {
-    let found = part.results.over.again.retest.as_ref()?;
-    let icc = |value: &Stat, ci95: &Interval| {
-        let ci = ci(ci95.ends(), apa::two);
-        Some(format!("{}{ci}", apa::two(value.number()?)))
-    };
-    Some(format!(
-        "Test–retest reliability over {} participants: ICC(A,1) = {} (agreement), ICC(C,1) = {} \
-         (consistency).",
-        found.n.number()?,
-        icc(&found.icc_agreement, &found.icc_agreement_ci95)?,
-        icc(&found.icc_consistency, &found.icc_consistency_ci95)?
-    ))
 }
 
 /// The thresholds of each condition; those that are learned together stand beside the means.
@@ -544,6 +535,13 @@ pub(super) fn methods(part: &PartAnalysis) -> String {
         text.push(
             "Whether conditions depend on the group is the interaction of both in an analysis of variance between \
              and within participants, with the Greenhouse–Geisser correction."
+                .to_owned(),
+        );
+    }
+    if over.again.groups_sessions.is_some() {
+        text.push(
+            "Whether changes from session to session depend on the group is the interaction of both in an analysis of \
+             variance between and within participants, with the Greenhouse–Geisser correction."
                 .to_owned(),
         );
     }

@@ -200,8 +200,14 @@ fn markdown(c: &Content<'_>) -> String {
         tests.push(format!("A rating of {from} or higher counts as realistic."));
     }
     if let Some(margin) = p.analysis.equivalence_margin {
+        let of_levels = match p.factors.is_empty() {
+            true => "",
+            false => {
+                " Levels of a factor are tested for it by two one-sided t tests, with Holm's correction over the pairs of levels."
+            }
+        };
         tests.push(format!(
-            "Equivalence means a difference of less than {margin} points."
+            "Equivalence means a difference of less than {margin} points.{of_levels}"
         ));
     }
     tests.push(

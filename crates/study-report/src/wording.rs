@@ -284,6 +284,7 @@ analysis = { primary = "better" }
             PartQuestion::Groups,
             PartQuestion::GroupsConditions,
             PartQuestion::Sessions,
+            PartQuestion::GroupsSessions,
         ] {
             let f = Finding {
                 question,

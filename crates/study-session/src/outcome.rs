@@ -14,6 +14,7 @@ pub mod media;
 pub mod motion;
 pub mod ratings;
 pub mod rows;
+pub mod sent;
 
 pub use event::{
     Author, Channel, Choice, Entry, Event, Failure, FormId, Moment, Playback, STEP_BACK,
@@ -22,6 +23,7 @@ pub use event::{
 pub use fidelity::{Defect, Fidelity, Verdict};
 pub use media::{Onset, Onsets};
 pub use rows::{AttemptEvent, AttemptRow, IntervalRow, ParticipantRow, RatingRow, Status};
+pub use sent::{SentFault, SentNumber};
 
 /// A row says what its realization is; readers of rows need no protocol for it.
 pub use study_plan::protocol::Role;

@@ -45,6 +45,7 @@ pub mod retrace;
 pub mod roster;
 mod saving;
 mod search;
+mod sent;
 mod tracks;
 mod trial;
 mod unsaved;
@@ -245,6 +246,7 @@ impl Session {
             Input::DeviceStarted => self.device_started(at),
             Input::DeviceSampled => self.device_sampled(at),
             Input::DeviceProgress { strokes } => self.device_progress(strokes),
+            Input::DeviceNumbers { numbers, outside } => self.device_numbers(numbers, outside, at),
             Input::DeviceJudged(fidelity) => self.judged = Some(fidelity),
             Input::DeviceStopped(playback) => self.device_stopped(playback, at),
             Input::DeviceFault(what) => self.device_fault(&what, at),
@@ -315,6 +317,7 @@ fn is_deliberate(input: &Input) -> bool {
             | Input::DeviceStarted
             | Input::DeviceSampled
             | Input::DeviceProgress { .. }
+            | Input::DeviceNumbers { .. }
             | Input::DeviceJudged(_)
             | Input::DeviceStopped(_)
             | Input::DeviceReady

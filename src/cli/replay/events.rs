@@ -6,7 +6,7 @@
 use serde_json::{Map, Value};
 use study_base::text::{ModelId, Untrusted};
 use study_plan::protocol::Answer;
-use study_session::outcome::{Choice, Entry, Event, FormId, Playback};
+use study_session::outcome::{Choice, Entry, Event, FormId, Playback, SentNumber};
 
 /// Fields of events that tell nothing of a realization.
 const OPEN: &[&str] = &[
@@ -68,6 +68,7 @@ const HIDDEN: &[&str] = &[
     "level",
     "medium",
     "model",
+    "numbers",
     "offset_ms",
     "part",
     "point",
@@ -207,6 +208,8 @@ pub(super) fn words(event: &Event, revealed: bool) -> String {
             medium.as_str()
         ),
         Event::MediaShown { .. } => "the participant's page shows or plays it".to_owned(),
+        Event::NumbersSent { numbers, .. } if revealed => numbers_sent(numbers),
+        Event::NumbersSent { .. } => "the device sends numbers".to_owned(),
         Event::Adjusted { standard: true, .. } => "the standard is asked for".to_owned(),
         Event::Adjusted { to, .. } if revealed => format!("{to} comes next"),
         // A step away, or after the standard the same.
@@ -293,6 +296,20 @@ fn felt(playback: &Playback) -> String {
         " after {:.1} s, {} full strokes",
         playback.exploration_s, playback.strokes
     )
+}
+
+/// Numbers by name, and why some do not count.
+fn numbers_sent(numbers: &[SentNumber]) -> String {
+    let one = |number: &SentNumber| {
+        let value = number.value.map_or_else(String::new, |x| format!(" = {x}"));
+        let why = number
+            .fault
+            .map(|fault| format!(", which {}", fault.in_words()));
+        let why = why.unwrap_or_default();
+        format!("{}{value}{why}", Untrusted(&number.key))
+    };
+    let all: Vec<String> = numbers.iter().map(one).collect();
+    format!("the device sends {}", all.join(", "))
 }
 
 fn of_interval(interval: Option<u32>) -> String {
@@ -387,6 +404,15 @@ mod tests {
                 attempt,
                 to: model.clone(),
                 standard: false,
+            },
+            Event::NumbersSent {
+                trial: Some(trial),
+                attempt: Some(attempt),
+                numbers: vec![SentNumber {
+                    key: format!("time_of_{model}"),
+                    value: Some(least_energy_j),
+                    fault: None,
+                }],
             },
             Event::PointLeftOut {
                 part: study_base::text::PartId::new("best").unwrap(),

@@ -87,7 +87,7 @@ fn trial_of(event: &Event) -> Option<u32> {
         | Event::StepFailed { trial, .. }
         | Event::TrialClosed { trial, .. }
         | Event::Adjusted { trial, .. } => Some(*trial),
-        Event::Remark { trial, .. } => *trial,
+        Event::Remark { trial, .. } | Event::NumbersSent { trial, .. } => *trial,
         _ => None,
     }
 }

@@ -1,9 +1,12 @@
 //! Factorial designs: `factorial/*`, `factorial_mean/*`, `factorial_contrast/*`. Over the
 //! participants who rated every realization ([`complete`]); where these are too few, over all,
-//! within participants ([`incomplete`]).
+//! within participants ([`incomplete`]). The latter can be repeated with means that are moved ([`moved`]).
 
 mod complete;
 mod incomplete;
+mod moved;
+
+pub(super) use moved::{Movable, movable};
 
 use super::Rules;
 use super::adjusted::Adjusted;
@@ -14,7 +17,8 @@ use incomplete::Incomplete;
 use std::collections::BTreeMap;
 use study_plan::protocol::Crossing;
 use study_stats::factorial::{Pair, product};
-use study_stats::paired::holm;
+use study_stats::level::rejects;
+use study_stats::paired::{Equivalence, equivalence_of, holm};
 
 statistics! {
     /// An effect in the analysis of variance of the participants' means in each combination of levels: each effect within participants against its own interaction with participants. With groups sums of squares are of type III.
@@ -85,6 +89,18 @@ statistics! {
         ci95: Option<Interval>,
     }
 
+    /// Whether a difference between two levels is smaller than the `equivalence_margin`, of ratings.
+    pub struct ContrastEquivalence {
+        /// the larger p of the two one-sided t tests (Schuirmann 1987) that the difference lies within ± the margin
+        p_tost: Stat,
+        /// the same corrected by Holm (1979), as `p_holm` is
+        p_tost_holm: Stat,
+        /// lies within the margin where `p_tost` is below .05
+        ci90: Interval,
+        /// 1 if `p_tost_holm` is significant
+        equivalent: Stat,
+    }
+
     /// A difference between two levels of a factor, over all levels of the others or at one level of another (a simple effect), by t over participants.
     pub struct FactorialContrast {
         /// first minus second level
@@ -101,6 +117,8 @@ statistics! {
         p_holm: Stat,
         /// difference over the standard deviation of the participants' differences
         dz: Option<Stat>,
+        /// with a margin
+        equivalence: Option<ContrastEquivalence> as "",
     }
 
     /// A factorial design.
@@ -117,9 +135,27 @@ statistics! {
 /// Levels of factors: the place of each factor and of its level.
 type Levels = Vec<(usize, usize)>;
 
+/// The margin of equivalence and the level of its tests.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Margin {
+    margin: f64,
+    alpha: f64,
+}
+
+impl Margin {
+    /// That of the ratings, if one was stated.
+    pub(super) fn of_ratings(rules: &Rules) -> Option<Self> {
+        rules.equivalence_margin.map(|margin| Self {
+            margin,
+            alpha: rules.alpha,
+        })
+    }
+}
+
 /// The combinations of a design and what belongs to them.
 struct Layout<'a> {
     crossing: &'a Crossing,
+    margin: Option<Margin>,
     /// The realizations of each combination, the last factor fastest; by their places in the list
     /// that it was made from.
     columns: Vec<Vec<usize>>,
@@ -130,6 +166,7 @@ struct Layout<'a> {
 /// A difference between two levels.
 struct Compared {
     estimate: f64,
+    se: f64,
     ci95: Option<(f64, f64)>,
     t: Option<f64>,
     df: Option<f64>,
@@ -138,18 +175,20 @@ struct Compared {
     dz: Option<Option<f64>>,
 }
 
-/// Tests of the effects of a factorial design; `None` in a study without factors.
+/// Tests of the effects of a factorial design; `None` in a study without factors. With a margin, which has to be
+/// in the unit of what is compared, levels are also tested for equivalence.
 pub(super) fn factorial(
     cells: &Cells<'_>,
     adjusted: &Adjusted,
     rules: &Rules,
+    margin: Option<Margin>,
 ) -> Option<FactorialTests> {
     let crossing = rules.crossing.as_ref()?;
-    let complete = Table::of(cells, crossing).map(|table| table.tests());
+    let complete = Table::of(cells, crossing, margin).map(|table| table.tests());
     let mut found = complete.unwrap_or_else(|why| undefined(crossing, &why));
     // With groups a difference between them cannot be told within participants.
     if !adjusted.design.uses_complete() && crossing.groups.is_empty() {
-        match Incomplete::of(cells, adjusted, crossing) {
+        match Incomplete::of(cells, adjusted, crossing, margin) {
             Ok(incomplete) => incomplete.decide(&mut found),
             Err(why) => found = undefined(crossing, &why),
         }
@@ -176,7 +215,12 @@ fn undefined(crossing: &Crossing, why: &Why) -> FactorialTests {
 
 impl<'a> Layout<'a> {
     /// That of some realizations, by their indices.
-    fn of(cells: &Cells<'_>, crossing: &'a Crossing, models: &[usize]) -> Result<Self, Why> {
+    fn of(
+        cells: &Cells<'_>,
+        crossing: &'a Crossing,
+        margin: Option<Margin>,
+        models: &[usize],
+    ) -> Result<Self, Why> {
         let combinations: usize = crossing.sizes().iter().product();
         let mut columns = vec![Vec::new(); combinations];
         for (j, &model) in models.iter().enumerate() {
@@ -194,6 +238,7 @@ impl<'a> Layout<'a> {
         }
         Ok(Self {
             crossing,
+            margin,
             columns,
             groups: Vec::new(),
         })
@@ -220,6 +265,39 @@ impl<'a> Layout<'a> {
             levels.iter().all(|(factor, level)| own[*factor] == *level)
         };
         (0..self.columns.len()).filter(is_at).collect()
+    }
+
+    /// What is 0 without an effect within participants, by weights of the combinations: products of differences of two
+    /// levels of each of its factors, the second less the first, over the levels of the others.
+    fn contrasts_of(&self, effect: &[usize]) -> Vec<Vec<f64>> {
+        let sizes = self.crossing.sizes();
+        let mut all: Vec<Vec<Pair>> = vec![Vec::new()];
+        for &factor in effect {
+            let size = sizes[factor];
+            let pairs = (0..size).flat_map(|second| {
+                (second + 1..size).map(move |first| Pair {
+                    factor,
+                    first,
+                    second,
+                })
+            });
+            all = (all.iter())
+                .flat_map(|start| pairs.clone().map(|pair| [&start[..], &[pair]].concat()))
+                .collect();
+        }
+        let weights = |pairs: &Vec<Pair>| product(&sizes, pairs, &[]);
+        all.iter().map(weights).collect()
+    }
+
+    /// Weights of combinations as weights of so many realizations.
+    fn over_realizations(&self, weights: &[f64], realizations: usize) -> Vec<f64> {
+        let mut all = vec![0.0; realizations];
+        for (own, weight) in self.columns.iter().zip(weights) {
+            for &j in own {
+                all[j] = weight / own.len() as f64;
+            }
+        }
+        all
     }
 
     /// Names of levels.
@@ -302,19 +380,58 @@ impl<'a> Layout<'a> {
             }
         }
         let p: Vec<Option<f64>> = found.iter().map(|(_, c)| c.as_ref()?.p).collect();
-        let tested = found.into_iter().zip(holm(&p));
-        let contrast = |((name, compared), p_holm): ((_, Option<Compared>), Option<f64>)| {
-            (name, FactorialContrast::of(compared, p_holm))
+        let equivalences = self.equivalences(&found);
+        let tested = found.into_iter().zip(holm(&p)).zip(equivalences);
+        tested
+            .map(|(((name, compared), p_holm), equivalence)| {
+                let contrast = FactorialContrast::of(compared, p_holm, equivalence);
+                (name, contrast)
+            })
+            .collect()
+    }
+
+    /// Whether each of a family of differences is smaller than the margin; nothing without one.
+    fn equivalences(
+        &self,
+        found: &[(ContrastName, Option<Compared>)],
+    ) -> Vec<Option<ContrastEquivalence>> {
+        let Some(Margin { margin, alpha }) = self.margin else {
+            return found.iter().map(|_| None).collect();
         };
-        tested.map(contrast).collect()
+        let tests: Vec<Option<Equivalence>> = (found.iter())
+            .map(|(_, compared)| {
+                let c = compared.as_ref()?;
+                // Without t all differences are equal but for rounding.
+                c.t.and(equivalence_of(c.estimate, c.se, c.df?, margin))
+            })
+            .collect();
+        let p: Vec<Option<f64>> = tests.iter().map(|test| Some((*test)?.p)).collect();
+        let why = "too few participants, or all differences are equal";
+        let one = |(test, p_holm): (&Option<Equivalence>, Option<f64>)| {
+            Some(ContrastEquivalence {
+                p_tost: Stat::or(test.map(|test| test.p), why),
+                p_tost_holm: Stat::or(p_holm, why),
+                ci90: Interval::or(test.map(|test| test.ci90), why),
+                equivalent: p_holm
+                    .map_or_else(|| Stat::missing(why), |p| Stat::flag(rejects(p, alpha))),
+            })
+        };
+        tests.iter().zip(holm(&p)).map(one).collect()
     }
 }
 
 impl FactorialContrast {
-    fn of(compared: Option<Compared>, p_holm: Option<f64>) -> Self {
+    fn of(
+        compared: Option<Compared>,
+        p_holm: Option<f64>,
+        equivalence: Option<ContrastEquivalence>,
+    ) -> Self {
         let few = "too few participants";
         let Some(c) = compared else {
-            return Self::undefined(few);
+            return Self {
+                equivalence,
+                ..Self::undefined(few)
+            };
         };
         let or = |x: Option<f64>| Stat::or(x, "all differences are equal");
         Self {
@@ -325,6 +442,7 @@ impl FactorialContrast {
             p: or(c.p),
             p_holm: or(p_holm),
             dz: c.dz.map(or),
+            equivalence,
         }
     }
 }

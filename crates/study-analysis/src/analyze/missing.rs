@@ -11,13 +11,15 @@
 use super::Rules;
 use super::adjusted::Adjusted;
 use super::cells::{Cell, Cells};
-use super::record::{RealizationName, Stat, statistics};
+use super::factorial::{Movable, movable};
+use super::record::{EffectName, RealizationName, Stat, statistics};
 use std::collections::BTreeMap;
 use study_base::sort::SmallSort as _;
 use study_stats::correlation::{p_of_r, pearson};
 use study_stats::describe::mean;
 use study_stats::level::rejects;
 use study_stats::lmm::CellSummary;
+use study_stats::paired::holm;
 use study_stats::within::{Clustered, Within};
 
 /// Above this share of missing ratings the answers are tried with them moved (Schafer 1999, Stat. Methods Med.
@@ -56,6 +58,8 @@ statistics! {
         differ: Moved,
         /// "the best is better than the second", clustered by participant
         best: Moved,
+        /// "the effect of a factor, or an interaction, is there", by the contrasts within participants clustered by participant (`factorial/EFFECT/clustered`), corrected by Holm (1979) over the effects that are tested; yes: means move towards no effect, no: away from it. Absent where the group is a factor
+        effects: BTreeMap<EffectName, Moved> as "effect",
     }
 
     /// Missing ratings of the test realizations, of participants with a rating of one of them. Presentations that were not reached, failed or were declined count; what a rule excludes has a rating and does not.
@@ -141,6 +145,7 @@ pub(super) fn missing(
             vaf: moves.vaf(cells),
             differ: moves.differ(),
             best: moves.best(),
+            effects: moves.effects(cells),
         })
     });
     Some(MissingRatings {
@@ -424,6 +429,34 @@ impl<'a> Moves<'a> {
             Some((t.estimate, t.p?))
         };
         self.answer(&towards, test, "there is no test clustered by participant")
+    }
+}
+
+impl Moves<'_> {
+    /// Each effect of a factorial design that is tested, with the other effects as they are.
+    fn effects(&self, cells: &Cells<'_>) -> BTreeMap<EffectName, Moved> {
+        let (Some(clustered), Some(crossing)) = (&self.clustered, &self.rules.crossing) else {
+            return BTreeMap::new();
+        };
+        let all = movable(cells, self.adjusted, crossing, clustered);
+        let still = vec![0.0; self.means.len()];
+        let family: Vec<Option<f64>> = (all.iter())
+            .map(|own| own.tested(&still).map(|(_, p)| p))
+            .collect();
+        let one = |(at, own): (usize, &Movable)| {
+            let towards: Vec<(f64, f64)> = (own.share.iter())
+                .map(|share| (sign(-share), share.abs()))
+                .collect();
+            let test = |by: &[f64]| {
+                let (t, p) = own.tested(by)?;
+                let mut family = family.clone();
+                family[at] = Some(p);
+                Some((t, holm(&family)[at]?))
+            };
+            let moved = self.answer(&towards, test, "there is no test clustered by participant");
+            (own.name.clone(), moved)
+        };
+        all.iter().enumerate().map(one).collect()
     }
 }
 

@@ -76,7 +76,8 @@ fn one(
     let design = Design::of(&cells);
     let means = adjusted::adjusted(&cells, &adjusted);
     let differences = effects::ranks_and_anova(&cells);
-    let tests = factorial::factorial(&cells, &adjusted, rules);
+    // The margin of equivalence is in points of the primary scale.
+    let tests = factorial::factorial(&cells, &adjusted, rules, None);
     let mut findings = findings::compared(&Compared {
         design,
         rules,
@@ -126,7 +127,11 @@ fn one(
 
 /// The relation of each time with what else was measured.
 fn pair(all: &mut [(MeasuredOutcome, OutcomeAnswer)], means: &[CellMeans]) {
-    let is_time = |rules: &OutcomeRules| matches!(rules.measure, Measure::Clock(_));
+    let is_time = |rules: &OutcomeRules| match &rules.measure {
+        Measure::Clock(_) => true,
+        Measure::Device(number) => ["s", "ms", "min"].contains(&number.unit.as_str()),
+        Measure::Telemetry(_) | Measure::Answers(_) | Measure::Questionnaire(_) => false,
+    };
     let rules: Vec<OutcomeRules> = all.iter().map(|(_, answer)| answer.rules.clone()).collect();
     for (at, (record, _)) in all.iter_mut().enumerate() {
         let own = &rules[at];
@@ -189,9 +194,10 @@ impl Counts {
                 let with: BTreeSet<_> = scored.map(cell).collect();
                 (all.len(), with.len())
             }
-            Measure::Clock(_) | Measure::Telemetry(_) | Measure::Answers(_) => {
-                (values.len(), measured.len())
-            }
+            Measure::Clock(_)
+            | Measure::Telemetry(_)
+            | Measure::Answers(_)
+            | Measure::Device(_) => (values.len(), measured.len()),
         };
         let left_out = |x: &&f64| outcome.transform.apply(**x).is_none();
         Self {
@@ -370,7 +376,7 @@ fn caveats(counts: &Counts, design: Design, outcome: &OutcomeRules) -> Vec<Warni
             "realization of a participant",
             "realizations of the participants",
         ),
-        Measure::Clock(_) | Measure::Telemetry(_) | Measure::Answers(_) => {
+        Measure::Clock(_) | Measure::Telemetry(_) | Measure::Answers(_) | Measure::Device(_) => {
             counted(all, "trial", "trials")
         }
     };

@@ -13,7 +13,8 @@ pub use super::describe::{
 pub use super::disagreement::{Disagree, Interaction};
 pub use super::effects::{Anova, Differences, Friedman, Posthoc, TwoWay, TwoWayEffect};
 pub use super::factorial::{
-    ClusteredEffect, FactorialContrast, FactorialEffect, FactorialMean, FactorialTests,
+    ClusteredEffect, ContrastEquivalence, FactorialContrast, FactorialEffect, FactorialMean,
+    FactorialTests,
 };
 pub use super::headline::{
     EquivalenceOfVaf, Realistic, Sensitivity, SmallCorrelation, SmallEffect, Variance,

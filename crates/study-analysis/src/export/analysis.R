@@ -118,7 +118,8 @@ if (has_ratings) {
 #'
 #' The participants' means in each combination of levels, of those who rated every realization.
 #' Each effect is tested by orthonormal contrasts of these means, in a multivariate linear model
-#' with Greenhouse and Geisser's correction; with groups, sums of squares are of type III.
+#' with Greenhouse and Geisser's correction; with groups, sums of squares are of type III. Levels of a factor
+#' are compared by t tests over participants and, if a margin of equivalence was stated, by two one-sided ones.
 
 # F, degrees of freedom and p of one effect; `y` has a column for each contrast.
 spherical <- function(y, group, of_group) {
@@ -136,6 +137,13 @@ spherical <- function(y, group, of_group) {
   }
   found <- anova(full, less, X = ~0, test = "Spherical")
   c(F = found$F[2], df1 = found[["num Df"]][2], df2 = found[["den Df"]][2], p_gg = found[["G-G Pr"]][2])
+}
+# A name in an identifier: what separates names there is written as its number.
+in_id <- function(name) {
+  for (mark in c("%", "/", "|", "=", "@", ",")) {
+    name <- gsub(mark, sprintf("%%%02X", utf8ToInt(mark)), name, fixed = TRUE)
+  }
+  name
 }
 factors <- kept("factor")
 if (has_ratings && length(factors) > 0) {
@@ -163,6 +171,26 @@ if (has_ratings && length(factors) > 0) {
       found <- spherical(wide %*% contrasts, group, of_group)
       print(c(effect = name, signif(found, 6)), quote = FALSE)
       value[paste0("factorial/", name, "/", names(found))] <- found
+    }
+  }
+  margin <- as.numeric(setting("equivalence margin"))
+  for (i in seq_along(factors)) {
+    named_levels <- levels(ratings[[factors[i]]])
+    for (a in seq_along(named_levels)) for (b in seq_along(named_levels)) if (b > a) {
+      weights <- matrix(1)
+      for (j in seq_along(factors)) {
+        at <- seq_len(sizes[j])
+        weights <- kronecker(weights, matrix(if (j == i) (at == a) - (at == b) else rep(1 / sizes[j], sizes[j])))
+      }
+      d <- as.vector(wide %*% weights)
+      fit <- if (length(group) == 0) lm(d ~ 1) else lm(d ~ group, contrasts = list(group = "contr.sum"))
+      own <- suppressWarnings(summary(fit))$coefficients[1, ]
+      found <- c(difference = own[[1]], t = own[[3]], df = fit$df.residual, p = own[[4]],
+                 p_tost = max(pt((own[[1]] + margin) / own[[2]], fit$df.residual, lower.tail = FALSE),
+                              pt((own[[1]] - margin) / own[[2]], fit$df.residual)))
+      pair <- paste0(in_id(factors[i]), "=", in_id(named_levels[a]), "|", in_id(named_levels[b]))
+      print(c(contrast = pair, signif(found, 6)), quote = FALSE)
+      value[paste0("factorial_contrast/", pair, "/", names(found))] <- found
     }
   }
 }
@@ -377,7 +405,47 @@ means_of <- function(part, data) {
   data
 }
 
-compare_groups <- function(put, cells, ratios, by_condition) {
+# The interaction of the group and what the columns of `y` are, as the numbers of `id`.
+interaction_of <- function(put, id, y, group) {
+  k <- ncol(y)
+  fit <- lm(y ~ group)
+  test <- tried(anova(fit, lm(y ~ 1), X = ~1, test = "Spherical"))
+  if (is.null(test)) return(invisible())
+  print(test)
+  contrasts <- contr.helmert(k)
+  contrasts <- sweep(contrasts, 2, sqrt(colSums(contrasts^2)), "/")
+  own <- crossprod(residuals(fit) %*% contrasts)
+  columns <- c(F = "F", df1 = "num Df", df2 = "den Df", p = "Pr(>F)", p_gg = "G-G Pr")
+  for (what in names(columns)) put(paste0(id, "/", what), test[2, columns[[what]]])
+  put(paste0(id, "/eps_gg"), sum(diag(own))^2 / ((k - 1) * sum(own^2)))
+}
+
+# Whether the groups change alike from session to session, over the conditions that all sessions have.
+compare_courses <- function(put, all, group, sessions, ratios) {
+  of_condition <- sub("\r.*", "", colnames(all))
+  of_session <- sub(".*\r", "", colnames(all))
+  sessions <- sessions[sessions %in% of_session]
+  shared <- Reduce(intersect, lapply(sessions, function(s) of_condition[of_session == s]))
+  if (length(sessions) < 2 || length(shared) == 0) return(invisible())
+  y <- vapply(sessions, function(s) {
+    rowMeans(all[, of_session == s & of_condition %in% shared, drop = FALSE])
+  }, numeric(nrow(all)))
+  interaction_of(put, "groups_sessions", y, group)
+  change <- y[, length(sessions)] - y[, 1]
+  groups <- sorted(group)
+  shown <- if (ratios) exp else identity
+  for (i in seq_along(groups)) for (j in seq_along(groups)) if (j > i) {
+    test <- tried(t.test(change[group == groups[i]], change[group == groups[j]], var.equal = TRUE))
+    if (is.null(test)) next
+    pair <- paste0("groups_sessions/", groups[i], "|", groups[j])
+    put(paste0(pair, if (ratios) "/ratio" else "/difference"), shown(test$estimate[[1]] - test$estimate[[2]]))
+    put(paste0(pair, "/t"), test$statistic[[1]])
+    put(paste0(pair, "/df"), test$parameter[[1]])
+    put(paste0(pair, "/p"), test$p.value)
+  }
+}
+
+compare_groups <- function(put, cells, ratios, by_condition, sessions) {
   cells <- cells[!is.na(cells$group), ]
   groups <- sorted(cells$group)
   if (length(groups) < 2) return(invisible())
@@ -412,21 +480,13 @@ compare_groups <- function(put, cells, ratios, by_condition) {
       }
     }
   }
+  if (nrow(all) <= length(groups) || length(unique(group)) < length(groups)) return(invisible())
+  if (!by_condition) compare_courses(put, all, group, sessions, ratios)
   of_column <- sub("\r.*", "", colnames(all))
   conditions <- sorted(of_column)
-  k <- length(conditions)
-  if (k < 2 || nrow(all) <= length(groups) || length(unique(group)) < length(groups)) return(invisible())
+  if (length(conditions) < 2) return(invisible())
   y <- vapply(conditions, function(c) rowMeans(all[, of_column == c, drop = FALSE]), numeric(nrow(all)))
-  fit <- lm(y ~ group)
-  test <- tried(anova(fit, lm(y ~ 1), X = ~1, test = "Spherical"))
-  if (is.null(test)) return(invisible())
-  print(test)
-  contrasts <- contr.helmert(k)
-  contrasts <- sweep(contrasts, 2, sqrt(colSums(contrasts^2)), "/")
-  own <- crossprod(residuals(fit) %*% contrasts)
-  columns <- c(F = "F", df1 = "num Df", df2 = "den Df", p = "Pr(>F)", p_gg = "G-G Pr")
-  for (what in names(columns)) put(paste0("groups_conditions/", what), test[2, columns[[what]]])
-  put("groups_conditions/eps_gg", sum(diag(own))^2 / ((k - 1) * sum(own^2)))
+  interaction_of(put, "groups_conditions", y, group)
 }
 
 compare_sessions <- function(put, cells, sessions) {
@@ -455,8 +515,8 @@ again <- function(part, cells, ratios = FALSE, by_condition = FALSE) {
   if (ratios) cells$value <- suppressWarnings(log(cells$value))
   if (nrow(cells) == 0 || any(!is.finite(cells$value))) return(invisible())
   put <- of_part(part)
-  compare_groups(put, cells, ratios, by_condition)
   sessions <- kept(paste("session", part))
+  compare_groups(put, cells, ratios, by_condition, sessions)
   if (length(sessions) > 1 && !by_condition) compare_sessions(put, cells, sessions)
 }
 

@@ -164,6 +164,7 @@ fn modeled(protocol: &Protocol) -> Vec<(&OutcomeRules, &str)> {
             (_, OutcomeFamily::Gamma) | (Measure::Clock(_) | Measure::Questionnaire(_), _) => None,
             (Measure::Telemetry(what), _) => (*what == Telemetry::Strokes).then_some("strokes"),
             (Measure::Answers(answers), _) => answers.questions.first().map(QuestionId::as_str),
+            (Measure::Device(_), _) => Some(outcome.id.as_str()),
         }
     }
     (protocol.outcomes.iter())
@@ -301,6 +302,11 @@ fn settings(
         }
         if !crossing.groups.is_empty() {
             put("group is a factor", "true");
+        }
+        if let Some(margin) = (protocol.analysis.equivalence_margin)
+            .filter(|_| protocol.analysis.primary.as_str() == question)
+        {
+            put("equivalence margin", &margin.to_string());
         }
     }
     for (outcome, column) in modeled(protocol) {

@@ -10,7 +10,7 @@ use study_base::text::ModelId;
 use study_plan::protocol::columns::{
     Column, IntervalColumn, Kind, ParticipantColumn, RatingColumn, Repeats, Typed,
 };
-use study_plan::protocol::{Factor, Protocol, Question, Scale};
+use study_plan::protocol::{DeviceNumber, Factor, Protocol, Question, Scale};
 use study_session::outcome::cell::{Cell, Header, Row};
 use study_session::outcome::{IntervalRow, ParticipantRow, RatingRow};
 
@@ -391,6 +391,12 @@ fn factor_field(factor: &Factor) -> Field {
     field
 }
 
+fn sent_field(mut field: Field, number: &DeviceNumber) -> Field {
+    field.meaning = format!("{} that the controller program sent", number.name);
+    field.unit = Some(number.unit.clone()).filter(|unit| unit != "1");
+    field
+}
+
 /// The unit of a level is that of its family, if there is only one.
 fn level_field(mut field: Field, protocol: &Protocol) -> Field {
     let units: Vec<_> = protocol.families.iter().map(|f| &f.unit).collect();
@@ -414,6 +420,12 @@ impl<'a> Tables<'a> {
                 _ if column.repeats == Repeats::Factor => {
                     let factor = protocol.factors.iter().find(|f| f.id.as_str() == name);
                     field = factor.map_or(field, factor_field);
+                }
+                _ if column.repeats == Repeats::Sent => {
+                    let mut sent = protocol.numbers_of_device();
+                    if let Some((_, number)) = sent.find(|(id, _)| id.as_str() == name) {
+                        field = sent_field(field, number);
+                    }
                 }
                 "vaf" | "rendered_vaf" | "delivered_vaf" => field.max = Some(1.0),
                 "level" | "level_proposed" => field = level_field(field, protocol),

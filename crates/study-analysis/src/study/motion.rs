@@ -26,7 +26,8 @@ pub(super) fn measured(study: &Study, outcomes: &[OutcomeRules]) -> Motions {
             Measure::Telemetry(Telemetry::Strokes)
             | Measure::Clock(_)
             | Measure::Answers(_)
-            | Measure::Questionnaire(_) => None,
+            | Measure::Questionnaire(_)
+            | Measure::Device(_) => None,
             Measure::Telemetry(what) => Some(*what),
         })
         .collect();

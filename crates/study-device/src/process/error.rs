@@ -22,6 +22,8 @@ pub(super) enum MessageError {
     Text(&'static str),
     #[error("{0}")]
     Told(String),
+    #[error("the outcome of its playback has no `load`")]
+    NoLoad,
     #[error("it sends `{0}` before `hello`")]
     NoHello(&'static str),
     #[error("it is another device than before, `{id}`", id = Untrusted(.0))]

@@ -4,9 +4,14 @@ use super::error::{MAX_SAMPLES, MessageError, short_text};
 use super::hello::{Hello, Told};
 use crate::Stimulus;
 use serde::Deserialize;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 use study_base::limits::Limits;
-use study_session::outcome::{Playback, Sample};
+use study_base::text::beginning;
+use study_session::outcome::{Playback, Sample, SentNumber};
+
+/// Most numbers of an outcome that are read, and characters of their names.
+const MAX_NUMBERS: usize = 64;
+const MAX_KEY: usize = 64;
 
 /// A message of a program.
 #[derive(Debug, Deserialize)]
@@ -32,12 +37,13 @@ pub(super) enum ChildMessage {
         strokes: u32,
         clamps: u64,
     },
-    /// Version 1 has another word for it.
-    #[serde(alias = "outcome")]
-    Stopped {
-        load: u64,
+    /// What a playback was, numbers that were measured in it, or both. Version 1 has another word for it.
+    #[serde(alias = "stopped")]
+    Outcome {
+        /// Numbers without it are of the load under way.
+        load: Option<u64>,
         #[serde(flatten)]
-        outcome: PlaybackOutcome,
+        outcome: Outcome,
     },
     /// The force is off, as was asked; with the sample after that.
     Free {
@@ -48,6 +54,47 @@ pub(super) enum ChildMessage {
         what: String,
     },
 }
+
+/// The content of an outcome: the keys of [`PlaybackOutcome`], and others, which are numbers of the study.
+#[derive(Debug, Deserialize)]
+#[serde(try_from = "Map<String, Value>")]
+pub(super) struct Outcome {
+    pub(super) playback: Option<PlaybackOutcome>,
+    pub(super) numbers: Vec<SentNumber>,
+}
+
+impl TryFrom<Map<String, Value>> for Outcome {
+    type Error = serde_json::Error;
+
+    /// Without any key it is a playback that lacks all of them.
+    fn try_from(mut keys: Map<String, Value>) -> Result<Self, Self::Error> {
+        let of_playback: Map<String, Value> = (OF_PLAYBACK.iter())
+            .filter_map(|key| Some(((*key).to_owned(), keys.remove(*key)?)))
+            .collect();
+        let playback = match of_playback.is_empty() && !keys.is_empty() {
+            true => None,
+            false => Some(serde_json::from_value(Value::Object(of_playback))?),
+        };
+        let number = |(key, value): (String, Value)| SentNumber {
+            key: beginning(&key, MAX_KEY),
+            value: value.as_f64().filter(|x| x.is_finite()),
+            fault: None,
+        };
+        Ok(Self {
+            playback,
+            numbers: keys.into_iter().take(MAX_NUMBERS).map(number).collect(),
+        })
+    }
+}
+
+/// The keys of [`PlaybackOutcome`].
+const OF_PLAYBACK: [&str; 5] = [
+    "duration_s",
+    "strokes",
+    "least_energy_j",
+    "switches_per_s",
+    "clamps",
+];
 
 /// Outcome of a playback.
 #[derive(Debug, Deserialize)]
@@ -108,8 +155,8 @@ impl ChildMessage {
             | Self::Started { load }
             | Self::Samples { load, .. }
             | Self::Progress { load, .. }
-            | Self::Stopped { load, .. }
             | Self::Free { load, .. } => Some(*load),
+            Self::Outcome { load, .. } => *load,
         }
     }
 
@@ -121,7 +168,7 @@ impl ChildMessage {
             Self::Started { .. } => "started",
             Self::Samples { .. } => "samples",
             Self::Progress { .. } => "progress",
-            Self::Stopped { .. } => "outcome",
+            Self::Outcome { .. } => "outcome",
             Self::Free { .. } => "free",
             Self::Fault { .. } => "fault",
         }
@@ -130,10 +177,13 @@ impl ChildMessage {
 
 /// Reads a line of a program.
 pub(super) fn read(line: &[u8]) -> Result<ChildMessage, MessageError> {
-    let mut message: ChildMessage = serde_json::from_slice(line).map_err(|e| {
-        let shown = String::from_utf8_lossy(line);
-        MessageError::Json(e, short_text(shown.trim_end()))
-    })?;
+    let mut message = match serde_json::from_slice(line) {
+        Ok(message) => message,
+        Err(error) => outcome_without_nan(line).ok_or_else(|| {
+            let shown = String::from_utf8_lossy(line);
+            MessageError::Json(error, short_text(shown.trim_end()))
+        })?,
+    };
     match &mut message {
         ChildMessage::Samples { samples, .. } if samples.len() > MAX_SAMPLES => {
             return Err(MessageError::TooManySamples);
@@ -144,6 +194,33 @@ pub(super) fn read(line: &[u8]) -> Result<ChildMessage, MessageError> {
         _ => {}
     }
     Ok(message)
+}
+
+/// An outcome with numbers that JSON has not, which many programs write all the same, as null. Of other messages such a
+/// number is an error: what a device says of itself has to be known.
+fn outcome_without_nan(line: &[u8]) -> Option<ChildMessage> {
+    let (mut rest, mut clean, mut in_text) = (line, Vec::new(), false);
+    while let [first, after @ ..] = rest {
+        let written = [&b"NaN"[..], b"-Infinity", b"Infinity"]
+            .into_iter()
+            .find(|word| !in_text && rest.starts_with(word));
+        if let Some(word) = written {
+            clean.extend_from_slice(b"null");
+            rest = &rest[word.len()..];
+            continue;
+        }
+        // What stands after a backslash ends no text.
+        if let (b'\\', true, [escaped, after @ ..]) = (*first, in_text, after) {
+            clean.extend_from_slice(&[*first, *escaped]);
+            rest = after;
+            continue;
+        }
+        in_text ^= *first == b'"';
+        clean.push(*first);
+        rest = after;
+    }
+    let message = serde_json::from_slice(&clean).ok()?;
+    matches!(message, ChildMessage::Outcome { .. }).then_some(message)
 }
 
 fn line(value: &Value) -> String {
@@ -229,6 +306,63 @@ mod tests {
         let error = read(other.as_bytes()).unwrap().hello().unwrap_err();
         let error = error.to_string();
         assert!(error.contains("study-process/2"), "{error}");
+    }
+
+    fn outcome(line: &str) -> Result<(Option<u64>, Outcome), String> {
+        match read(line.as_bytes()).map_err(|e| e.to_string())? {
+            ChildMessage::Outcome { load, outcome } => Ok((load, outcome)),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn an_outcome_has_numbers_of_the_study() {
+        let playback =
+            r#""duration_s":2,"strokes":3,"least_energy_j":0,"switches_per_s":1,"clamps":0"#;
+        let (load, both) = outcome(&format!(
+            r#"{{"say":"outcome","load":7,{playback},"time_s":3.25}}"#
+        ))
+        .unwrap();
+        assert_eq!((load, both.playback.unwrap().duration_s), (Some(7), 2.0));
+        let told = |numbers: &[SentNumber]| -> Vec<(String, Option<f64>)> {
+            let one = |n: &SentNumber| (n.key.clone(), n.value);
+            numbers.iter().map(one).collect()
+        };
+        assert_eq!(told(&both.numbers), [("time_s".to_owned(), Some(3.25))]);
+        // Version 1 calls it otherwise.
+        let (_, old) = outcome(&format!(r#"{{"say":"stopped","load":7,{playback}}}"#)).unwrap();
+        assert!(old.playback.is_some() && old.numbers.is_empty());
+        let (load, alone) = outcome(r#"{"say":"outcome","time_s":3.25}"#).unwrap();
+        assert!(load.is_none() && alone.playback.is_none());
+        let why = outcome(r#"{"say":"outcome","load":7}"#).unwrap_err();
+        assert!(why.contains("missing field `duration_s`"), "{why}");
+        let why = outcome(r#"{"say":"outcome","load":7,"duration_s":2,"time_s":1}"#).unwrap_err();
+        assert!(why.contains("missing field `strokes`"), "{why}");
+    }
+
+    /// What is no number is none, and says so by its name; of a playback it is an error, as in all other messages.
+    #[test]
+    fn numbers_that_json_has_not_are_none() {
+        let (_, found) = outcome(
+            r#"{"say":"outcome","load":7,"a":NaN,"b":-Infinity,"c":null,"d":"3.2","e":true,"f_NaN":1,"g":"\"NaN"}"#,
+        )
+        .unwrap();
+        let told: Vec<(&str, Option<f64>)> = (found.numbers.iter())
+            .map(|n| (n.key.as_str(), n.value))
+            .collect();
+        let none = ["a", "b", "c", "d", "e"].map(|key| (key, None));
+        assert_eq!(
+            told,
+            [&none[..], &[("f_NaN", Some(1.0)), ("g", None)]].concat()
+        );
+        let of_playback = r#"{"say":"outcome","load":7,"duration_s":NaN,"strokes":3,"least_energy_j":0,"switches_per_s":1,"clamps":0}"#;
+        assert!(outcome(of_playback).is_err());
+        let long = format!(r#"{{"say":"outcome","load":7,"{}":1}}"#, "k".repeat(500));
+        let (_, found) = outcome(&long).unwrap();
+        assert_eq!(found.numbers[0].key.chars().count(), MAX_KEY + 1);
+        let many: Vec<String> = (0..200).map(|i| format!(r#""k{i}":{i}"#)).collect();
+        let many = format!(r#"{{"say":"outcome","load":7,{}}}"#, many.join(","));
+        assert_eq!(outcome(&many).unwrap().1.numbers.len(), MAX_NUMBERS);
     }
 
     #[test]

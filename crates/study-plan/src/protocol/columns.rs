@@ -42,6 +42,8 @@ pub enum Repeats {
     Covariate,
     /// One for each factor, named by its id.
     Factor,
+    /// One for each outcome that the device sends, named by its id.
+    Sent,
 }
 
 /// The declaration of a column.
@@ -315,6 +317,7 @@ table! {
             ("failed", "abandoned after the last permitted attempt"),
             ("missing", "not reached, or the primary question was left empty"),
         ], "outcome of the trial"),
+        Sent: number("one for each outcome from the device", "number that the controller program sent; outcomes in the order of the protocol").empty("none that counts").repeats(Repeats::Sent),
         Vaf: number(
             "vaf",
             "variance accounted for (VAF) of the realization, from the protocol or its model file",
@@ -354,18 +357,14 @@ table! {
         InputChannel: INPUT_CHANNEL.empty("not answered, or not by a person"),
         FrontName: text("front_name", "program of `--front` that asked the participant, as it says")
             .empty("none: the program's own screen").optional().typed(Typed::Once),
-        Group: text("group", "group of the participant").empty("the study has no groups")
-            .optional().with_parts(),
-        SessionId: text("session_id", "planned session, of `[[sessions]]`")
-            .empty("a participant comes once").optional().with_parts(),
-        JudgedShare: number("judged_share", "share of the time in which the force was judged")
-            .empty("not judged").optional(),
+        Group: text("group", "group of the participant").empty("the study has no groups").optional().with_parts(),
+        SessionId: text("session_id", "planned session, of `[[sessions]]`").empty("a participant comes once").optional().with_parts(),
+        JudgedShare: number("judged_share", "share of the time in which the force was judged").empty("not judged").optional(),
         ErrorJnd: number("error_jnd", "largest difference from the right force that lasted 20 ms, in just noticeable differences")
             .empty("not known").optional(),
         Levels: text("one for each factor", "level of the realization in the factor; factors in the order of the protocol")
             .empty("the realization is not part of the factorial design").repeats(Repeats::Factor),
-        PausedS: number("paused_s", "pauses between the end of the playback and the answer")
-            .unit("s").empty("less than 1 s, or not answered").optional(),
+        PausedS: number("paused_s", "pauses between the end of the playback and the answer").unit("s").empty("less than 1 s, or not answered").optional(),
         FeltAgainAfterS: number("felt_again_after_s", "pause after which an earlier attempt was felt again instead of answered, as it was longer than the protocol allows")
             .unit("s").empty("there was none, or its length is not known").optional(),
         AnswerBeforeFeedback: text("answer_before_feedback", "answer of an identification before the right label was told, which is the one that is analyzed")
@@ -483,6 +482,7 @@ table! {
             ("reveal", "the order was revealed"),
             ("self-weighed", "the motor weighed itself before the session"),
             ("media", "a picture, video or sound came on the participant's page"),
+            ("number-sent", "a number that the controller program sent does not count"),
         ], "what happened"),
         Question: text("question", "question that was answered or corrected")
             .empty("the event is neither an answer nor a correction"),

@@ -22,8 +22,8 @@
 
 use super::keys::word;
 use super::{
-    FamilyRules, FileOrders, FitRules, Occasion, Order, Part, Protocol, Question, Questionnaire,
-    SpaceRules, TrackRules,
+    FamilyRules, FileOrders, FitRules, ModelEntry, Occasion, Order, Part, Protocol, Question,
+    Questionnaire, SpaceRules, TrackRules,
 };
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};

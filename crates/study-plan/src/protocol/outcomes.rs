@@ -1,5 +1,6 @@
 //! Measured outcomes: `[[outcomes]]`, what a study measures in each trial beside its questions.
 
+use super::Protocol;
 use super::keys::words;
 use super::questionnaires::{Inventory, Scored};
 use serde::Serialize;
@@ -41,6 +42,56 @@ pub enum Measure {
     Answers(Answers),
     /// The score of a questionnaire that is asked after each condition.
     Questionnaire(Scored),
+    /// What a controller program sends with the outcome of a playback.
+    Device(DeviceNumber),
+}
+
+/// A number that a controller program sends.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct DeviceNumber {
+    /// What it measures, such as `time`.
+    pub name: QuestionId,
+    /// Its unit; `1` if it has none.
+    pub unit: String,
+}
+
+impl DeviceNumber {
+    /// Its key in the message: the name and the unit in small letters, such as `time_s`, `stiffness_n_per_mm`. Without
+    /// a unit it is the name.
+    pub fn key(&self) -> String {
+        match suffix(&self.unit) {
+            None => self.name.to_string(),
+            Some(unit) => format!("{}_{unit}", self.name),
+        }
+    }
+}
+
+/// A unit as a part of a key: letters and digits, `per` for `/`, `percent`, `deg` and `u` for `%`, `°` and `µ`. `None` without any, and of
+/// `1`.
+pub(super) fn suffix(unit: &str) -> Option<String> {
+    let mut text = String::new();
+    for sign in unit.chars() {
+        match sign {
+            '/' => text.push_str("_per_"),
+            '%' => text.push_str("percent"),
+            '°' => text.push_str("deg"),
+            'µ' | 'μ' => text.push('u'),
+            sign if sign.is_ascii_alphanumeric() => text.push(sign.to_ascii_lowercase()),
+            _ => text.push('_'),
+        }
+    }
+    let parts: Vec<&str> = text.split('_').filter(|part| !part.is_empty()).collect();
+    (!parts.is_empty() && unit != "1").then(|| parts.join("_"))
+}
+
+impl Protocol {
+    /// The outcomes that a controller program sends, by their names.
+    pub fn numbers_of_device(&self) -> impl Iterator<Item = (&QuestionId, &DeviceNumber)> {
+        self.outcomes.iter().filter_map(|own| match &own.measure {
+            Measure::Device(number) => Some((&own.id, number)),
+            _ => None,
+        })
+    }
 }
 
 /// The mean of some answers of a trial, such as the items of a questionnaire, or the one answer.
@@ -116,12 +167,13 @@ words! {
 }
 
 impl Measure {
-    /// Whether its numbers can be counts: full strokes, or the answer to one question.
+    /// Whether its numbers can be counts: full strokes, the answer to one question, or what a program may count.
     pub fn can_be_counted(&self) -> bool {
         match self {
             Self::Clock(_) | Self::Questionnaire(_) => false,
             Self::Telemetry(what) => *what == Telemetry::Strokes,
             Self::Answers(answers) => answers.questions.len() == 1,
+            Self::Device(_) => true,
         }
     }
 
@@ -132,6 +184,7 @@ impl Measure {
             Self::Telemetry(_) => "telemetry",
             Self::Answers(_) => "answers",
             Self::Questionnaire(_) => "questionnaire",
+            Self::Device(_) => "device",
         }
     }
 
@@ -145,6 +198,7 @@ impl Measure {
             Self::Telemetry(Telemetry::Energy) => "J",
             Self::Answers(answers) => &answers.unit,
             Self::Questionnaire(_) => "points",
+            Self::Device(own) => &own.unit,
         }
     }
 
@@ -169,6 +223,7 @@ impl Measure {
                 Inventory::NasaTlxWeighted => "weighted score of the Task Load Index",
                 Inventory::Own => return format!("score of the questionnaire {}", own.id).into(),
             },
+            Self::Device(own) => return format!("{} that the device sends", own.name).into(),
         })
     }
 }
@@ -229,6 +284,27 @@ mod tests {
     }
 
     #[test]
+    fn a_key_is_the_name_with_its_unit() {
+        for (name, unit, key) in [
+            ("time", "s", "time_s"),
+            ("peak", "N", "peak_n"),
+            ("slope", "N/mm", "slope_n_per_mm"),
+            ("share", "%", "share_percent"),
+            ("angle", "°", "angle_deg"),
+            ("gap", "µm", "gap_um"),
+            ("work", "N·m", "work_n_m"),
+            ("errors", "1", "errors"),
+        ] {
+            let number = DeviceNumber {
+                name: QuestionId::new(name).unwrap(),
+                unit: unit.to_owned(),
+            };
+            assert_eq!(number.key(), key);
+        }
+        assert_eq!(suffix("·"), None);
+    }
+
+    #[test]
     fn the_form_in_a_fingerprint_never_changes() {
         let rules = OutcomeRules {
             id: QuestionId::new("time").unwrap(),
@@ -252,6 +328,17 @@ mod tests {
             of: Some(12),
             ..rules
         };
+        let sent = OutcomeRules {
+            measure: Measure::Device(DeviceNumber {
+                name: QuestionId::new("time").unwrap(),
+                unit: "s".to_owned(),
+            }),
+            ..modeled.clone()
+        };
+        assert_eq!(
+            serde_json::json!(sent)["measure"],
+            serde_json::json!({ "from": "device", "measure": { "name": "time", "unit": "s" } })
+        );
         let written = serde_json::json!(modeled);
         assert_eq!(
             (&written["model"], &written["of"]),

@@ -3,10 +3,10 @@
 use super::Answer;
 use crate::{apa, sentences};
 use study_analysis::analyze::results::{ContrastName, LevelsName, Number as _};
-use study_analysis::analyze::{Analysis, Question};
+use study_analysis::analyze::{Analysis, PreregisteredRule, Question};
 use study_plan::protocol::Crossing;
 
-/// Simple effects that are listed.
+/// Differences that are listed.
 const MAX_LISTED: usize = 12;
 
 /// An answer for each effect that is tested.
@@ -18,7 +18,12 @@ pub(super) fn factors(a: &Analysis) -> Vec<Answer> {
         let question = Question::Effect(crossing.effect_name(effect));
         let (mut answer, finding) = Answer::to(a, &question)?;
         match effect[..] {
-            [factor] => answer.main.extend(means(a, crossing, factor)),
+            [factor] => {
+                answer.main.extend(means(a, crossing, factor));
+                // Without a test of differences there is none of equivalence, for the same reason.
+                let told = equivalent(a, crossing, factor).filter(|_| finding.reason().is_none());
+                answer.main.extend(told);
+            }
             [first, second] if finding.is_yes() => {
                 answer
                     .main
@@ -47,6 +52,58 @@ fn means(a: &Analysis, crossing: &Crossing, factor: usize) -> Option<String> {
         })
         .collect();
     (!means.is_empty()).then(|| format!("Means over participants: {}.", means.join("; ")))
+}
+
+/// Which levels of a factor differ by less than the margin that was stated in advance.
+fn equivalent(a: &Analysis, crossing: &Crossing, factor: usize) -> Option<String> {
+    let tests = a.results.evidence.factorial.as_ref()?;
+    let margin = a.equivalence_margin?;
+    let levels = crossing.levels(factor);
+    let (mut shown, mut not_shown) = (Vec::new(), Vec::new());
+    for (i, first) in levels.iter().enumerate() {
+        for second in &levels[i + 1..] {
+            let name = ContrastName {
+                factor: crossing.name(factor).to_owned(),
+                levels: [first.clone(), second.clone()],
+                at: LevelsName::default(),
+            };
+            let found = tests.contrasts.get(&name)?.equivalence.as_ref()?;
+            let p = apa::p_beside(found.p_tost_holm.number()?, a.alpha);
+            let ci = apa::interval(found.ci90.ends()?, apa::two);
+            let told = format!("{first} and {second} (90 % CI {ci}, p {p})");
+            match found.equivalent.is_set() {
+                true => shown.push(told),
+                false => not_shown.push(told),
+            }
+        }
+    }
+    let later = match a.changed(PreregisteredRule::Margin) {
+        true => " (changed after the study began)",
+        false => "",
+    };
+    let begin = format!("Equivalence within ± {margin} points{later}");
+    let end = "two one-sided t tests, Holm's correction over the pairs of levels";
+    let told = match (shown.is_empty(), not_shown.is_empty()) {
+        (true, true) => return None,
+        (true, false) => format!("{begin} is not shown for {}", listed(not_shown)),
+        (false, true) => format!("{begin} is shown for {}", listed(shown)),
+        (false, false) => format!(
+            "{begin} is shown for {}, not for {}",
+            listed(shown),
+            listed(not_shown)
+        ),
+    };
+    Some(format!("{told}; {end}."))
+}
+
+/// As many as are listed.
+fn listed(mut told: Vec<String>) -> String {
+    let more = match told.len().saturating_sub(MAX_LISTED) {
+        0 => String::new(),
+        n => format!("; and {n} more in the table"),
+    };
+    told.truncate(MAX_LISTED);
+    told.join("; ") + &more
 }
 
 /// The differences between the levels of a factor at each level of another.
@@ -78,16 +135,11 @@ fn simple_effects(
             }
         }
     }
-    let more = match told.len().saturating_sub(MAX_LISTED) {
-        0 => String::new(),
-        n => format!("; and {n} more in the table"),
-    };
-    told.truncate(MAX_LISTED);
     (!told.is_empty()).then(|| {
         format!(
-            "Simple effects of {} (t tests over participants, Holm's correction): {}{more}.",
+            "Simple effects of {} (t tests over participants, Holm's correction): {}.",
             crossing.name(factor),
-            told.join("; ")
+            listed(told)
         )
     })
 }

@@ -274,20 +274,40 @@ fn factors(a: &Analysis) -> Option<String> {
         return Some(format!(
             "The factors were {}. Because only {} of {} rated every realization, {} tested within participants, from all \
              cell means with participants and realizations as fixed factors, by t tests of the contrasts of the effect with standard \
-             errors clustered by participant (Pustejovsky & Tipton, 2018), Bonferroni's correction over these{correction}.",
+             errors clustered by participant (Pustejovsky & Tipton, 2018), Bonferroni's correction over these{correction}.{}",
             apa::listing(&factors),
             a.design.complete,
             counted(a.design.participants, "participant", "participants"),
-            effects.to_lowercase()
+            effects.to_lowercase(),
+            equivalent_levels(a)
         ));
     }
     Some(format!(
         "The factors were {}. {effects} tested by a repeated-measures analysis of variance of the participants' \
          means in each combination of levels, each effect within participants against its own interaction with \
          participants, with the Greenhouse–Geisser correction{correction}; simple effects by t tests over \
-         participants with Holm's correction. An aligned rank transform (Wobbrock et al., 2011) is given besides.",
-        apa::listing(&factors)
+         participants with Holm's correction. An aligned rank transform (Wobbrock et al., 2011) is given besides.{}",
+        apa::listing(&factors),
+        equivalent_levels(a)
     ))
+}
+
+/// How the levels of factors were tested for equivalence; nothing without a margin.
+fn equivalent_levels(a: &Analysis) -> String {
+    let tests = a.results.evidence.factorial.as_ref();
+    let contrasts = tests.map(|tests| tests.contrasts.values());
+    let is_tested = contrasts.is_some_and(|mut all| all.any(|c| c.equivalence.is_some()));
+    let Some(margin) = a.equivalence_margin.filter(|_| is_tested) else {
+        return String::new();
+    };
+    let stated = match a.changed(PreregisteredRule::Margin) {
+        true => "was changed after the study began (see Deviations)",
+        false => "was set in advance",
+    };
+    format!(
+        " Levels were tested for equivalence by two one-sided t tests (Schuirmann, 1987) with a margin of {margin} points, which \
+         {stated}, with Holm's correction over the pairs of levels of a factor."
+    )
 }
 
 /// What was measured besides the ratings, and how it was tested.

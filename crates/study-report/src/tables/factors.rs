@@ -134,6 +134,12 @@ pub(crate) fn contrasts(a: &Analysis) -> Table {
         false => levels(&name.at),
     };
     let any = all.clone().next().is_some();
+    let has_margin = all.clone().any(|(_, c)| c.equivalence.is_some());
+    let equivalence = a.equivalence_margin.filter(|_| has_margin).map(|margin| {
+        format!(
+            "p (equivalence): two one-sided t tests that the difference is smaller than {margin} points, corrected as p (Holm)."
+        )
+    });
     let note = "t tests over participants, or within them where many did not rate everything. p (Holm) is corrected over the pairs of levels of a factor; of simple \
                 effects over all of a factor in one interaction.";
     Builder::new("Differences between levels", all)
@@ -149,5 +155,15 @@ pub(crate) fn contrasts(a: &Analysis) -> Table {
         .field(report("df").file("df"), whole, |c| &c.1.df)
         .field(report("p (Holm)").file("p_holm"), bare_p, |c| &c.1.p_holm)
         .field(report("dz").file("dz"), two, |c| c.1.dz.as_ref())
-        .notes(any.then(|| note.to_owned()))
+        .ends(report("90 % CI").file("ci90").when(has_margin), two, &|c| {
+            c.1.equivalence.as_ref()?.ci90.ends()
+        })
+        .field(
+            report("p (equivalence)")
+                .file("p_tost_holm")
+                .when(has_margin),
+            bare_p,
+            |c| c.1.equivalence.as_ref().map(|e| &e.p_tost_holm),
+        )
+        .notes(any.then(|| note.to_owned()).into_iter().chain(equivalence))
 }

@@ -24,7 +24,7 @@ use study_base::text::Untrusted;
 type Kind = (&'static str, fn(&PartResults) -> Table);
 
 /// All tables, in the order of a page; those without rows and notes are left out of it.
-pub(crate) const KINDS: [Kind; 31] = [
+pub(crate) const KINDS: [Kind; 32] = [
     ("part_thresholds.csv", thresholds),
     ("part_population.csv", population::population),
     ("part_population_contrasts.csv", population::contrasts),
@@ -56,6 +56,7 @@ pub(crate) const KINDS: [Kind; 31] = [
     ("part_items.csv", items),
     ("part_groups.csv", groups),
     ("part_group_pairs.csv", group_pairs),
+    ("part_group_changes.csv", group_changes),
 ];
 
 /// All tables of these statistics; those without rows are left out.
@@ -284,6 +285,15 @@ fn group_pairs(results: &PartResults) -> Table {
     let sessions = again.sessions.iter().flat_map(|s| &s.pairs);
     let caption = "Contrasts of groups and sessions";
     of_pairs(caption, "names", groups.chain(sessions))
+        .field(column("g", "hedges_g"), two, |c| &c.1.hedges_g)
+        .done()
+}
+
+/// By how much more one group changes than another, from the first session to the last.
+fn group_changes(results: &PartResults) -> Table {
+    let courses = results.over.again.groups_sessions.iter();
+    let caption = "Changes from the first session to the last";
+    of_pairs(caption, "groups", courses.flat_map(|g| &g.changes))
         .field(column("g", "hedges_g"), two, |c| &c.1.hedges_g)
         .done()
 }

@@ -160,6 +160,13 @@ fn texts(question: &PartQuestion) -> Wording {
             shown: "{estimate}{result} ({corrected}, {people})",
             ..PART
         },
+        PartQuestion::GroupsSessions => Wording {
+            ask: "Do the changes from session to session depend on the group?",
+            yes: "The changes from session to session depended on the group",
+            not_shown: "No interaction of group and session was shown",
+            shown: "{estimate}{result} ({corrected}, {people})",
+            ..PART
+        },
     }
 }
 

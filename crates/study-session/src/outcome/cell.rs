@@ -130,6 +130,7 @@ fn header<C: Copy>(all: &[C], declaration: fn(C) -> Column, repeated: &Repeated<
         Repeats::Question => repeated.questions.clone(),
         Repeats::Covariate => repeated.covariates.clone(),
         Repeats::Factor => repeated.factors.clone(),
+        Repeats::Sent => repeated.sent.clone(),
     };
     (all.iter())
         .filter(|c| declaration(**c).is_in(repeated.has_parts, repeated.has_replays))
@@ -146,6 +147,8 @@ struct Repeated<'a> {
     questions: Vec<&'a str>,
     covariates: Vec<&'a str>,
     factors: Vec<&'a str>,
+    /// Outcomes that the device sends.
+    sent: Vec<&'a str>,
     /// Whether the study has parts.
     has_parts: bool,
     /// Whether its trials can be felt again.
@@ -154,7 +157,8 @@ struct Repeated<'a> {
 
 impl RatingRow {
     /// The header of `ratings.csv`: questions in the protocol's order, those of questionnaires
-    /// between the trials last, covariates sorted by name, factors in the protocol's order.
+    /// between the trials last, covariates sorted by name, factors and
+    /// numbers of the device in the protocol's order.
     pub fn header(protocol: &Protocol) -> Header<RatingColumn> {
         let models = protocol.models.iter();
         let covariates: BTreeSet<&str> = models
@@ -166,6 +170,9 @@ impl RatingRow {
                 .collect(),
             covariates: covariates.into_iter().collect(),
             factors: protocol.factors.iter().map(|f| f.id.as_str()).collect(),
+            sent: (protocol.numbers_of_device())
+                .map(|(id, _)| id.as_str())
+                .collect(),
             has_parts: !protocol.parts.is_empty(),
             has_replays: protocol.trial.exposure.replays > 0,
         };
@@ -297,6 +304,7 @@ row! {
         RatedAt: rated_at,
         Attempt: attempt,
         Status: status,
+        Sent: sent,
         Vaf: vaf,
         Covariates: covariates,
         Levels: levels,

@@ -5,6 +5,7 @@
 //! number, checksums and clocks to each event.
 
 use super::fidelity::Fidelity;
+use super::sent::SentNumber;
 use chrono::{DateTime, FixedOffset};
 use serde::{Deserialize, Serialize};
 use study_base::named;
@@ -426,6 +427,15 @@ pub enum Event {
         offset_ms: f64,
         /// By how much the clocks may make that wrong, ms.
         uncertainty_ms: f64,
+    },
+    /// A controller program sent numbers: those that count, and those that do not. Since `study-protocol/3`.
+    NumbersSent {
+        /// The trial under way or, before and after its playback, the last one that was felt, if there was one.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        trial: Option<u32>,
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        attempt: Option<u32>,
+        numbers: Vec<SentNumber>,
     },
     /// What is felt was changed in a trial of adjustment; it is loaded once what plays has stopped. Since `study-protocol/3`.
     Adjusted {

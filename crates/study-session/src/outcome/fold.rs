@@ -172,6 +172,7 @@ impl History {
             | Event::ClockStepped { .. }
             | Event::Revealed { .. }
             | Event::TelemetryLost { .. }
+            | Event::NumbersSent { .. }
             | Event::IdCorrected { .. }
             | Event::StateSet { .. } => {}
             _ => self.last_activity = Some(at),
@@ -289,6 +290,15 @@ impl History {
                 let interval = interval.unwrap_or(1);
                 self.came((*trial, *attempt), interval, (*medium, onset));
             }
+            Event::NumbersSent {
+                trial: Some(trial),
+                attempt: Some(attempt),
+                numbers,
+            } => {
+                if let Some(attempt) = self.attempt_mut(*trial, *attempt) {
+                    attempt.sent(numbers);
+                }
+            }
             Event::Adjusted {
                 trial,
                 attempt,
@@ -382,6 +392,7 @@ impl History {
             }
             Event::StateSet { state, reason } => self.set_state(*state, reason),
             Event::Remark { trial: None, .. }
+            | Event::NumbersSent { .. }
             | Event::Paused
             | Event::Unpaused { .. }
             | Event::ClockStepped { .. }

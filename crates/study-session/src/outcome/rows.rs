@@ -90,6 +90,8 @@ pub struct RatingRow {
     pub media_offset_ms: Option<f64>,
     pub media_uncertainty_ms: Option<f64>,
     pub media_jitter_ms: Option<f64>,
+    /// Outcome → the number that the device sent.
+    pub sent: BTreeMap<String, f64>,
 }
 
 impl RatingRow {
@@ -158,6 +160,7 @@ impl RatingRow {
             media_offset_ms: None,
             media_uncertainty_ms: None,
             media_jitter_ms: None,
+            sent: BTreeMap::new(),
         }
     }
 }
@@ -203,6 +206,7 @@ study_base::named! {
         Reveal = "reveal",
         SelfWeighed = "self-weighed",
         Media = "media",
+        NumberSent = "number-sent",
     }
 }
 
@@ -221,6 +225,10 @@ impl AttemptEvent {
             Event::Revealed { .. } => Self::Reveal,
             Event::SelfWeighed(_) => Self::SelfWeighed,
             Event::MediaShown { .. } => Self::Media,
+            // Only those that do not count; the others are in `ratings.csv`.
+            Event::NumbersSent { numbers, .. } if numbers.iter().any(|n| n.fault.is_some()) => {
+                Self::NumberSent
+            }
             _ => return None,
         })
     }

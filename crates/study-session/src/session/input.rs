@@ -1,7 +1,9 @@
 //! The inputs and effects of a session.
 
 use super::cue::MediaReport;
-use crate::outcome::{Author, Choice, Entry, Event, Fidelity, FormId, Playback, SelfWeighed};
+use crate::outcome::{
+    Author, Choice, Entry, Event, Fidelity, FormId, Playback, SelfWeighed, SentNumber,
+};
 use study_base::text::{ModelId, ParticipantId, QuestionId};
 use study_plan::protocol::fingerprint::Fingerprints;
 use study_plan::protocol::{Answer, Assigned, DeviceKind, Seat, Turn};
@@ -87,6 +89,13 @@ pub enum Input {
     DeviceProgress {
         /// Full strokes so far.
         strokes: u32,
+    },
+    /// A controller program sends numbers; those of the end of a playback come before [`Input::DeviceStopped`].
+    DeviceNumbers {
+        /// As they were sent.
+        numbers: Vec<SentNumber>,
+        /// Whether they belong to no playback under way.
+        outside: bool,
     },
     /// Whether the playback that has just stopped had the force of its table;
     /// [`Input::DeviceStopped`] follows.

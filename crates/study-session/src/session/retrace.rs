@@ -121,6 +121,7 @@ impl Retrace<'_> {
             | Event::Reopened { .. }
             | Event::SelfWeighed(_)
             | Event::TelemetryLost { .. }
+            | Event::NumbersSent { .. }
             | Event::ClockStepped { .. }
             | Event::Remark { .. }
             | Event::Revealed { .. }

@@ -205,6 +205,7 @@ mod tests {
             media_offset_ms: d.maybe(Draws::number),
             media_uncertainty_ms: d.maybe(Draws::number),
             media_jitter_ms: d.maybe(Draws::number),
+            sent: BTreeMap::from([("duration".to_owned(), d.number())]),
         }
     }
 
@@ -257,6 +258,7 @@ mod tests {
                 AttemptEvent::Reveal,
                 AttemptEvent::SelfWeighed,
                 AttemptEvent::Media,
+                AttemptEvent::NumberSent,
             ]),
             question: d.maybe(|_| question("realism")),
             from: d.maybe(|d| Answer::Choice(vec![d.text(), "b".to_owned()])),
@@ -321,6 +323,7 @@ mod tests {
                 Repeats::Question => questions.iter().map(|q| (*c, (*q).to_owned())).collect(),
                 Repeats::Covariate => vec![(*c, "lambda".to_owned())],
                 Repeats::Factor => vec![(*c, "friction".to_owned())],
+                Repeats::Sent => vec![(*c, "duration".to_owned())],
             })
             .collect()
     }

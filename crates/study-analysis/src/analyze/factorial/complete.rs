@@ -1,7 +1,7 @@
 //! The analysis of variance over the participants who rated every realization, from the mean of
 //! each in each combination of levels.
 
-use super::{Compared, FactorialEffect, FactorialMean, FactorialTests, Layout};
+use super::{Compared, FactorialEffect, FactorialMean, FactorialTests, Layout, Margin};
 use crate::analyze::cells::Cells;
 use crate::analyze::effects::NO_ERROR;
 use crate::analyze::record::{EffectName, Interval, Stat, Why};
@@ -22,9 +22,13 @@ pub(super) struct Table<'a> {
 }
 
 impl<'a> Table<'a> {
-    pub(super) fn of(cells: &Cells<'_>, crossing: &'a Crossing) -> Result<Self, Why> {
+    pub(super) fn of(
+        cells: &Cells<'_>,
+        crossing: &'a Crossing,
+        margin: Option<Margin>,
+    ) -> Result<Self, Why> {
         let table = cells.table(&cells.tested());
-        let mut layout = Layout::of(cells, crossing, &table.models)?;
+        let mut layout = Layout::of(cells, crossing, margin, &table.models)?;
         let has_groups = !crossing.groups.is_empty();
         let of_group = |s: usize| {
             let own = cells.ratings.subjects[s].group.as_ref()?;
@@ -69,6 +73,7 @@ impl<'a> Table<'a> {
             let found = factorial::contrast(&self.rows, &self.groups, weights)?;
             Some(Compared {
                 estimate: found.estimate,
+                se: found.se,
                 ci95: Some(found.ci95),
                 t: found.t,
                 df: Some(found.df),

@@ -1,12 +1,11 @@
 //! The effects within participants, over everybody who rated two realizations or more: where
 //! many did not rate everything.
 
-use super::{ClusteredEffect, Compared, FactorialMean, FactorialTests, Layout};
+use super::{ClusteredEffect, Compared, FactorialMean, FactorialTests, Layout, Margin};
 use crate::analyze::adjusted::Adjusted;
 use crate::analyze::cells::Cells;
 use crate::analyze::record::{Number as _, Stat, Why};
 use study_plan::protocol::Crossing;
-use study_stats::factorial::{Pair, product};
 use study_stats::lmm::ContrastT;
 use study_stats::paired::holm;
 use study_stats::within::Clustered;
@@ -24,8 +23,9 @@ impl<'a> Incomplete<'a> {
         cells: &Cells<'_>,
         adjusted: &'a Adjusted,
         crossing: &'a Crossing,
+        margin: Option<Margin>,
     ) -> Result<Self, Why> {
-        let layout = Layout::of(cells, crossing, &adjusted.models)?;
+        let layout = Layout::of(cells, crossing, margin, &adjusted.models)?;
         let why = "more realizations or participants than are compared within participants";
         let clustered = adjusted.clustered.as_ref().ok_or(why)?;
         let means = adjusted.means.as_ref().map_err(|e| e.to_string())?;
@@ -64,6 +64,7 @@ impl<'a> Incomplete<'a> {
             let found = self.clustered.contrast(&self.over_realizations(weights))?;
             Some(Compared {
                 estimate: found.estimate,
+                se: found.se,
                 ci95: found.ci95,
                 t: found.t,
                 df: found.df,
@@ -75,21 +76,23 @@ impl<'a> Incomplete<'a> {
 
     /// Weights of combinations as weights of realizations.
     fn over_realizations(&self, weights: &[f64]) -> Vec<f64> {
-        let mut all = vec![0.0; self.clustered.realizations.len()];
-        for (own, weight) in self.layout.columns.iter().zip(weights) {
-            for &j in own {
-                all[j] = weight / own.len() as f64;
-            }
-        }
-        all
+        let realizations = self.clustered.realizations.len();
+        self.layout.over_realizations(weights, realizations)
     }
 
     fn effect(&self, effect: &[usize]) -> ClusteredEffect {
-        let why =
-            "too few participants link the levels, or their ratings leave no variance of error";
-        let contrasts: Vec<Vec<f64>> = (self.contrasts_of(effect).iter())
+        let contrasts: Vec<Vec<f64>> = (self.layout.contrasts_of(effect).iter())
             .map(|weights| self.over_realizations(weights))
             .collect();
+        let why = match contrasts.iter().all(|weights| self.is_linked(weights)) {
+            true => {
+                "too few participants link the levels, or their ratings leave no variance of error"
+            }
+            false => {
+                "no participants link the levels, so that a difference between them may be one between participants; let \
+                 the same participants rate all of them"
+            }
+        };
         // One that cannot be tested leaves the effect without a test.
         let tests: Option<Vec<(f64, ContrastT)>> = (contrasts.iter())
             .map(|weights| {
@@ -112,26 +115,13 @@ impl<'a> Incomplete<'a> {
         }
     }
 
-    /// What is 0 without an effect, by weights of the combinations: products of differences of two levels of
-    /// each of its factors, the second less the first, over the levels of the others.
-    fn contrasts_of(&self, effect: &[usize]) -> Vec<Vec<f64>> {
-        let sizes = self.layout.crossing.sizes();
-        let mut all: Vec<Vec<Pair>> = vec![Vec::new()];
-        for &factor in effect {
-            let size = sizes[factor];
-            let pairs = (0..size).flat_map(|second| {
-                (second + 1..size).map(move |first| Pair {
-                    factor,
-                    first,
-                    second,
-                })
-            });
-            all = (all.iter())
-                .flat_map(|start| pairs.clone().map(|pair| [&start[..], &[pair]].concat()))
-                .collect();
+    /// Whether a contrast compares realizations that participants link: its weights sum to 0 in every set of these.
+    fn is_linked(&self, weights: &[f64]) -> bool {
+        let mut sums = vec![0.0; self.clustered.sets.len()];
+        for (set, weight) in self.clustered.sets.iter().zip(weights) {
+            sums[*set] += weight;
         }
-        let weights = |pairs: &Vec<Pair>| product(&sizes, pairs, &[]);
-        all.iter().map(weights).collect()
+        sums.iter().all(|sum: &f64| sum.abs() < 1e-9)
     }
 
     fn mean(&self, levels: &[(usize, usize)]) -> FactorialMean {

@@ -6,7 +6,7 @@ use study_session::outcome::ratings::Ratings;
 
 /// Nine participants rate each combination of friction (low, high) and grain (fine, medium,
 /// coarse) twice; made with random numbers, so that no effect is exact.
-const RATINGS: [(&str, &str); 9] = [
+pub(super) const RATINGS: [(&str, &str); 9] = [
     ("novices", "343233433555"),
     ("experts", "557555666677"),
     ("novices", "545454656767"),
@@ -18,8 +18,8 @@ const RATINGS: [(&str, &str); 9] = [
     ("experts", "233433432566"),
 ];
 
-const FRICTION: [&str; 2] = ["low", "high"];
-const GRAIN: [&str; 3] = ["fine", "medium", "coarse"];
+pub(super) const FRICTION: [&str; 2] = ["low", "high"];
+pub(super) const GRAIN: [&str; 3] = ["fine", "medium", "coarse"];
 
 fn factor(id: &str, levels: &[&str]) -> Factor {
     Factor {
@@ -28,7 +28,7 @@ fn factor(id: &str, levels: &[&str]) -> Factor {
     }
 }
 
-fn crossing(groups: &[&str], effects: &[&[usize]]) -> Crossing {
+pub(super) fn crossing(groups: &[&str], effects: &[&[usize]]) -> Crossing {
     let combinations = (0..2).flat_map(|a| (0..3).map(move |b| (a, b)));
     Crossing {
         factors: vec![factor("friction", &FRICTION), factor("grain", &GRAIN)],
@@ -40,7 +40,7 @@ fn crossing(groups: &[&str], effects: &[&[usize]]) -> Crossing {
     }
 }
 
-const ALL: [&[usize]; 3] = [&[0], &[1], &[0, 1]];
+pub(super) const ALL: [&[usize]; 3] = [&[0], &[1], &[0, 1]];
 
 /// The table without some cells; each a participant and the number of a rating.
 fn table(missing: &[(usize, usize)]) -> Ratings {
@@ -60,7 +60,7 @@ fn table(missing: &[(usize, usize)]) -> Ratings {
     ratings
 }
 
-fn analyzed(ratings: &Ratings, crossing: Crossing) -> Analysis {
+pub(super) fn analyzed(ratings: &Ratings, crossing: Crossing) -> Analysis {
     let rules = Rules {
         crossing: Some(crossing),
         ..Rules::default()
@@ -352,6 +352,109 @@ fn incomplete_designs_agree_with_r() {
     );
     // What the four say is beside it.
     close(&a, "factorial/grain/df2", 6.0);
+}
+
+/// The participants' differences by R 4.2.2: the larger of pt((d ± margin)/se, 8), p.adjust(…, "holm") over the three
+/// pairs of grain, and d ± qt(.95, 8)·se. Of the incomplete table se and its degrees of freedom are those of clubSandwich
+/// 0.5.8, linear_contrast(…, test = "Satterthwaite").
+#[test]
+fn levels_are_equivalent_as_r_says() {
+    let with_margin = |ratings: &Ratings, margin: f64| {
+        let rules = Rules {
+            crossing: Some(crossing(&[], &ALL)),
+            equivalence_margin: Some(margin),
+            ..Rules::default()
+        };
+        analyze(ratings, &rules)
+    };
+    let a = with_margin(&table(&[]), 1.0);
+    for (pair, p, p_holm, ci90, equivalent) in [
+        (
+            "fine|medium",
+            0.003_778_790_369_974_8,
+            0.007_557_580_739_949_59,
+            (-0.709_394_226_038_905_2, -0.068_383_551_738_872_5),
+            1.0,
+        ),
+        (
+            "fine|coarse",
+            0.113_391_019_747_65,
+            0.113_391_019_747_65,
+            (-1.105_063_318_349_663, -0.394_936_681_650_337),
+            0.0,
+        ),
+        (
+            "medium|coarse",
+            0.001_429_116_176_860_32,
+            0.004_287_348_530_580_95,
+            (-0.641_664_752_007_503_7, -0.080_557_470_214_718_49),
+            1.0,
+        ),
+    ] {
+        let id = |name: &str| format!("factorial_contrast/grain={pair}/{name}");
+        close(&a, &id("p_tost"), p);
+        close(&a, &id("p_tost_holm"), p_holm);
+        close(&a, &id("ci90_lo"), ci90.0);
+        close(&a, &id("ci90_hi"), ci90.1);
+        assert_eq!(a.values.number(&id("equivalent")), Some(equivalent));
+    }
+    // What differs can be equivalent, and what does not matter here is no verdict about differences.
+    let b = with_margin(&table(&[]), 2.0);
+    close(
+        &b,
+        "factorial_contrast/friction=low|high/p_tost",
+        0.000_108_706_288_713_713,
+    );
+    assert!(
+        b.finding(&Question::Effect("friction".to_owned()))
+            .unwrap()
+            .is_yes()
+    );
+    // Simple effects are a family of their own, and without a margin there are no such tests.
+    assert!(
+        b.values
+            .number("factorial_contrast/friction=low|high@grain=fine/p_tost_holm")
+            .is_some()
+    );
+    let without = analyzed(&table(&[]), crossing(&[], &ALL));
+    assert!(without.values.iter().all(|(id, _)| !id.contains("tost")));
+
+    let missing = [(0, 0), (2, 4), (3, 6), (5, 8), (8, 10)];
+    let missing: Vec<(usize, usize)> = missing
+        .iter()
+        .flat_map(|(s, i)| [(*s, *i), (*s, i + 1)])
+        .collect();
+    let c = with_margin(&table(&missing), 1.5);
+    let incomplete = "factorial_contrast/grain=fine|coarse";
+    close(
+        &c,
+        &format!("{incomplete}/p_tost"),
+        0.002_529_550_580_883_39,
+    );
+    close(&c, &format!("{incomplete}/ci90_lo"), -1.108_710_359_071_529);
+    close(&c, &format!("{incomplete}/ci90_hi"), -0.378_469_128_107_959);
+}
+
+/// Participants who all differ alike leave no error, and equivalence with a reason.
+#[test]
+fn equivalence_without_an_error_has_a_reason() {
+    let mut csv = "subject,model,rating\n".to_owned();
+    for s in 0..4 {
+        for (i, model) in ["low-fine", "low-medium", "low-coarse"].iter().enumerate() {
+            let high = model.replace("low", "high");
+            csv += &format!("P{s},{model},{}\nP{s},{high},{}\n", s + i, s + i);
+        }
+    }
+    let ratings = Ratings::read_csv("t.csv", csv.as_bytes(), None).unwrap();
+    let rules = Rules {
+        crossing: Some(crossing(&[], &ALL)),
+        equivalence_margin: Some(1.0),
+        ..Rules::default()
+    };
+    let a = analyze(&ratings, &rules);
+    let id = "factorial_contrast/friction=low|high/equivalent";
+    assert_eq!(a.values.number(id), None);
+    assert!(a.values.get(id).is_some(), "it is listed with its reason");
 }
 
 /// Who did not rate everything is left out, and the finding says so.

@@ -113,7 +113,8 @@ fn decided(facts: &Compared<'_>, question: Question, numbers: &FactorialEffect) 
         found.caveat(
             "complete-only",
             format!(
-                "{complete} of {people} rated every realization; the others are left out of the analysis of the factors"
+                "{complete} of {people} rated every realization; the others are left out of the analysis of the factors, \
+                 assuming that who did not rate everything would have rated alike"
             ),
         );
     }

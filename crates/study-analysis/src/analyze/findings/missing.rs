@@ -16,7 +16,7 @@ pub(super) fn with_missing_moved(facts: &Facts<'_>, findings: &mut [Finding]) {
         return;
     };
     for found in findings {
-        let (answer, against) = match found.question {
+        let (answer, against) = match &found.question {
             Question::Vaf => (
                 &moved.vaf,
                 ["against the relation", "along with the relation"],
@@ -32,6 +32,10 @@ pub(super) fn with_missing_moved(facts: &Facts<'_>, findings: &mut [Finding]) {
                 &moved.best,
                 ["against the best", "for the best and against the second"],
             ),
+            Question::Effect(effect) => match moved.effects.get(effect.as_str()) {
+                Some(answer) => (answer, ["towards no effect", "away from no effect"]),
+                None => continue,
+            },
             _ => continue,
         };
         let yes = match found.verdict {

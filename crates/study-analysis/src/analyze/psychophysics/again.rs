@@ -1,14 +1,20 @@
-//! Groups and repeated sessions: `groups/…`, `groups_conditions/…`, `sessions/…`, `retest/…`.
+//! Groups and repeated sessions: `groups/…`, `groups_conditions/…`, `sessions/…`, `groups_sessions/…`,
+//! `retest/…`.
 //!
 //! Each participant has one number for each condition and session: a mean rating, a
 //! threshold or a sensitivity. Groups are compared over what all of them have, sessions
 //! over what all sessions have.
+
+mod courses;
+
+pub use courses::Courses;
 
 use super::over_participants::{
     Center, ConditionModel, Contrast, FTest, Measured, NOT_POSITIVE, Threshold, mixed,
 };
 use crate::analyze::keys::GroupName;
 use crate::analyze::record::{Interval, PairName, Stat, statistics};
+use courses::courses;
 use std::collections::{BTreeMap, BTreeSet};
 use study_stats::agreement::icc;
 use study_stats::between::{self, welch};
@@ -68,6 +74,8 @@ statistics! {
         sessions: Option<ConditionModel>,
         /// how alike they are
         retest: Option<Retest>,
+        /// whether the groups change differently from session to session
+        groups_sessions: Option<Courses>,
     }
 }
 
@@ -85,15 +93,17 @@ pub(super) fn again(measured: &[Measured], sessions: &[&str], ratios: bool) -> A
         .collect();
     let usable = logs.iter().all(|m| m.value.is_finite());
     let common = have_groups(&logs).then(|| Common::of(&logs));
-    let (sessions, retest) = match sessions.len() > 1 {
+    let compared = common.as_ref().filter(|_| usable);
+    let (of_sessions, retest) = match sessions.len() > 1 {
         true => between_sessions(&logs, sessions, ratios, usable),
         false => (None, None),
     };
     Again {
         groups: (common.as_ref()).map(|common| between_groups(common, ratios, usable)),
-        groups_conditions: common.filter(|_| usable).and_then(|c| profiles(&c)),
-        sessions,
+        groups_conditions: compared.and_then(profiles),
+        sessions: of_sessions,
         retest,
+        groups_sessions: compared.and_then(|common| courses(common, sessions, ratios)),
     }
 }
 
@@ -259,16 +269,36 @@ fn profiles(common: &Common<'_>) -> Option<Profiles> {
     let rows: Vec<Vec<Vec<f64>>> = (common.groups.values())
         .map(|group| group.iter().map(of_conditions).collect())
         .collect();
+    let why = "too few participants have all conditions that the groups have in common";
+    let found = interaction(&rows, why);
+    Some(Profiles {
+        n_conditions: Stat::count(conditions.len()),
+        n: found.n,
+        test: found.test,
+        eps_gg: found.eps_gg,
+        p_gg: found.p_gg,
+    })
+}
+
+/// An interaction with the group.
+struct Interaction {
+    /// Participants.
+    n: Stat,
+    test: FTest,
+    eps_gg: Stat,
+    p_gg: Stat,
+}
+
+/// The interaction of the group and what the columns are, of the rows of each group.
+fn interaction(rows: &[Vec<Vec<f64>>], why: &'static str) -> Interaction {
     // A group without anybody has no profile.
     let found = match rows.iter().any(Vec::is_empty) {
         true => None,
-        false => between::profiles(&rows),
+        false => between::profiles(rows),
     };
     let found = found.as_ref();
-    let why = "too few participants have all conditions that the groups have in common";
     let stat = |x: Option<f64>| Stat::or(x, why);
-    Some(Profiles {
-        n_conditions: Stat::count(conditions.len()),
+    Interaction {
         n: Stat::count(rows.iter().map(Vec::len).sum()),
         test: FTest {
             f: stat(found.and_then(|f| f.f)),
@@ -278,7 +308,7 @@ fn profiles(common: &Common<'_>) -> Option<Profiles> {
         },
         eps_gg: stat(found.and_then(|f| f.eps_gg)),
         p_gg: stat(found.and_then(|f| f.p_gg)),
-    })
+    }
 }
 
 fn between_sessions(
@@ -355,7 +385,7 @@ mod tests {
     use super::*;
     use crate::analyze::record::{Field as _, Number as _};
 
-    fn measured(rows: &[(&str, &str, &str, f64)]) -> Vec<Measured> {
+    pub(super) fn measured(rows: &[(&str, &str, &str, f64)]) -> Vec<Measured> {
         let one = |(participant, group, session, value): &(&str, &str, &str, f64)| Measured {
             participant: (*participant).to_owned(),
             group: Some((*group).to_owned()),
@@ -366,7 +396,7 @@ mod tests {
         rows.iter().map(one).collect()
     }
 
-    const ROWS: [(&str, &str, &str, f64); 12] = [
+    pub(super) const ROWS: [(&str, &str, &str, f64); 12] = [
         ("A", "x", "one", 2.0),
         ("A", "x", "two", 3.0),
         ("B", "x", "one", 4.0),

@@ -61,6 +61,8 @@ pub enum PartQuestion {
     GroupsConditions,
     /// Do the sessions differ?
     Sessions,
+    /// Do the changes from session to session depend on the group?
+    GroupsSessions,
 }
 
 impl PartQuestion {
@@ -85,6 +87,7 @@ impl PartQuestion {
             Self::Groups => "groups".to_owned(),
             Self::GroupsConditions => "groups-conditions".to_owned(),
             Self::Sessions => "sessions".to_owned(),
+            Self::GroupsSessions => "groups-sessions".to_owned(),
         }
     }
 }
@@ -485,20 +488,56 @@ pub(super) fn of_groups_and_sessions(facts: &PartFacts, again: &Again) -> Vec<Pa
         decided(PartQuestion::Groups, test, &g.test.p, only_pair(&g.pairs))
     });
     let profiles = again.groups_conditions.as_ref().map(|g| {
-        // Of a test within participants p and both degrees of freedom are corrected.
-        let epsilon = g.eps_gg.number().unwrap_or(1.0);
-        let df = [&g.test.df1, &g.test.df2].map(|df| Some(df.number()? * epsilon));
-        let test = g.p_gg.number().map(|p| {
-            let test = Test::single(TestKind::BetweenWithin, p, facts.alpha);
-            test.with("F", g.test.f.number(), &df)
-        });
+        let test = interaction(facts, &g.test, &g.eps_gg, &g.p_gg);
         decided(PartQuestion::GroupsConditions, test, &g.p_gg, None)
     });
     let sessions = again.sessions.as_ref().map(|s| {
         let test = f_test(facts, TestKind::MixedModel, &s.test);
         decided(PartQuestion::Sessions, test, &s.test.p, only_pair(&s.pairs))
     });
-    [groups, profiles, sessions].into_iter().flatten().collect()
+    let courses = again.groups_sessions.as_ref().map(|g| {
+        let test = interaction(facts, &g.test, &g.eps_gg, &g.p_gg);
+        // With more sessions F is about more than the change from the first to the last.
+        let change = only_pair(&g.changes).filter(|_| g.n_sessions.number() == Some(2.0));
+        let size = |n: &Stat| n.number().unwrap_or(0.0) as usize;
+        Finding {
+            participants: size(&g.n),
+            ..decided(PartQuestion::GroupsSessions, test, &g.p_gg, change)
+        }
+    });
+    let mut found: Vec<PartFinding> = [groups, profiles, sessions, courses]
+        .into_iter()
+        .flatten()
+        .collect();
+    differ_by_group(&mut found);
+    found
+}
+
+/// The test of an interaction with the group: p and both degrees of freedom are corrected.
+fn interaction(facts: &PartFacts, test: &FTest, eps_gg: &Stat, p_gg: &Stat) -> Option<Test> {
+    let epsilon = eps_gg.number().unwrap_or(1.0);
+    let df = [&test.df1, &test.df2].map(|df| Some(df.number()? * epsilon));
+    let decides = Test::single(TestKind::BetweenWithin, p_gg.number()?, facts.alpha);
+    Some(decides.with("F", test.f.number(), &df))
+}
+
+/// Says of the sessions and of the groups that they depend on each other, where that is shown.
+fn differ_by_group(found: &mut [PartFinding]) {
+    let shown = |f: &PartFinding| f.question == PartQuestion::GroupsSessions && f.is_yes();
+    if !found.iter().any(shown) {
+        return;
+    }
+    for finding in found.iter_mut().filter(|f| f.reason().is_none()) {
+        let over = match finding.question {
+            PartQuestion::Groups => "sessions between which the groups change differently",
+            PartQuestion::Sessions => "groups that change differently from session to session",
+            _ => continue,
+        };
+        finding.caveat(
+            "interaction",
+            format!("it is a mean over {over}: the interaction of group and session is shown"),
+        );
+    }
 }
 
 /// The contrast of two groups or sessions, where there are no more.

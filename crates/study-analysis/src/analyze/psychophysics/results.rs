@@ -2,7 +2,7 @@
 
 pub use super::abilities::AbilityDifference;
 pub use super::adjustment::{Adjusted, ConstantError, OwnSettings, SettingSpread, SidesOfStart};
-pub use super::again::{Again, Groups, Profiles, Retest};
+pub use super::again::{Again, Courses, Groups, Profiles, Retest};
 pub use super::detection::Sensitivity;
 pub use super::fits::{
     Fitted, FreeLapse, Function, Functions, GroupThresholds, MaximumLikelihood, Mode,

@@ -39,6 +39,14 @@ pub(super) fn of_ratings(analysis: &Analysis) -> Vec<Number> {
             &["F", "df1", "df2", "p_gg"],
             CLOSED,
         );
+        // Those of levels over all others, where they are over the participants who rated everything.
+        let is_complete = tests.effects.values().all(|e| e.clustered.is_none());
+        let pairs: BTreeMap<_, _> = (tests.contrasts.iter())
+            .filter(|(name, _)| is_complete && name.at.0.is_empty())
+            .map(|(name, contrast)| (name.clone(), contrast.clone()))
+            .collect();
+        let compared = ["difference", "t", "df", "p", "p_tost"];
+        numbers.each("factorial_contrast", &pairs, &compared, CLOSED);
     }
     let correlation = ["n_models", "pearson/r", "pearson/p_t"];
     numbers.add("corr", &evidence.corr, &correlation, CLOSED);
@@ -136,6 +144,11 @@ pub(super) fn of_part(part: &PartAnalysis) -> Vec<Number> {
     let interaction = ["F", "df1", "df2", "p", "eps_gg", "p_gg"];
     let profiles = &over.again.groups_conditions;
     numbers.add("groups_conditions", profiles, &interaction, CLOSED);
+    if let Some(own) = &over.again.groups_sessions {
+        numbers.add("groups_sessions", own, &interaction, CLOSED);
+        let change = ["difference", "ratio", "t", "df", "p"];
+        numbers.each("groups_sessions", &own.changes, &change, CLOSED);
+    }
     let retest = ["icc_agreement", "icc_consistency", "sem"];
     numbers.add("retest", &over.again.retest, &retest, CLOSED);
     let mut all = numbers.0;

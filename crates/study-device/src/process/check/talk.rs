@@ -248,7 +248,10 @@ impl Talk {
     pub(super) fn stop(&mut self, wait: Duration) -> Result<(f64, Duration), Failed> {
         self.say("stop")?;
         let outcome = |m: &ChildMessage| match m {
-            ChildMessage::Stopped { outcome, .. } => Some(outcome.duration_s),
+            ChildMessage::Outcome { outcome, .. } => outcome
+                .playback
+                .as_ref()
+                .map(|playback| playback.duration_s),
             _ => None,
         };
         let answer = self.await_message("outcome", LATEST.max(wait), outcome)?;

@@ -18,7 +18,7 @@ pub(super) const ANALYSIS: &[Key] = keys! {
     "share_of": Kind::Text, r#""yes""#;
     /// The least rating that counts as realistic. It has to be on the primary scale.
     "realistic_from": Kind::ANY_NUMBER, "5";
-    /// The margin of the tests of equivalence, between realizations, against a hidden
+    /// The margin of the tests of equivalence, between realizations or levels of a factor, against a hidden
     /// reference and of the effect of VAF: smaller differences count as none.
     "equivalence_margin": Kind::positive("points of the primary scale"), "0.5";
     /// The margin of the test that the correlation with VAF is none: smaller correlations,

@@ -7,8 +7,8 @@ use crate::protocol::columns::is_parts_column;
 use crate::protocol::factors::GROUP;
 use crate::protocol::keys::{Id, Kind, Shape, Variants, Words as _, keys};
 use crate::protocol::outcomes::{
-    Answers, BetterEnd, Clock, MAX_OUTCOMES, Measure, OutcomeFamily, OutcomeRules, Telemetry,
-    Transform,
+    Answers, BetterEnd, Clock, DeviceNumber, MAX_OUTCOMES, Measure, OutcomeFamily, OutcomeRules,
+    Telemetry, Transform, suffix,
 };
 use crate::protocol::questionnaires::Scored;
 use crate::protocol::section::{Section, Variant, shapes};
@@ -23,8 +23,8 @@ pub(super) static OUTCOMES: Variants = Variants {
         /// The name of the outcome, in the report and in the identifiers of its statistics.
         "id": Kind::Id(Id::Question), r#""time""#, required;
         /// The unit of its numbers. Of clock and telemetry it follows from what is measured, and one that is stated has to
-        /// be the same.
-        "unit": Kind::Text, r#""s""#, derived("that of what is measured; of answers `points`");
+        /// be the same. Of a device it is part of the key of the message.
+        "unit": Kind::Text, r#""s""#, derived("that of what is measured; of answers `points`, of a device `1`: none");
         /// Which end is better. With it the report says best and worst, without it highest and lowest.
         "better": Kind::Word(BetterEnd::WORDS), r#""lower""#;
         /// What is analyzed: the numbers, or their logarithms. Times and forces are skewed, and what changes
@@ -42,7 +42,7 @@ pub(super) static OUTCOMES: Variants = Variants {
 
 static SHAPES: [Shape; KINDS.len()] = shapes(&KINDS);
 
-const KINDS: [Variant<Measure>; 3] = [
+const KINDS: [Variant<Measure>; 4] = [
     Variant::new(
         "clock",
         "The clock of the session.",
@@ -76,6 +76,20 @@ const KINDS: [Variant<Measure>; 3] = [
             }))
         },
     ),
+    Variant::new(
+        "device",
+        "A number that the controller program sends with the outcome of a playback ([devices.md](devices.md), section 3): of `kind = \"process\"`.",
+        keys! {
+            /// What it measures. With the unit it is the key of the message: `time_s` of `measure = "time"` with `unit = "s"`.
+            "measure": Kind::Id(Id::Question), r#""time""#, required;
+        },
+        |section| {
+            Some(Measure::Device(DeviceNumber {
+                name: section.question_id("measure")?,
+                unit: "1".to_owned(),
+            }))
+        },
+    ),
 ];
 
 /// An outcome that may be faulty in part.
@@ -93,8 +107,22 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Vec<PartialOutcome> {
             let id = section.question_id("id");
             let mut measure = kind.and_then(|kind| (kind.read)(&mut section));
             let unit = section.text("unit");
-            if let (Some(Measure::Answers(answers)), Some(unit)) = (&mut measure, &unit) {
-                answers.unit.clone_from(unit);
+            match (&mut measure, &unit) {
+                (Some(Measure::Answers(answers)), Some(unit)) => answers.unit.clone_from(unit),
+                (Some(Measure::Device(number)), Some(unit)) => {
+                    number.unit.clone_from(unit);
+                    if unit != "1" && suffix(unit).is_none() {
+                        let what = format!(
+                            "the unit {} has no letters for the key of the message",
+                            Untrusted(unit)
+                        );
+                        section.fault_at(
+                            "unit",
+                            Fault::error(what).hint("unit = \"1\" if it has none"),
+                        );
+                    }
+                }
+                _ => {}
             }
             if let (Some(measure), Some(unit)) = (&measure, unit)
                 && unit != measure.unit()
@@ -271,6 +299,13 @@ pub(super) fn agree(all: &[PartialOutcome], sections: &Sections<'_>, document: &
         {
             let what = format!("`{name}` needs telemetry, and samples mounted by hand report none");
             fault(path, "from", Fault::error(what));
+        }
+        let by_program = (sections.device).is_none_or(|d| d.kind == DeviceKind::Process);
+        let is_sent = |o: &OutcomeRules| matches!(o.measure, Measure::Device(_));
+        if !by_program && own.outcome.as_ref().is_some_and(is_sent) {
+            let what = format!("`{name}` is sent by a controller program, and the study has none");
+            let hint = "device.kind = \"process\"";
+            fault(path, "from", Fault::error(what).hint(hint));
         }
         if let Some(Measure::Answers(answers)) = own.outcome.as_ref().map(|o| &o.measure) {
             for what in faulty_answers(answers, sections) {

@@ -3,6 +3,7 @@
 use super::History;
 use crate::outcome::event::{Author, Choice, Entry, Event, FormId};
 use crate::outcome::rows::{AttemptEvent, AttemptRow};
+use crate::outcome::sent::SentNumber;
 use std::collections::BTreeMap;
 use study_base::text::{ModelId, ParticipantId};
 use study_plan::protocol::Answer;
@@ -152,6 +153,16 @@ pub fn attempt_rows(
                 }
             }
             Event::SelfWeighed(weighed) => row.text = weighed.in_words(),
+            Event::NumbersSent {
+                trial,
+                attempt,
+                numbers,
+            } => {
+                (row.trial, row.attempt) = (*trial, *attempt);
+                let refused = numbers.iter().filter(|number| number.fault.is_some());
+                let told: Vec<String> = refused.map(SentNumber::in_words).collect();
+                row.text = told.join("; ");
+            }
             Event::StateSet { state, reason } => {
                 row.text = format!("{}: {reason}", state.as_str());
             }

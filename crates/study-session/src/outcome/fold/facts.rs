@@ -185,6 +185,11 @@ impl History {
         self.felt.last().and_then(|(t, _)| self.planned(*t))
     }
 
+    /// The trial and the attempt whose playback was the last one to start.
+    pub fn last_attempt(&self) -> Option<(u32, u32)> {
+        self.felt.last().copied()
+    }
+
     /// The realization that was felt last.
     pub fn last_model(&self) -> Option<&ModelId> {
         let (trial, number) = self.felt.last()?;

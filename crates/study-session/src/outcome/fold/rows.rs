@@ -4,6 +4,7 @@ use super::trial::TrialHistory;
 use super::{Attempt, GivenAnswer, History};
 use crate::outcome::event::{FormId, Start};
 use crate::outcome::rows::{ParticipantRow, RatingRow, Status};
+use crate::outcome::sent::counted as counted_numbers;
 use std::collections::BTreeMap;
 use study_base::text::{ParticipantId, QuestionId};
 use study_plan::protocol::{Answer, Part, Protocol, Role, Stimuli, TrackRules, Trial};
@@ -157,6 +158,7 @@ impl History {
             media_offset_ms: media.map(|m| m.onset.offset_ms),
             media_uncertainty_ms: media.map(|m| m.onset.uncertainty_ms),
             media_jitter_ms: media.and_then(|m| m.jitter_ms),
+            sent: shown.map_or_else(BTreeMap::new, |a| counted_numbers(&a.numbers, protocol)),
         }
     }
 

@@ -3,6 +3,7 @@
 use crate::outcome::event::{Moment, Playback, TrackLevel};
 use crate::outcome::fidelity::Fidelity;
 use crate::outcome::media::{Onset, Onsets};
+use crate::outcome::sent::{SentFault, SentNumber};
 use study_base::text::ModelId;
 use study_plan::protocol::{Answer, Medium};
 
@@ -78,6 +79,8 @@ pub struct Attempt {
     pub ended: Option<Ended>,
     /// Whether the force was that of the table, for each playback that was judged.
     pub rendering: Vec<Fidelity>,
+    /// Numbers that a controller program sent in its playbacks, and in which presentation, counted from 1.
+    pub(in crate::outcome) numbers: Vec<(usize, SentNumber)>,
     /// The answer that the track was told, as it was when the trial was completed.
     pub told: Option<Answer>,
     /// Rating time until the program was last resumed, s.
@@ -228,6 +231,26 @@ impl Attempt {
         (self.presentations.iter()).filter(move |p| p.replays == present)
     }
 
+    /// Numbers that were sent in the presentation under way; those that came before or after it, or twice, are no
+    /// part of it.
+    pub(super) fn sent(&mut self, numbers: &[SentNumber]) {
+        let presentation = self.presentations.len();
+        let of_it = numbers.iter().filter(|number| match number.fault {
+            // Without a declaration so far: the outcome may be added later.
+            None | Some(SentFault::Undeclared | SentFault::OtherUnit) => true,
+            Some(SentFault::NoNumber | SentFault::OutsidePlayback | SentFault::Twice) => false,
+        });
+        self.numbers
+            .extend(of_it.map(|number| (presentation, number.clone())));
+    }
+
+    /// Whether a number of this name was sent in the presentation under way.
+    pub fn was_sent(&self, key: &str) -> bool {
+        let presentation = self.presentations.len();
+        let is_it = |(of, sent): &(usize, SentNumber)| *of == presentation && sent.key == key;
+        self.numbers.iter().any(is_it)
+    }
+
     /// The confirmed start of an interval.
     pub(super) fn started(&mut self, interval: u32, at: Moment) {
         let before = self.presentations.last().and_then(|p| p.ended);
@@ -309,6 +332,7 @@ impl Attempt {
             replays: 0,
             ended: None,
             rendering: Vec::new(),
+            numbers: Vec::new(),
             told: None,
             rated_earlier_s: 0.0,
             rating: None,

@@ -61,7 +61,7 @@ impl Ratings {
             values: (self.source_row.iter())
                 .map(|source| {
                     let at = (*source as usize).checked_sub(1)?;
-                    measured(at, rows.get(at)?, &outcome.measure, telemetry)
+                    measured(at, rows.get(at)?, outcome, telemetry)
                 })
                 .map(|value| value.filter(|x| x.is_finite()))
                 .collect(),
@@ -96,8 +96,13 @@ impl Ratings {
 }
 
 /// What was measured in a trial.
-fn measured(at: usize, row: &RatingRow, measure: &Measure, telemetry: &Motions) -> Option<f64> {
-    match measure {
+fn measured(
+    at: usize,
+    row: &RatingRow,
+    outcome: &OutcomeRules,
+    telemetry: &Motions,
+) -> Option<f64> {
+    match &outcome.measure {
         Measure::Clock(Clock::Exploration) => row.exploration_s,
         Measure::Clock(Clock::Response) => row.response_s,
         Measure::Telemetry(Telemetry::Strokes) => row.strokes.map(f64::from),
@@ -112,6 +117,7 @@ fn measured(at: usize, row: &RatingRow, measure: &Measure, telemetry: &Motions) 
             Some(all.iter().sum::<f64>() / all.len() as f64)
         }
         Measure::Questionnaire(own) => own.of(&row.answers),
+        Measure::Device(_) => row.sent.get(outcome.id.as_str()).copied(),
     }
 }
 

@@ -50,6 +50,51 @@ outcomes = [
     );
 }
 
+#[test]
+fn a_number_of_the_device_has_a_key_with_its_unit() {
+    let study = STUDY.replace(
+        "\"manual\", limits = { force_n = 12.0, velocity_mm_s = 1000.0 }",
+        "\"process\"",
+    );
+    let of = |outcomes: &str| parse("p.toml", &format!("{study}outcomes = {outcomes}"));
+    let parsed = of(r#"[
+  { id = "duration", from = "device", measure = "time", unit = "s", better = "lower" },
+  { id = "missed", from = "device", measure = "errors", model = "poisson" },
+]"#);
+    let protocol = parsed.protocol.unwrap();
+    let keys: Vec<String> = (protocol.numbers_of_device())
+        .map(|(id, number)| format!("{id} {}", number.key()))
+        .collect();
+    assert_eq!(keys, ["duration time_s", "missed errors"]);
+    assert_eq!(
+        protocol.outcomes[0].in_words(),
+        "duration (time that the device sends, s, lower is better)"
+    );
+    for (outcomes, told) in [
+        (r#"[{ id = "a", from = "device" }]"#, "has no `measure`"),
+        (
+            r#"[{ id = "a", from = "device", measure = "time", unit = "·" }]"#,
+            "has no letters for the key",
+        ),
+        (
+            r#"[{ id = "a", from = "device", measure = "t" }, { id = "b", from = "device", measure = "t" }]"#,
+            "are the same measurement",
+        ),
+    ] {
+        let parsed = of(outcomes);
+        let found = parsed.findings.render(false);
+        assert!(
+            parsed.protocol.is_none() && found.contains(told),
+            "{outcomes}: {found}"
+        );
+    }
+    let by_hand = faults(r#"outcomes = [{ id = "a", from = "device", measure = "time" }]"#);
+    assert!(
+        by_hand.contains("sent by a controller program"),
+        "{by_hand}"
+    );
+}
+
 /// They belong to the analysis: nothing else of a study changes, and it can be amended.
 #[test]
 fn outcomes_are_part_of_the_analysis_and_of_no_other_fingerprint() {
