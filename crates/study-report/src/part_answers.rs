@@ -501,7 +501,9 @@ pub(super) fn methods(part: &PartAnalysis) -> String {
             "Whether participants rank alike was tested by Kendall's (1939) W of their mean ranks, corrected for ties, over the orders of each \
              participant's ranks. Worths are those of the model of Plackett (1975) and Luce (1959) with ties of any order (Turner et al., \
              2020), by maximum likelihood; their differences were tested by t with participants as clusters and Holm's correction, \
-             and a realization is above each other one if all of its differences are significant."
+             and a realization is above each other one if all of its differences are significant. Where some realizations were above \
+             all others in every ranking, worths are the limit of the likelihood within such a level, and differences of two levels, which have no \
+             upper limit, were tested by the sign test over participants and have the exact lower limit of Clopper and Pearson (1934)."
                 .to_owned(),
         );
     }

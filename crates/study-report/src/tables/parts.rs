@@ -385,7 +385,7 @@ fn abilities(results: &PartResults) -> Table {
     items.sort_by(|a, b| order(b).total_cmp(&order(a)));
     let mut notes = Vec::new();
     if let Some(why) = items.first().and_then(|item| item.1.ability.reason()) {
-        notes.push(format!("No abilities: {}.", name(why)));
+        notes.push(format!("No abilities: {}.", Untrusted(why)));
         items.clear();
     } else if let Some(effect) = pairs.and_then(|p| p.order.as_ref())
         && let Some(order) = effect.order.number()

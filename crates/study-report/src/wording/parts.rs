@@ -122,7 +122,7 @@ fn texts(question: &PartQuestion) -> Wording {
             ask: "Is one realization ranked above each other one?",
             yes: "{first} was ranked above each other realization",
             not_shown: "It was not shown that one realization is ranked above each other one",
-            shown: "{first} over {second} by {size} on the logarithm of the worth, {result} ({corrected}, {people})",
+            shown: "{first} over {second} by {margin}, {result} ({corrected}, {people})",
             ..PART
         },
         PartQuestion::Adjusted => Wording {
@@ -188,6 +188,21 @@ fn value(part: &PartAnalysis, f: &PartFinding, key: &str) -> Option<String> {
             found
                 .and_then(|own| own.by_guessing.number())
                 .map_or_else(String::new, apa::two)
+        }
+        "margin" => {
+            let found = part.results.over.ranking.as_ref();
+            let bound = found.and_then(|own| own.best.ci95.lo.number());
+            match (&f.estimate, bound) {
+                (None, Some(bound)) => format!(
+                    "at least {} (95 %) on the logarithm of the worth, in every ranking",
+                    apa::two(bound)
+                ),
+                (estimate, _) => {
+                    let size = estimate.as_ref().map(|e| sentences::estimate(e, apa::two));
+                    let size = size.unwrap_or_default();
+                    format!("{size} on the logarithm of the worth")
+                }
+            }
         }
         "clearest" => match clearest(part) {
             Some(pair) => format!(
