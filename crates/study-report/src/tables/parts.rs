@@ -23,7 +23,7 @@ use study_base::text::Untrusted;
 type Kind = (&'static str, fn(&PartResults) -> Table);
 
 /// All tables, in the order of a page; those without rows and notes are left out of it.
-pub(crate) const KINDS: [Kind; 31] = [
+pub(crate) const KINDS: [Kind; 33] = [
     ("part_thresholds.csv", thresholds),
     ("part_population.csv", population::population),
     ("part_population_contrasts.csv", population::contrasts),
@@ -43,6 +43,8 @@ pub(crate) const KINDS: [Kind; 31] = [
     ("part_dimensions.csv", similarity::dimensions),
     ("part_map.csv", similarity::map),
     ("part_map_follows.csv", similarity::follows),
+    ("part_weights.csv", similarity::weights),
+    ("part_weighted_map.csv", similarity::weighted_map),
     ("part_differences.csv", similarity::pairs),
     ("part_similarity.csv", similarity::participants),
     ("part_ranks.csv", ranking::realizations),

@@ -2,6 +2,7 @@
 
 mod maps;
 mod people;
+mod weights;
 
 use crate::analyze::draws::Draws;
 use crate::analyze::keys::{DimensionsName, PropertyName};
@@ -18,6 +19,8 @@ use study_stats::similarity::scaling::{Map, Scale};
 use study_stats::similarity::{
     Dissimilarities, agreement, asymmetry, pairs as pairs_of, with_the_others,
 };
+use weights::weights;
+pub use weights::{OwnWeights, WeightedPlace, Weights};
 
 statistics! {
     /// Whether participants find the same pairs different.
@@ -178,6 +181,8 @@ statistics! {
         map_stress: Stat,
         /// the map, by realization
         map: BTreeMap<RealizationName, Place>,
+        /// weights of dimensions
+        weights: Weights,
         /// by property of the realizations
         follows: BTreeMap<PropertyName, MapFit>,
         /// by pair
@@ -269,6 +274,15 @@ pub fn similarity(
         agreement: agreed(&all, none),
         order: order(&people, names.len(), &mut draws("order")),
         identical: identical(&people),
+        weights: {
+            let dimensions = scaled.map.as_ref().map(Map::dimensions);
+            weights(
+                &known,
+                &names,
+                dimensions.ok_or_else(|| scaled.why()),
+                &draws,
+            )
+        },
         follows: follows(&scaled, &all, properties, &names, &draws),
         participants: participants.collect(),
         pairs: pairs(&people, &names, unit.as_ref(), points, scaled.map.as_ref()),
