@@ -38,18 +38,30 @@ pub enum PlanError {
     /// A number that the factors fix.
     #[error("the number of realizations is that of the factors' levels")]
     FixedByFactors,
-    /// No number and no part of pairs or tracks.
-    #[error("`{0}` is no rating, and no part of pairs or tracks asks it")]
+    /// No number, and no part that is simulated.
+    #[error("`{0}` is no rating, and no part that can be simulated asks it")]
     NoRatings(QuestionId),
     /// No such part.
     #[error("there is no part `{0}`")]
     NoPart(PartId),
     /// Another kind of part.
     #[error(
-        "the power of part `{0}` is not computed: ratings, pairs and tracks are simulated, but not \
-         magnitude estimation, MUSHRA, identification, similarity, ranking and adjustment; a search has no test"
+        "the power of part `{0}` is not computed: ratings, pairs, tracks, ranking, similarity, adjustment and identification are \
+         simulated, but not magnitude estimation and MUSHRA; a search has no test"
     )]
     NoPower(PartId),
+    /// Nothing that a map could follow.
+    #[error(
+        "the map of part `{0}` can follow no property: it takes 4 to 30 realizations that all have a level of a family or a VAF, \
+         not all the same"
+    )]
+    NoProperty(PartId),
+    /// Settings without a level that they could differ from.
+    #[error("part `{0}` has no level as its standard, so that settings are compared with nothing")]
+    NoStandard(PartId),
+    /// A share of correct answers that is none.
+    #[error("the mean of identification is a share of correct answers: {0} is not between 0 and 1")]
+    NoShare(f64),
     /// A pilot of ratings for another part.
     #[error("a pilot has estimates for ratings, not for part `{0}`: state its assumptions")]
     PilotOfPart(PartId),
@@ -60,7 +72,7 @@ pub enum PlanError {
     #[error("`{0}` is no test of part `{1}`")]
     NotOfPart(&'static str, PartId),
     /// A test of a part for ratings.
-    #[error("`{0}` is no test of the relation with VAF, but of pairs, tracks or factors")]
+    #[error("`{0}` is no test of the relation with VAF, but of another part or of factors")]
     NotOfRatings(&'static str),
     /// A flag that changes nothing.
     #[error("`--{0}` does not apply to {1}: leave it out")]
@@ -149,7 +161,7 @@ pub struct Overrides {
 pub struct Plan {
     /// How.
     pub settings: Settings,
-    /// The part of pairs or tracks; `None`: ratings.
+    /// The part that is simulated; `None`: ratings.
     pub part: Option<PartId>,
     /// The protocol's own design.
     pub own: Cell,
@@ -180,7 +192,7 @@ pub struct LeftOut {
     pub sessions: bool,
     /// Other parts that can be simulated.
     pub parts: Vec<PartId>,
-    /// Parts of magnitude estimation, MUSHRA, identification, similarity, ranking, adjustment and search.
+    /// Parts of magnitude estimation, MUSHRA and search.
     pub never: Vec<PartId>,
 }
 
@@ -197,14 +209,13 @@ impl LeftOut {
             .filter(|part| Some(&part.id) != simulated)
         {
             match part.task {
-                Task::Pairs(_) | Task::Discrimination { .. } => found.parts.push(part.id.clone()),
-                Task::Magnitude(_)
-                | Task::Mushra(_)
+                Task::Pairs(_)
+                | Task::Discrimination { .. }
                 | Task::Identification(_)
-                | Task::Search(_)
                 | Task::Similarity(_)
                 | Task::Ranking(_)
-                | Task::Adjustment(_) => {
+                | Task::Adjustment(_) => found.parts.push(part.id.clone()),
+                Task::Magnitude(_) | Task::Mushra(_) | Task::Search(_) => {
                     found.never.push(part.id.clone());
                 }
                 Task::Rating(_) => {}

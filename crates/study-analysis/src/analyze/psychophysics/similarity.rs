@@ -9,7 +9,7 @@ use crate::analyze::keys::{DimensionsName, PropertyName};
 use crate::analyze::record::{
     Interval, PairName, ParticipantName, RealizationName, Stat, Why, statistics,
 };
-use maps::{Maps, maps};
+use maps::{Maps, maps, scaling};
 use people::{Own, people};
 use std::collections::{BTreeMap, BTreeSet};
 use study_stats::describe::{mean, sd};
@@ -300,6 +300,35 @@ pub fn similarity(
         dimensions: scaled.dimensions,
         second: scaled.second,
     }
+}
+
+/// Random starts of the maps of simulated studies.
+const SIMULATED_STARTS: usize = 10;
+
+/// How the map of some ratings follows a property of the realizations, as that of [`similarity`] but from fewer random starts and without
+/// an interval. `None` without a map.
+pub(super) fn property_followed(
+    rows: &[SimilarityRow],
+    property: &BTreeMap<String, f64>,
+    seed: u64,
+) -> Option<MapFit> {
+    let names: Vec<&str> = property.keys().map(String::as_str).collect();
+    let all: Vec<Dissimilarities> = (people(rows, &names).values())
+        .filter_map(|own| own.dissimilarities(names.len()).rescaled())
+        .collect();
+    let unit = Dissimilarities::in_common(all.iter())?;
+    let draws = |of: &str| Draws::new(seed, &format!("similarity/power/{of}"));
+    let map = scaling(&all, &unit, SIMULATED_STARTS, &draws).map?.map;
+    let columns = [property.values().copied().collect::<Vec<f64>>()];
+    let found = followed(&map, &columns, &mut draws("follows"))?;
+    Some(MapFit {
+        properties: Stat::count(columns.len()),
+        r: Stat::of(found.r),
+        ci95: Interval::or(None, "the interval is not simulated"),
+        p: Stat::of(found.p),
+        exact: Stat::flag(found.exact),
+        smallest_p: Stat::of(found.smallest),
+    })
 }
 
 /// Mean over participants of the factor between what they rated and what all have in common, in points of the scale.
