@@ -141,7 +141,7 @@ impl<'a> FeltJudge<'a> {
         Outcome::of_tests(self.settings.tests.iter().map(of))
     }
 
-    /// Calls `trials` for each participant who is not lost, with the participant's name.
+    /// Calls `trials` for each participant, with the place and whether the participant is lost.
     fn participants(&self, draws: &mut Stream, mut trials: impl FnMut(usize, bool, &mut Stream)) {
         for i in 0..self.cell.participants {
             let lost = is_lost(self.settings, draws);

@@ -26,9 +26,12 @@ pub(crate) fn of_part<'a>(part: &'a PartAnalysis, f: &'a PartFinding) -> Words<'
 
 /// A question and the test that decides it, for a preregistration.
 pub(crate) fn declared_of_part(part: &PartAnalysis, f: &PartFinding) -> Option<String> {
-    of_part(part, f).fill(match f.test {
-        Some(_) => "Part `{part}`: {ask} Decided by: {corrected}; level {level}.",
-        None => "Part `{part}`: {ask} No test: {why}.",
+    of_part(part, f).fill(match (&f.test, &f.question) {
+        (Some(_), PartQuestion::RankedFirst) => {
+            "Part `{part}`: {ask} Decided by: {corrected}; level {level}. Where two never had another order, the sign test over participants takes its place."
+        }
+        (Some(_), _) => "Part `{part}`: {ask} Decided by: {corrected}; level {level}.",
+        (None, _) => "Part `{part}`: {ask} No test: {why}.",
     })
 }
 
