@@ -56,7 +56,7 @@ pub const CHUNK: u64 = 1000;
 /// Studies of a chunk of tracks, each of which takes many fits.
 const CHUNK_OF_TRACKS: u64 = 20;
 
-/// Studies of a chunk of what is ranked, set or labelled; of similarity there are as many as of tracks, because each takes many maps.
+/// Studies of a chunk of what is ranked, set or labeled; of similarity there are as many as of tracks, because each takes many maps.
 const CHUNK_OF_FELT: u64 = 100;
 
 /// A design to simulate.

@@ -30,7 +30,7 @@ const COMPARED: Spread = Spread {
     ..NOTHING
 };
 /// Of identification, in logits.
-const LABELLED: Spread = Spread {
+const LABELED: Spread = Spread {
     subject: 0.5,
     realization: 0.3,
     ..NOTHING
@@ -194,8 +194,8 @@ fn of_identification(
     }
     let sd = &stated.sd;
     let spread = Spread {
-        subject: defaults.or("sd.participant", sd.participant, LABELLED.subject),
-        realization: defaults.or("sd.realization", sd.realization, LABELLED.realization),
+        subject: defaults.or("sd.participant", sd.participant, LABELED.subject),
+        realization: defaults.or("sd.realization", sd.realization, LABELED.realization),
         ..NOTHING
     };
     let world = FeltWorld::Identification {

@@ -1,4 +1,4 @@
-//! Parts of pairs, of tracks (`tracks`), of factors (`factors`) and of what is ranked, compared, set or labelled (`felt`): answers are
+//! Parts of pairs, of tracks (`tracks`), of factors (`factors`) and of what is ranked, compared, set or labeled (`felt`): answers are
 //! drawn one by one, and decided by the analysis of such parts.
 //!
 //! **Pairs.** The ability of a realization is slope·x + scatter + what a participant adds, in
