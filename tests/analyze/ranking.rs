@@ -88,6 +88,78 @@ fn the_salads_of_vargo_differ_in_tartness() {
     assert!(number("agreement/p") < 0.001);
 }
 
+/// Ten people, all of whom put e last and a first: worths of the others, bounds of the two ends, and no sentence that is cut.
+#[test]
+fn what_everybody_puts_first_or_last_has_bounds() {
+    let orders = [
+        "a b c d e",
+        "a c b d e",
+        "a b d c e",
+        "a b c d e",
+        "a d b c e",
+        "a b c d e",
+        "a c d b e",
+        "a b c d e",
+        "a c b d e",
+        "a d c b e",
+    ];
+    let mut table = "participant,realization,rank\n".to_owned();
+    for (person, order) in orders.iter().enumerate() {
+        for (rank, realization) in (1..).zip(order.split(' ')) {
+            table += &format!("P{person},{realization},{rank}\n");
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = ["--task", "ranking", "--json"];
+    let found = values(&mut analyze(folder.path(), &table, &arguments));
+    let number = |id: &str| found[format!("ranking/{id}")].as_f64();
+    for (id, level) in [("a", 1.0), ("b", 2.0), ("c", 2.0), ("d", 2.0), ("e", 3.0)] {
+        assert_eq!(
+            number(&format!("realization/{id}/level")),
+            Some(level),
+            "{id}"
+        );
+    }
+    // SciPy as in crates/study-stats/tests/reference/ranking_levels.py: ten of ten.
+    let bound = 0.807_154_865_25;
+    for (id, expected) in [
+        ("pair/a|e/ci95_lo", bound),
+        ("pair/a|b/ci95_lo", bound),
+        ("best/ci95_lo", bound),
+        ("pair/a|b/p", 0.001_953_125),
+        // Holm over ten pairs.
+        ("best/p", 0.019_531_25),
+    ] {
+        assert!((number(id).unwrap() - expected).abs() < 1e-9, "{id}");
+    }
+    for id in [
+        "pair/a|e/ci95_hi",
+        "pair/a|e/difference",
+        "best/difference",
+        "realization/e/log_worth",
+    ] {
+        assert_eq!(number(id), None, "{id}");
+    }
+    let within: f64 = ["b", "c", "d"]
+        .iter()
+        .filter_map(|id| number(&format!("realization/{id}/log_worth")))
+        .sum();
+    assert!(within.abs() < 1e-9);
+    assert!(number("pair/b|c/difference").is_some() && number("agreement/p").unwrap() < 0.05);
+    let words = |table: &str| {
+        let page = text(&mut analyze(folder.path(), table, &["--task", "ranking"]));
+        page.split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    let page = words(&table);
+    for said in ["has no upper limit", "one end", "sum to 0 within a level"] {
+        assert!(page.contains(said), "{said}:\n{page}");
+    }
+    let apart = "participant,realization,rank\nP1,a,1\nP1,c,2\nP2,b,1\nP2,c,2\n";
+    let why = "No worths: none of the others was ever ranked above a, or with the same rank, and not all realizations were ranked together.";
+    let page = words(apart);
+    assert!(page.contains(why), "{page}");
+}
+
 /// Everybody felt the realizations in one order: what ranks have in common may be due to it.
 #[test]
 fn ranks_in_one_order_for_everybody_decide_nothing() {

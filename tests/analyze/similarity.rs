@@ -157,6 +157,83 @@ fn people_who_rate_other_pairs_have_a_map_in_common() {
     }
 }
 
+/// Five people weigh the two properties of eight points differently; SciPy and the program's own tests have the numbers
+/// (crates/study-stats/tests/reference/individual.py). A line has no weights, and neither has one person.
+#[test]
+fn people_who_weigh_dimensions_differently_have_weights() {
+    let folder = tempfile::tempdir().unwrap();
+    // All differences of the first property are different: their order has no ties.
+    let places = [
+        (0, 0),
+        (22, 10),
+        (9, 40),
+        (32, 45),
+        (15, 22),
+        (34, 5),
+        (4, 26),
+        (1, 15),
+    ];
+    let weights = [(1.0, 0.1), (0.8, 0.4), (0.5, 0.9), (0.1, 1.0), (1.0, 1.0)];
+    let table = |people: &[(f64, f64)], flat: f64| {
+        let mut table = "participant,first,second,rating\n".to_owned();
+        for (person, (a, b)) in people.iter().enumerate() {
+            for (i, one) in places.iter().enumerate() {
+                for (j, other) in places.iter().enumerate().skip(i + 1) {
+                    let (x, y) = (
+                        f64::from(one.0 - other.0),
+                        flat * f64::from(one.1 - other.1),
+                    );
+                    let rating = (a * x * x + b * y * y).sqrt();
+                    writeln!(table, "P{person},m{i},m{j},{rating:.1}").unwrap();
+                }
+            }
+        }
+        table
+    };
+    let arguments = ["--task", "similarity", "--json"];
+    let whole = table(&weights, 1.0);
+    let found = values(&mut analyze(folder.path(), &whole, &arguments));
+    let number = |id: &str| found[format!("similarity/weights/{id}")].as_f64();
+    assert_eq!(number("n"), Some(5.0));
+    // A third dimension, if the map has one, adds nothing.
+    assert!(number("fit").unwrap() > 0.999, "{:?}", number("fit"));
+    assert!(number("common_fit").unwrap() < 0.95 && number("p").unwrap() < 0.05);
+    let own = |who: &str, axis: &str| number(&format!("participant/{who}/{axis}")).unwrap();
+    // Which of the two properties has the larger weights is the first dimension.
+    let (first, second) = match own("P0", "x") > own("P0", "y") {
+        true => ("x", "y"),
+        false => ("y", "x"),
+    };
+    let shares: Vec<f64> = ["P0", "P1", "P2", "P3"]
+        .iter()
+        .map(|who| own(who, first) / own(who, second))
+        .collect();
+    assert!(shares.windows(2).all(|two| two[0] > two[1]), "{shares:?}");
+    let page = text(&mut analyze(
+        folder.path(),
+        &whole,
+        &["--task", "similarity"],
+    ));
+    assert!(
+        page.contains("Weights of the dimensions") && page.contains("Map with weights"),
+        "{page}"
+    );
+    for (table, why) in [
+        (table(&weights, 0.0), "the map has one dimension"),
+        (
+            table(&weights[..1], 1.0),
+            "fewer than two participants rated every pair",
+        ),
+    ] {
+        let out = text(&mut analyze(folder.path(), &table, &arguments));
+        let document: serde_json::Value = serde_json::from_str(&out).unwrap();
+        assert_eq!(
+            document["undefined"]["similarity/weights/fit"], why,
+            "{out}"
+        );
+    }
+}
+
 /// Fewer than four realizations, one participant, ratings that are all 0, and pairs that do not connect all realizations: each
 /// is said, and nothing panics.
 #[test]
@@ -260,6 +337,7 @@ fn differences_of_a_study_are_mapped_as_in_their_table() {
         "structure",
         "follows",
         "second",
+        "weights",
         "dimensions",
         "order/p",
     ];

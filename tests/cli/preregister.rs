@@ -262,7 +262,8 @@ fn tracks_and_estimates_are_declared() {
                 "identification of 4 realizations, 6 trials each, order shuffled, each is given one of 4 labels, after practice until 7 of the last 8 answers are correct (at most 24 trials, each drawn on its own), the right label is told after each practice trial",
                 "Part `which`: Is the right label given more often than by guessing? Decided by: t test over participants",
                 "Do the sessions differ? Decided by: linear mixed model",
-                "Power was not computed:",
+                "In 100 simulated studies (seed ",
+                "`identified` at α = .050 was a yes in",
             ],
         ),
         (
@@ -272,7 +273,8 @@ fn tracks_and_estimates_are_declared() {
                 "Part `difference`: Is there a structure that a map shows better than chance? Decided by: permutation test within participants",
                 "Part `difference`: Does it take more than one dimension? Decided by: t test over participants",
                 "Part `difference`: Does the map follow the level? Decided by: permutation test, exact",
-                "Power was not computed:",
+                "In 100 simulated studies (seed ",
+                "`map-follows` at α = .050 was a yes in",
             ],
         ),
         (
@@ -281,7 +283,8 @@ fn tracks_and_estimates_are_declared() {
                 "rankings of 4 realizations, all felt one after another, 2 trials, order williams, no ties",
                 "Part `order`: Do participants rank the realizations alike? Decided by: permutation test of the ranks within participants",
                 "Part `order`: Is one realization ranked above each other one? Decided by: t test, participants as clusters, Holm's correction over 6 pairs",
-                "Power was not computed:",
+                "In 100 simulated studies (seed ",
+                "`ranked-alike` at α = .050 was a yes in",
             ],
         ),
         (
@@ -290,7 +293,8 @@ fn tracks_and_estimates_are_declared() {
                 "a level of `detent` is set 3 times from below and as often from above, one step of its 21 levels at a time, until it feels equal to 1; where it starts is drawn",
                 "Part `equal`: Do settings differ from the standard? Decided by: t test over participants",
                 "Part `equal`: Do settings depend on the side from which they start? Decided by: t test over participants",
-                "Power was not computed:",
+                "In 100 simulated studies (seed ",
+                "`adjusted` at α = .050 was a yes in",
             ],
         ),
     ] {

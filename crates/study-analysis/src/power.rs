@@ -10,19 +10,22 @@
 //! text of the cell and k, never from threads, shards or other cells. Counts are integers;
 //! sums run over chunks ([`Settings::chunk`]) in order.
 //!
-//! Parts of pairs and of tracks are simulated answer by answer, and decided by the analysis of
-//! such parts. A search decides nothing: of it is known how near the best point it comes ([`SearchPlan`]).
+//! Parts of pairs, of tracks, of ranking, similarity, adjustment and identification are simulated answer by answer, and decided by the
+//! analysis of such parts. A search decides nothing: of it is known how near the best point it comes ([`SearchPlan`]).
 
 mod decide;
 mod draw;
 mod expected;
 mod factors;
 mod factors_plan;
+mod felt;
+mod felt_plan;
 mod part_plan;
 mod parts;
 mod perceivers;
 mod pilot;
 mod plan;
+mod planned;
 mod precision;
 mod procedures;
 mod searches;
@@ -32,6 +35,7 @@ mod tracks;
 
 pub use expected::{Floor, Reach, Smallest, candidates, closed, design, floor, reach, smallest};
 pub use factors::FactorsWorld;
+pub use felt::FeltWorld;
 pub use parts::{PairsWorld, PartWorld};
 pub use perceivers::{Likes, Perceiver};
 pub use pilot::{Parameters, Pilot, PilotError};
@@ -55,6 +59,9 @@ pub const CHUNK: u64 = 1000;
 
 /// Studies of a chunk of tracks, each of which takes many fits.
 const CHUNK_OF_TRACKS: u64 = 20;
+
+/// Studies of a chunk of what is ranked, set or labeled; of similarity there are as many as of tracks, because each takes many maps.
+const CHUNK_OF_FELT: u64 = 100;
 
 /// A design to simulate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -140,7 +147,7 @@ pub struct Assumptions {
 pub struct Settings {
     /// The assumptions.
     pub assumptions: Assumptions,
-    /// The part of pairs or tracks, or the effects of factors, that are simulated; `None`: ratings, for VAF.
+    /// The part, or the effects of factors, that are simulated; `None`: ratings, for VAF.
     pub part: Option<PartWorld>,
     /// The pilot whose uncertainty each study draws from, in place of the assumed slope
     /// and standard deviations.
@@ -190,7 +197,10 @@ impl Settings {
     /// Studies of a chunk.
     pub fn chunk(&self) -> u64 {
         match self.part {
-            Some(PartWorld::Tracks(_)) => CHUNK_OF_TRACKS,
+            Some(PartWorld::Tracks(_) | PartWorld::Felt(FeltWorld::Similarity { .. })) => {
+                CHUNK_OF_TRACKS
+            }
+            Some(PartWorld::Felt(_)) => CHUNK_OF_FELT,
             None | Some(PartWorld::Factors(_) | PartWorld::Pairs(_)) => CHUNK,
         }
     }

@@ -233,6 +233,13 @@ fn change(change: &Change) -> String {
     }
 }
 
+/// Whether two words of tests are one procedure. In rankings the sign test takes the place of t where two realizations never had
+/// another order, which only the answers tell.
+fn is_one_procedure(one: &str, other: &str) -> bool {
+    let in_place = |sign: &str, t: &str| sign == "sign" && ["clustered-t", "wald"].contains(&t);
+    one == other || in_place(one, other) || in_place(other, one)
+}
+
 /// How a declared test differs from the one that decided.
 fn other_test(declared: &Declared, done: &[Declared]) -> Option<String> {
     let alike = |d: &&Declared| d.question == declared.question && d.part == declared.part;
@@ -245,7 +252,7 @@ fn other_test(declared: &Declared, done: &[Declared]) -> Option<String> {
         None => Some(format!(
             "{question}: no test decided; `{test}` was declared"
         )),
-        Some(own) if own.test != *test => Some(format!(
+        Some(own) if !is_one_procedure(&own.test, test) => Some(format!(
             "{question}: `{}` decided; `{test}` was declared",
             own.test
         )),
@@ -380,6 +387,25 @@ mod tests {
         // A vanished realization changes the tests, too.
         let one = changed(&|p| p.models[1].vaf = None);
         assert!(one.contains("vaf: 0.73 → none"), "{one}");
+    }
+
+    /// The sign test of what never had another order is part of the declared procedure, and nothing else is.
+    #[test]
+    fn the_sign_test_stands_for_t() {
+        let of = |test: &str| Declared {
+            part: Some(PartId::new("order").unwrap()),
+            question: "ranked-first".to_owned(),
+            test: test.to_owned(),
+            level: 0.05,
+            comparisons: 6,
+        };
+        let differs = |declared: &str, done: &str| other_test(&of(declared), &[of(done)]);
+        assert_eq!(differs("clustered-t", "sign"), None);
+        assert_eq!(differs("sign", "wald"), None);
+        for (declared, done) in [("clustered-t", "wald"), ("ranks-exact", "sign")] {
+            let said = differs(declared, done).unwrap();
+            assert!(said.contains(&format!("`{done}` decided")), "{said}");
+        }
     }
 
     #[test]

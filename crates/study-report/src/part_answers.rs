@@ -55,6 +55,7 @@ fn answer(part: &PartAnalysis, f: &PartFinding) -> Option<Answer> {
     }
     if f.question == PartQuestion::Dimensions {
         answer.main.extend(dimensions(part));
+        answer.main.extend(weights(part));
     }
     if f.question == PartQuestion::RankedAlike {
         answer.main.extend(ranks(part));
@@ -148,6 +149,7 @@ pub(super) fn results(part: &PartAnalysis) -> String {
     let tested = part.findings.iter().filter(|f| f.test.is_some());
     text.extend(tested.filter_map(|f| wording::of_part(part, f).paper()));
     text.extend(dimensions(part));
+    text.extend(weights(part));
     text.extend(retest(part));
     let pairs = part.findings.iter().any(|f| {
         let of_conditions = [
@@ -287,6 +289,20 @@ fn identical(part: &PartAnalysis) -> Option<String> {
         "Identical pairs were rated {} on average, different ones {}.",
         apa::one(own.mean.number()?),
         apa::one(found.mean.number()?)
+    ))
+}
+
+/// What weights of the dimensions add for participants.
+fn weights(part: &PartAnalysis) -> Option<String> {
+    let found = &part.results.over.similarity.as_ref()?.weights;
+    let (fit, common) = (found.fit.number()?, found.common_fit.number()?);
+    Some(format!(
+        "With weights of the dimensions for each participant (INDSCAL, n = {}) a map accounts for {} of their scalar products, with the \
+         same for all for {} (p {} by chance).",
+        found.n.number()?,
+        apa::percent(fit),
+        apa::percent(common),
+        apa::p(found.p.number()?)
     ))
 }
 
@@ -484,7 +500,9 @@ pub(super) fn methods(part: &PartAnalysis) -> String {
              dissimilarities, or in proportion to them where their order fits without stress, from the classical map and from random starts. Stress was compared with that after each participant's \
              ratings were dealt to the pairs at random. The number of dimensions is the smallest whose maps of all others predict the ratings of \
              a participant as well as any, within one standard error. Standard errors of positions are by resampling participants; \
-             properties of the realizations were laid on the map by Procrustes' rotation and tested over the orders of the realizations."
+             properties of the realizations were laid on the map by Procrustes' rotation and tested over the orders of the realizations. \
+             Weights of dimensions are those of INDSCAL (Carroll & Chang, 1970) with none below 0; what they add to equal weights was \
+             compared with that after the ratings of each pair were dealt to the participants at random."
                 .to_owned(),
         );
     }
@@ -493,7 +511,9 @@ pub(super) fn methods(part: &PartAnalysis) -> String {
             "Whether participants rank alike was tested by Kendall's (1939) W of their mean ranks, corrected for ties, over the orders of each \
              participant's ranks. Worths are those of the model of Plackett (1975) and Luce (1959) with ties of any order (Turner et al., \
              2020), by maximum likelihood; their differences were tested by t with participants as clusters and Holm's correction, \
-             and a realization is above each other one if all of its differences are significant."
+             and a realization is above each other one if all of its differences are significant. Where some realizations were above \
+             all others in every ranking, worths are the limit of the likelihood within such a level, and differences of two levels, which have no \
+             upper limit, were tested by the sign test over participants and have the exact lower limit of Clopper and Pearson (1934)."
                 .to_owned(),
         );
     }

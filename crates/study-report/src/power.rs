@@ -2,6 +2,7 @@
 //!
 //! Nothing is simulated here, and no test is decided.
 
+mod felt;
 mod figure;
 mod json;
 mod page;
@@ -100,7 +101,7 @@ impl Report {
     }
 
     /// What decides such a study: the requirement of its number of realizations. Of a part
-    /// of pairs or tracks, what is simulated.
+    /// that is no rating, what is simulated.
     pub fn ceiling_sentence(&self) -> String {
         let (plan, settings) = (&self.plan, &self.plan.settings);
         if settings.part.is_some() {
@@ -272,7 +273,7 @@ fn left_out(left: &LeftOut) -> Vec<String> {
     }
     if !left.never.is_empty() {
         found.push(format!(
-            "the power of magnitude estimation, MUSHRA, identification, similarity, ranking and adjustment is not computed: part {}",
+            "the power of magnitude estimation and MUSHRA is not computed: part {}",
             ids(&left.never)
         ));
     }

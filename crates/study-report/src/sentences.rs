@@ -41,6 +41,7 @@ pub(super) fn test_name(kind: TestKind) -> &'static str {
         TestKind::StressPermutation => "permutation test within participants",
         TestKind::RanksExact => "permutation test of the ranks within participants, exact",
         TestKind::RanksMonteCarlo => "permutation test of the ranks within participants",
+        TestKind::Sign => "sign test, exact",
         TestKind::Interaction => "interaction of participants and realizations",
         TestKind::SlopesDiffer => "slopes of the participants on VAF",
         TestKind::SlopeT => "t test",

@@ -120,6 +120,8 @@ pub struct Abilities {
     /// Its degrees of freedom.
     pub df: usize,
     model: Model,
+    /// Of each item: its ability as a linear function of the parameters.
+    vectors: Vec<Vec<f64>>,
     covariance: Covariance,
     clustered: Option<SymmetricMatrix>,
     /// The information of each participant.
@@ -148,10 +150,7 @@ pub struct Difference {
 impl Abilities {
     /// The ability of item `a` minus that of `b`.
     pub fn difference(&self, a: usize, b: usize) -> Difference {
-        let contrast = minus(
-            &ability(a, self.abilities.len(), self.covariance.0.size()),
-            &ability(b, self.abilities.len(), self.covariance.0.size()),
-        );
+        let contrast = minus(&self.vectors[a], &self.vectors[b]);
         let estimate = self.abilities[a] - self.abilities[b];
         Difference {
             effect: Effect::new(estimate, quadratic(&self.covariance.0, &contrast)),
@@ -169,17 +168,12 @@ impl Abilities {
     /// participant.
     pub fn clustered_se(&self, item: usize) -> Option<f64> {
         let sandwich = self.clustered.as_ref()?;
-        let unit = ability(item, self.abilities.len(), sandwich.size());
-        Some(quadratic(sandwich, &unit).max(0.0).sqrt())
+        Some(quadratic(sandwich, &self.vectors[item]).max(0.0).sqrt())
     }
 
     /// On how many participants an ability rests, as [`Difference::participants`].
     pub fn participants_of(&self, item: usize) -> f64 {
-        self.participants(&ability(
-            item,
-            self.abilities.len(),
-            self.covariance.0.size(),
-        ))
+        self.participants(&self.vectors[item])
     }
 
     /// The standard error of the order effect by the sandwich over participants; `None` without the effect, or with
@@ -223,7 +217,7 @@ impl Abilities {
 }
 
 /// Ability `i` as a linear function of the parameters: the last one is minus the sum.
-pub(crate) fn ability(i: usize, items: usize, size: usize) -> Vec<f64> {
+fn ability(i: usize, items: usize, size: usize) -> Vec<f64> {
     let mut vector = vec![0.0; size];
     if i + 1 < items {
         vector[i] = 1.0;
@@ -357,7 +351,23 @@ pub fn abilities(
         let (deviance, cells) = deviance(&rows, comparisons, model.link, at);
         (deviance, cells * (1 + usize::from(with_ties)))
     };
-    Ok(fitted(items, &rows, model, size, of_pairs)?.abilities)
+    let space = Space {
+        vectors: (0..items).map(|i| ability(i, items, size)).collect(),
+        abilities: items - 1,
+        size,
+    };
+    Ok(fitted(space, &rows, model, of_pairs)?.abilities)
+}
+
+/// How parameters become abilities.
+pub(crate) struct Space {
+    /// Of each item: its ability as a linear function of the parameters.
+    pub(crate) vectors: Vec<Vec<f64>>,
+    /// Number of parameters of abilities, which are the first ones. The order effect follows, if the model has it, and then
+    /// those of ties.
+    pub(crate) abilities: usize,
+    /// Number of all parameters.
+    pub(crate) size: usize,
 }
 
 /// What maximizes a likelihood.
@@ -368,16 +378,16 @@ pub(crate) struct Fitted {
     pub(crate) log_likelihood: f64,
 }
 
-/// The maximum of the likelihood of rows with `size` parameters: the abilities but the last, the order effect, if the
-/// model has it, and those of ties. `deviance` gives that of the rows at the parameters, and the number of free outcomes.
+/// The maximum of the likelihood of rows. `deviance` gives that of the rows at the parameters, and the number of free
+/// outcomes.
 pub(crate) fn fitted(
-    items: usize,
+    space: Space,
     rows: &[Row],
     model: Model,
-    size: usize,
     deviance: impl FnOnce(&[f64]) -> (f64, usize),
 ) -> Result<Fitted, NoAbilities> {
-    let order_place = items - 1;
+    let Space { vectors, size, .. } = space;
+    let order_place = space.abilities;
     let tie_place = order_place + usize::from(model.order);
     let evaluate = |at: &[f64]| {
         let mut sum = Evaluation::zero(size);
@@ -393,7 +403,6 @@ pub(crate) fn fitted(
     }
     let factor = Cholesky::definite(&found.information).ok_or(NoAbilities::NotFound)?;
     let covariance = inverse(&factor, size);
-    let vectors: Vec<Vec<f64>> = (0..items).map(|i| ability(i, items, size)).collect();
     let effect = |place: usize| Effect::new(found.at[place], covariance.get(place, place));
     let (deviance, free) = deviance(&found.at);
     let clusters = by_cluster(rows, model.link, &found.at);
@@ -411,6 +420,7 @@ pub(crate) fn fitted(
         clustered: sandwich(&clusters, &factor),
         information: (clusters.iter()).map(|own| own.hessian.negated()).collect(),
         covariance: Covariance(covariance),
+        vectors,
     };
     Ok(Fitted {
         abilities,

@@ -6,11 +6,15 @@
 //! A that are left the set S of those with the smallest rank is taken, with a probability in proportion to δ(|S|) times
 //! the geometric mean of the worths in S, over all sets of A whose size is 1 or was tied by somebody; δ(1) = 1. The logarithms of these
 //! weights are linear in those of worths and δ. Of two items this is the model of [`super::pairs`].
+//!
+//! The likelihood has no maximum where an item, or a group of them, is above all others in every ranking: it rises with the
+//! difference of their worths without an end. Its limit is the likelihood of the rankings within each such level, because the
+//! probability that a higher level is chosen first tends to 1. [`worths`] maximizes that; what is known of the difference of two
+//! levels is a lower bound ([`always_above`]).
 
 use super::friedman::{Friedman, friedman};
 use super::pairs::{
-    Abilities, Comparison, Effect, Fitted, Link, Model, NoAbilities, Row, ability, existence,
-    fitted,
+    Abilities, Comparison, Effect, Fitted, Link, Model, NoAbilities, Row, Space, existence, fitted,
 };
 use super::random::RandomSource;
 use super::rank::doubled_ranks;
@@ -30,21 +34,81 @@ const MOST_SETS: f64 = 5_000.0;
 /// Estimated worths.
 #[derive(Debug, Clone)]
 pub struct Worths {
-    /// Logarithms of the worths, which sum to zero, with their differences and errors.
+    /// Logarithms of the worths, which sum to zero within each level, with their differences and errors. Only those of items of one
+    /// level can be compared: the difference of two levels is infinite.
     pub abilities: Abilities,
+    /// The items in levels, the highest first: in every ranking every item is above those of lower levels. One level, if
+    /// the likelihood of all items has a maximum.
+    pub levels: Vec<Vec<usize>>,
     /// Of each number of items that somebody tied, ascending: ln δ.
     pub ties: Vec<(usize, Effect)>,
-    /// The logarithm of the likelihood.
+    /// The logarithm of the likelihood; of several levels that of its limit.
     pub log_likelihood: f64,
 }
 
 impl Worths {
-    /// The worths, which sum to one: the probability that an item has the first rank among all, if it is not tied there.
+    /// The worths, which sum to one: the probability that an item has the first rank among all, if it is not tied there; 0
+    /// below the highest level.
     pub fn first(&self) -> Vec<f64> {
-        let powers: Vec<f64> = self.abilities.abilities.iter().map(|a| a.exp()).collect();
+        let worth = |(item, log_worth): (usize, &f64)| match self.level(item) {
+            0 => log_worth.exp(),
+            _ => 0.0,
+        };
+        let powers: Vec<f64> = self
+            .abilities
+            .abilities
+            .iter()
+            .enumerate()
+            .map(worth)
+            .collect();
         let sum: f64 = powers.iter().sum();
         powers.iter().map(|power| power / sum).collect()
     }
+
+    /// The level of an item; 0 is the highest.
+    pub fn level(&self, item: usize) -> usize {
+        let level = self.levels.iter().position(|level| level.contains(&item));
+        level.unwrap_or(0)
+    }
+}
+
+/// What is known of the difference of two logarithms of worths without an end: one item was always above the other.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Beyond {
+    /// The lower end of the 95 % interval; the upper one is infinite.
+    pub at_least: f64,
+    /// Two-sided p of equal worths, by the sign test.
+    pub p: f64,
+}
+
+/// An item was above another in each of `times` independent rankings. By the model the probability of that is at most
+/// 1/(1 + e^(−d)) with the difference d of the logarithms of their worths, so that the lower end of its exact interval (Clopper &
+/// Pearson 1934) bounds d. If the worths are equal, it is at most a half, so that p = 2^(1 − `times`), and at most 1.
+///
+/// `most_tied` is the largest number of items that somebody tied, 1 without ties: among sets of k items those with only one of the two
+/// are chosen in proportion to e^(d/k) and 1, so that a bound below zero is `most_tied` times as low. `None` without rankings.
+///
+/// ```
+/// # use study_stats::ranking::always_above;
+/// let found = always_above(10, 1).unwrap();
+/// assert!((found.p - 1.0 / 512.0).abs() < 1e-15);
+/// // 0.025^(1/10) = .692, ln(.692/.308)
+/// assert!((found.at_least - 0.807_2).abs() < 1e-4);
+/// ```
+pub fn always_above(times: usize, most_tied: usize) -> Option<Beyond> {
+    if times == 0 {
+        return None;
+    }
+    let n = times as f64;
+    let low = 0.025f64.powf(1.0 / n);
+    let bound = (low / (1.0 - low)).ln();
+    Some(Beyond {
+        at_least: match bound < 0.0 {
+            true => bound * most_tied.max(1) as f64,
+            false => bound,
+        },
+        p: (2.0 * 0.5f64.powf(n)).min(1.0),
+    })
 }
 
 /// A set that is taken from those that are left.
@@ -53,10 +117,12 @@ struct Choice {
     left: Vec<usize>,
 }
 
-/// The choices of a ranking, but for that from a single item.
-fn choices(ranking: &Ranking) -> Vec<Choice> {
-    let ranked = ranking.ranks.iter().enumerate();
-    let mut left: Vec<(usize, f64)> = ranked.filter_map(|(i, r)| Some((i, (*r)?))).collect();
+/// The choices of a ranking among the items of a level, but for that from a single item.
+fn choices(ranking: &Ranking, level: &[usize]) -> Vec<Choice> {
+    let ranked = level
+        .iter()
+        .filter_map(|item| Some((*item, ranking.ranks.get(*item).copied().flatten()?)));
+    let mut left: Vec<(usize, f64)> = ranked.collect();
     left.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
     let mut all = Vec::new();
     while left.len() > 1 {
@@ -113,8 +179,27 @@ fn comparisons(ranking: &Ranking) -> Vec<Comparison> {
     all
 }
 
+/// The logarithm of the worth of each item as a linear function of `size` parameters: within a level the last one is minus the sum
+/// of the others.
+fn vectors(levels: &[Vec<usize>], items: usize, size: usize) -> Vec<Vec<f64>> {
+    let mut all = vec![vec![0.0; size]; items];
+    let mut first = 0;
+    for level in levels {
+        let Some((last, others)) = level.split_last() else {
+            continue;
+        };
+        for (place, item) in (first..).zip(others) {
+            all[*item][place] = 1.0;
+        }
+        all[*last][first..first + others.len()].fill(-1.0);
+        first += others.len();
+    }
+    all
+}
+
 /// Maximum-likelihood worths of items 0 … `items` − 1, with standard errors from the observed information. Differences
-/// have those of the sandwich over participants, too ([`Abilities::difference`]).
+/// have those of the sandwich over participants, too ([`Abilities::difference`]). Where some items are above all
+/// others in every ranking, they are those of each level ([`Worths::levels`]).
 ///
 /// ```
 /// # use study_stats::ranking::{Ranking, worths};
@@ -128,18 +213,20 @@ fn comparisons(ranking: &Ranking) -> Vec<Comparison> {
 /// ```
 ///
 /// # Errors
-/// [`NoAbilities`] if there is no maximum, or more than 5,000 sets of tied items could be taken in one choice.
+/// [`NoAbilities`] if there is no maximum within the levels, if the rankings do not say which of two levels is the higher
+/// one, or if more than 5,000 sets of tied items could be taken in one choice.
 pub fn worths(items: usize, rankings: &[Ranking]) -> Result<Worths, NoAbilities> {
     let pairs: Vec<Comparison> = rankings.iter().flat_map(comparisons).collect();
     let with_ties = pairs.iter().any(|pair| pair.tied > 0.0);
-    existence::check(items, &pairs, with_ties, false)?;
+    let levels = existence::levels(items, &pairs, with_ties)?;
     if pairs.iter().all(|pair| pair.tied > 0.0) {
         return Err(NoAbilities::AllTied);
     }
     let made: Vec<(usize, Choice)> = (rankings.iter())
-        .flat_map(|ranking| {
+        .flat_map(|ranking| levels.iter().map(move |level| (ranking, level)))
+        .flat_map(|(ranking, level)| {
             let cluster = ranking.cluster;
-            choices(ranking).into_iter().map(move |c| (cluster, c))
+            (choices(ranking, level).into_iter()).map(move |c| (cluster, c))
         })
         .collect();
     let mut tied: Vec<usize> = made.iter().map(|(_, choice)| choice.taken.len()).collect();
@@ -162,16 +249,21 @@ pub fn worths(items: usize, rankings: &[Ranking]) -> Result<Worths, NoAbilities>
     if !tied.is_empty() && (!any_single || tied.iter().any(always)) {
         return Err(NoAbilities::AlwaysTied);
     }
-    let size = items - 1 + tied.len();
+    let free = items - levels.len();
+    let space = Space {
+        vectors: vectors(&levels, items, free + tied.len()),
+        abilities: free,
+        size: free + tied.len(),
+    };
     let weight = |set: &[usize]| -> Vec<f64> {
-        let mut sum = vec![0.0; size];
+        let mut sum = vec![0.0; space.size];
         for item in set {
-            let own = ability(*item, items, size);
+            let own = &space.vectors[*item];
             sum.iter_mut().zip(own).for_each(|(s, own)| *s += own);
         }
         sum.iter_mut().for_each(|s| *s /= set.len() as f64);
         if let Ok(place) = tied.binary_search(&set.len()) {
-            sum[items - 1 + place] = 1.0;
+            sum[free + place] = 1.0;
         }
         sum
     };
@@ -205,9 +297,10 @@ pub fn worths(items: usize, rankings: &[Ranking]) -> Result<Worths, NoAbilities>
         let free: usize = rows.iter().map(|row| row.outcomes.len() - 1).sum();
         (-2.0 * taken.sum::<f64>(), free)
     };
-    let found: Fitted = fitted(items, &rows, model, size, of_choices)?;
+    let found: Fitted = fitted(space, &rows, model, of_choices)?;
     Ok(Worths {
         abilities: found.abilities,
+        levels,
         ties: tied.iter().copied().zip(found.ties).collect(),
         log_likelihood: found.log_likelihood,
     })

@@ -1,12 +1,13 @@
 //! Similarity: how different participants say that stimuli are, two at a time. Means and agreement,
 //! whether the order within a pair matters, a map in which distances stand for differences
-//! ([`scaling`]), its number of dimensions and whether it is better than chance ([`dimensions`]), and how it
-//! lies to known properties of the stimuli ([`fit`]).
+//! ([`scaling`]), its number of dimensions and whether it is better than chance ([`dimensions`]), how it
+//! lies to known properties of the stimuli ([`fit`]), and how participants weigh its dimensions ([`individual`]).
 //!
 //! A pair that was not rated has no dissimilarity; maps give it the weight 0.
 
 pub mod dimensions;
 pub mod fit;
+pub mod individual;
 pub mod scaling;
 
 use super::correlation::pearson;

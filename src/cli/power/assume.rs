@@ -26,7 +26,7 @@ pub(super) struct Assume {
     /// The smallest slope of interest
     #[arg(long, value_name = "B", value_parser = not_negative)]
     smallest: Option<f64>,
-    /// Mean rating
+    /// Mean rating; of adjustment the mean level, of identification the share of correct answers
     #[arg(long, value_name = "M", value_parser = finite, allow_hyphen_values = true)]
     mean: Option<f64>,
     /// Standard deviations: participant=, realization=, interaction=, residual=, slope=
@@ -48,7 +48,7 @@ pub(super) struct Assume {
     /// True mean of the hidden reference minus that of the best realization
     #[arg(long, value_name = "B", value_parser = finite, allow_hyphen_values = true)]
     reference: Option<f64>,
-    /// The part of pairs or tracks, or the search (default: the one with the primary question)
+    /// A part that is no rating, or the search (default: the one with the primary question)
     #[arg(long, value_name = "PART")]
     part: Option<PartId>,
     /// Effects of factors and their sizes in points: friction=0.5,friction:detent=0.3
@@ -85,8 +85,9 @@ pub(super) struct Assume {
     #[arg(long, value_name = "P,…", value_delimiter = ',', value_parser = target)]
     targets: Vec<f64>,
     /// verdict, pearson, permutation, crossed, friedman, clmm, equivalence, reference-equivalence; of
-    /// pairs preferred, preference-vaf; of tracks thresholds, told-apart; of factors effect; the first
-    /// one decides
+    /// pairs preferred, preference-vaf; of tracks thresholds, told-apart; of factors effect; of ranking
+    /// ranked-alike, ranked-first; of similarity map-follows; of adjustment adjusted; of identification
+    /// identified; the first one decides
     #[arg(long, value_name = "TEST,…", value_delimiter = ',', value_parser = test)]
     tests: Vec<Test>,
     /// Seed of the simulated studies (default: that of the study)
@@ -240,7 +241,8 @@ fn test(text: &str) -> Result<Test, FlagError> {
     let found = Test::ALL.into_iter().find(|t| t.as_str() == text);
     found.ok_or(FlagError(
         "write verdict, pearson, permutation, crossed, friedman, clmm, equivalence, \
-         reference-equivalence, preferred, preference-vaf, thresholds, told-apart or effect",
+         reference-equivalence, preferred, preference-vaf, thresholds, told-apart, effect, ranked-alike, \
+         ranked-first, map-follows, adjusted or identified",
     ))
 }
 

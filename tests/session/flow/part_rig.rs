@@ -5,7 +5,7 @@ use study_base::text::QuestionId;
 use study_plan::procedure::Recorded;
 use study_plan::protocol::file::parse;
 use study_plan::protocol::{Answer, Interval, Protocol, Stimuli};
-use study_session::outcome::Event;
+use study_session::outcome::{Author, Event, FormId};
 use study_session::session::{Ending, Input, Screen};
 
 const HEAD: &str = r#"
@@ -230,6 +230,11 @@ pub(super) fn step(rig: &mut Rig) {
 }
 
 pub(super) fn finish(rig: &mut Rig) {
+    finish_by(rig, step);
+}
+
+/// To the end, with the steps of a kind of part.
+pub(super) fn finish_by(rig: &mut Rig, step: fn(&mut Rig)) {
     while rig.ending.is_none() {
         step(rig);
     }
@@ -240,8 +245,13 @@ pub(super) fn done(rig: &Rig) -> usize {
     rig.count(|e| matches!(e, Event::TrialDone { .. }))
 }
 
-/// Steps until a screen after so many trials. A gap passes by itself.
+/// Steps until a screen after so many trials.
 pub(super) fn until(rig: &mut Rig, trials: usize, screen: fn(&Screen) -> bool) {
+    until_by(rig, step, trials, screen);
+}
+
+/// The same with the steps of a kind of part. A gap passes by itself: a step would also end the interval after it.
+fn until_by(rig: &mut Rig, step: fn(&mut Rig), trials: usize, screen: fn(&Screen) -> bool) {
     let there = |rig: &Rig| done(rig) >= trials && screen(&rig.view().screen);
     while !there(rig) {
         assert_eq!(rig.ending, None);
@@ -251,6 +261,45 @@ pub(super) fn until(rig: &mut Rig, trials: usize, screen: fn(&Screen) -> bool) {
         }
         step(rig);
     }
+}
+
+/// A kind of part in a session in which everything goes wrong once.
+pub(super) struct Course {
+    /// One step, with the answers of the part.
+    pub(super) step: fn(&mut Rig),
+    /// Trials before the fault, the mark, the correction and the interruption.
+    pub(super) after: [usize; 4],
+    /// The screen at which the fault and the interruption come.
+    pub(super) playing: fn(&Screen) -> bool,
+    /// What is corrected in the form of the newest trial.
+    pub(super) corrected: fn(FormId) -> (QuestionId, Answer),
+}
+
+/// A session with a fault in a later interval, a trial that is repeated, a correction and an interruption.
+pub(super) fn eventful(protocol: &Protocol, course: &Course) -> Rig {
+    let [fault, mark, correction, interruption] = course.after;
+    let mut rig = Rig::new(protocol.clone());
+    until_by(&mut rig, course.step, fault, course.playing);
+    rig.send(Input::DeviceFault("no bus".to_owned()));
+    until_by(&mut rig, course.step, mark, reference);
+    rig.send(Input::MarkBad {
+        reason: "noise".to_owned(),
+    });
+    until_by(&mut rig, course.step, correction, reference);
+    let form = rig.view().correctable[0].form;
+    let (question, answer) = (course.corrected)(form);
+    rig.send(Input::Correct {
+        form,
+        question,
+        answer,
+        reason: "a slip".to_owned(),
+        by: Author::Participant,
+    });
+    until_by(&mut rig, course.step, interruption, course.playing);
+    rig.send(Input::Quit);
+    let mut rig = Rig::back(protocol.clone(), rig.journal.clone(), 30.0);
+    finish_by(&mut rig, course.step);
+    rig
 }
 
 pub(super) fn recorded(rig: &Rig, protocol: &Protocol) -> Vec<Recorded> {

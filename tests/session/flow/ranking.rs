@@ -6,9 +6,9 @@ use serde_json::json;
 use study_base::text::{ModelId, PartId, QuestionId};
 use study_plan::protocol::ranking::question;
 use study_plan::protocol::{Answer, Protocol, Stimuli};
-use study_session::outcome::{Author, Event, FormId, fold};
+use study_session::outcome::{Event, FormId, fold};
 use study_session::page::reply::{Exchange, Outcome, Sent};
-use study_session::session::{Ending, Input, Screen};
+use study_session::session::{Input, Screen};
 
 /// The question about the rank of an interval, from 1.
 fn asked(interval: usize) -> QuestionId {
@@ -49,20 +49,6 @@ fn step(rig: &mut Rig) {
     };
     let trial = rig.session.history().open().unwrap().trial.trial;
     give(rig, interval, rank(trial, interval));
-}
-
-fn step_until(rig: &mut Rig, trials: usize, there: fn(&Screen) -> bool) {
-    while done(rig) < trials || !there(&rig.view().screen) {
-        assert_eq!(rig.ending, None);
-        step(rig);
-    }
-}
-
-fn finish_all(rig: &mut Rig) {
-    while rig.ending.is_none() {
-        step(rig);
-    }
-    assert_eq!(rig.ending, Some(Ending::Finished));
 }
 
 fn second_of_three(screen: &Screen) -> bool {
@@ -145,7 +131,7 @@ fn realizations_are_ranked_after_all_were_felt() {
     }
     names.dedup();
     assert_eq!(names, ["number 1", "number 2", "number 3"]);
-    finish_all(&mut rig);
+    finish_by(&mut rig, step);
     let rows = ranked(&rig, &protocol);
     assert_eq!(rows, planned(&rig));
     assert_eq!((rows.len(), rows.iter().filter(|r| r.3).count()), (5, 1));
@@ -181,7 +167,7 @@ fn a_rank_is_given_once_unless_there_are_ties() {
     assert_eq!(page(&rig), Some(2));
     give(&mut rig, 2, 2);
     give(&mut rig, 3, 3);
-    finish_all(&mut rig);
+    finish_by(&mut rig, step);
     let rows = rig
         .session
         .history()
@@ -225,39 +211,21 @@ fn a_page_is_told_why_a_rank_is_refused() {
     assert_eq!(page(&rig), Some(3));
 }
 
-/// A session with a fault in a second interval, a trial that is repeated, a correction and an interruption.
-fn eventful(protocol: &Protocol) -> Rig {
-    let mut rig = Rig::new(protocol.clone());
-    step_until(&mut rig, 1, second_of_three);
-    rig.send(Input::DeviceFault("no bus".to_owned()));
-    step_until(&mut rig, 2, reference);
-    rig.send(Input::MarkBad {
-        reason: "noise".to_owned(),
-    });
-    step_until(&mut rig, 3, reference);
-    let newest = rig.view().correctable[0].clone();
-    let FormId::Trial { trial, .. } = newest.form else {
-        panic!("{:?}", newest.form)
-    };
-    rig.send(Input::Correct {
-        form: newest.form,
-        question: asked(1),
-        answer: Answer::Rating(rank(trial, 2)),
-        reason: "a slip".to_owned(),
-        by: Author::Participant,
-    });
-    step_until(&mut rig, 4, second_of_three);
-    rig.send(Input::Quit);
-    let mut rig = Rig::back(protocol.clone(), rig.journal.clone(), 30.0);
-    finish_all(&mut rig);
-    rig
-}
+const COURSE: Course = Course {
+    step,
+    after: [1, 2, 3, 4],
+    playing: second_of_three,
+    corrected: |form| match form {
+        FormId::Trial { trial, .. } => (asked(1), Answer::Rating(rank(trial, 2))),
+        other => panic!("{other:?}"),
+    },
+};
 
 /// The program ends after any event: every set is ranked once, in its planned order, and no rank is lost.
 #[test]
 fn a_session_is_picked_up_after_every_single_event() {
     let protocol = ranking("repetitions = 5\npractice = 1");
-    let whole = eventful(&protocol);
+    let whole = eventful(&protocol, &COURSE);
     let failed = whole.count(|e| matches!(e, Event::AttemptFailed { .. }));
     assert_eq!(failed, 3);
     assert_eq!(whole.count(|e| matches!(e, Event::Corrected { .. })), 1);
@@ -265,7 +233,7 @@ fn a_session_is_picked_up_after_every_single_event() {
     for k in 1..whole.journal.len() {
         let journal = &whole.journal[..k];
         let mut rig = Rig::back(protocol.clone(), journal.to_vec(), 30.0);
-        finish_all(&mut rig);
+        finish_by(&mut rig, step);
         assert_eq!(rig.journal[..k], *journal, "append only");
         assert_eq!(ranked(&rig, &protocol), planned(&rig), "after {k} events");
     }

@@ -4,8 +4,8 @@ use super::part_rig::*;
 use super::rig::Rig;
 use study_base::text::{ModelId, QuestionId};
 use study_plan::protocol::{Answer, Protocol, Stimuli};
-use study_session::outcome::{Author, Event, fold};
-use study_session::session::{Ending, Input, Screen};
+use study_session::outcome::{Event, fold};
+use study_session::session::{Input, Screen};
 
 fn asked() -> QuestionId {
     QuestionId::new("apart").unwrap()
@@ -21,26 +21,6 @@ fn rate(rig: &mut Rig) {
     let trial = rig.session.history().open().unwrap().trial.trial;
     let rating = Answer::Number(f64::from(trial));
     rig.send(Input::Answer(vec![(asked(), rating)]));
-}
-
-/// Steps until a screen after so many trials. A gap passes by itself: a step would also end the interval after it.
-fn rate_until(rig: &mut Rig, trials: usize, screen: fn(&Screen) -> bool) {
-    while done(rig) < trials || !screen(&rig.view().screen) {
-        assert_eq!(rig.ending, None);
-        match rig.view().screen {
-            Screen::Loading { .. } => {
-                rig.wait(1.0);
-            }
-            _ => rate(rig),
-        }
-    }
-}
-
-fn rate_all(rig: &mut Rig) {
-    while rig.ending.is_none() {
-        rate(rig);
-    }
-    assert_eq!(rig.ending, Some(Ending::Finished));
 }
 
 /// Number of the trial, what was felt first and second, the rating, and whether it is practice.
@@ -88,7 +68,7 @@ fn planned(rig: &Rig) -> Vec<Rated> {
 fn differences_are_rated_after_two_intervals() {
     let protocol = similarity("identical = true\npractice = 2");
     let mut rig = Rig::new(protocol.clone());
-    rate_all(&mut rig);
+    finish_by(&mut rig, rate);
     let rows = rated(&rig, &protocol);
     assert_eq!(rows, planned(&rig));
     assert_eq!(rows.len(), 2 + 2 * (3 + 3));
@@ -97,36 +77,18 @@ fn differences_are_rated_after_two_intervals() {
     assert_eq!(identical.count(), 2 * 3);
 }
 
-/// A session with a fault in a second interval, a trial that is repeated, a correction and an interruption.
-fn eventful(protocol: &Protocol) -> Rig {
-    let mut rig = Rig::new(protocol.clone());
-    rate_until(&mut rig, 3, second);
-    rig.send(Input::DeviceFault("no bus".to_owned()));
-    rate_until(&mut rig, 5, reference);
-    rig.send(Input::MarkBad {
-        reason: "noise".to_owned(),
-    });
-    rate_until(&mut rig, 7, reference);
-    let newest = rig.view().correctable[0].clone();
-    rig.send(Input::Correct {
-        form: newest.form,
-        question: asked(),
-        answer: Answer::Number(99.0),
-        reason: "a slip".to_owned(),
-        by: Author::Participant,
-    });
-    rate_until(&mut rig, 9, second);
-    rig.send(Input::Quit);
-    let mut rig = Rig::back(protocol.clone(), rig.journal.clone(), 30.0);
-    rate_all(&mut rig);
-    rig
-}
+const COURSE: Course = Course {
+    step: rate,
+    after: [3, 5, 7, 9],
+    playing: second,
+    corrected: |_| (asked(), Answer::Number(99.0)),
+};
 
 /// The program ends after any event: every pair is rated once, in its planned order of intervals, and no rating is lost.
 #[test]
 fn a_session_is_picked_up_after_every_single_event() {
     let protocol = similarity("identical = true\npractice = 2");
-    let whole = eventful(&protocol);
+    let whole = eventful(&protocol, &COURSE);
     let failed = whole.count(|e| matches!(e, Event::AttemptFailed { .. }));
     assert_eq!(failed, 3);
     let corrected = |row: &&Rated| row.2 == Some(99.0);
@@ -135,7 +97,7 @@ fn a_session_is_picked_up_after_every_single_event() {
     for k in 1..whole.journal.len() {
         let journal = &whole.journal[..k];
         let mut rig = Rig::back(protocol.clone(), journal.to_vec(), 30.0);
-        rate_all(&mut rig);
+        finish_by(&mut rig, rate);
         assert_eq!(rig.journal[..k], *journal, "append only");
         let corrected_before = (journal.iter()).any(|e| matches!(e.event, Event::Corrected { .. }));
         let found = rated(&rig, &protocol);

@@ -112,6 +112,8 @@ pub enum TestKind {
     RanksExact,
     /// Kendall's W over random orders of each participant's ranks.
     RanksMonteCarlo,
+    /// Sign test of which of two is above the other, over participants.
+    Sign,
     /// F of the interaction of participants and realizations, against the variance within
     /// cells.
     Interaction,
@@ -163,6 +165,7 @@ impl TestKind {
             Self::StressPermutation => "stress-permutation",
             Self::RanksExact => "ranks-exact",
             Self::RanksMonteCarlo => "ranks-monte-carlo",
+            Self::Sign => "sign",
             Self::Interaction => "interaction",
             Self::SlopesDiffer => "slopes-differ",
             Self::SlopeT => "slope-t",

@@ -844,7 +844,8 @@ for (part in kept("similarity")) {
 #' Ranks are those of one ranking, ties in the middle; the mean ranks of each participant have Kendall's W. Worths are those of
 #' the model of Plackett and Luce with ties (Turner and others 2020), as a log-linear model: each ranking is a sequence of choices of
 #' the set with the smallest rank from those that are left, and the logarithm of a set's weight is the mean of those of its
-#' worths and, of a tie, a constant for its size. The logarithms of the worths sum to zero.
+#' worths and, of a tie, a constant for its size. Where some items are above all others in every ranking, the likelihood has
+#' a limit in place of a maximum, that of the choices within each such level. The logarithms of the worths of a level sum to zero.
 
 for (part in kept("ranking")) {
   put <- of_part(part)
@@ -907,13 +908,45 @@ for (part in kept("ranking")) {
       put(paste0(id, "tied"), mean(ranks[both, i] == ranks[both, j]))
     }
   }
+  # Whether an item was above another or had the same rank, directly or by way of others.
+  above <- diag(length(items)) > 0
+  for (i in seq_along(items)) for (j in seq_along(items)) {
+    above[i, j] <- above[i, j] || any(ranks[, i] <= ranks[, j], na.rm = TRUE)
+  }
+  for (via in seq_along(items)) above <- above | outer(above[, via], above[via, ])
+  if (!all(above | t(above))) {
+    cat("part ", part, ": the worths have no estimate\n", sep = "")
+    next
+  }
+  level <- match(rowSums(above), sort(unique(rowSums(above)), decreasing = TRUE))
+  alone <- table(level)[level] == 1
   choices <- unlist(lapply(seq_len(nrow(ranks)), function(row) {
     own <- ranks[row, ]
-    places <- sort(unique(own[!is.na(own)]))
-    lapply(places, function(place) list(taken = which(own == place), left = which(own >= place)))
+    unlist(lapply(seq_len(max(level)), function(one) {
+      inside <- level == one & !is.na(own)
+      places <- sort(unique(own[inside]))
+      lapply(places, function(place) list(taken = which(inside & own == place), left = which(inside & own >= place)))
+    }), recursive = FALSE)
   }), recursive = FALSE)
   choices <- Filter(function(choice) length(choice$left) > 1, choices)
+  if (length(choices) == 0) {
+    # Each item is a level.
+    for (i in seq_along(items)) {
+      put(paste0("ranking/realization/", items[i], "/level"), level[i])
+      put(paste0("ranking/realization/", items[i], "/worth"), (level[i] == 1) + 0)
+    }
+    next
+  }
   sizes <- setdiff(sort(unique(lengths(lapply(choices, function(choice) choice$taken)))), 1)
+  # The logarithms of the worths from the parameters: within a level the last one is minus the sum of the others.
+  contrast <- do.call(cbind, lapply(seq_len(max(level)), function(one) {
+    inside <- which(level == one)
+    sapply(inside[-length(inside)], function(item) {
+      own <- replace(numeric(length(items)), item, 1)
+      replace(own, inside[length(inside)], -1)
+    })
+  })[lengths(split(level, level)) > 1])
+  free <- ncol(contrast)
   outcomes <- do.call(rbind, lapply(seq_along(choices), function(at) {
     left <- choices[[at]]$left
     sets <- unlist(lapply(intersect(c(1, sizes), seq_along(left)), function(size) {
@@ -921,14 +954,14 @@ for (part in kept("ranking")) {
     }), recursive = FALSE)
     weights <- t(sapply(sets, function(set) {
       own <- tabulate(set, length(items)) / length(set)
-      c(own[-length(items)] - own[length(items)], (sizes == length(set)) + 0)
+      c(own %*% contrast, (sizes == length(set)) + 0)
     }))
     # With one column the sets are the columns.
-    if (ncol(weights) != length(items) - 1 + length(sizes)) weights <- t(weights)
+    if (ncol(weights) != free + length(sizes)) weights <- t(weights)
     taken <- sapply(sets, function(set) setequal(set, choices[[at]]$taken))
     cbind(weights, taken + 0, at)
   }))
-  own <- seq_len(length(items) - 1 + length(sizes))
+  own <- seq_len(free + length(sizes))
   stratum <- model.matrix(~ factor(outcomes[, ncol(outcomes)]) - 1)
   fit <- tryCatch(
     glm.fit(cbind(outcomes[, own, drop = FALSE], stratum), outcomes[, length(own) + 1], family = poisson(),
@@ -941,23 +974,26 @@ for (part in kept("ranking")) {
   covariance <- chol2inv(fit$qr$qr[seq_along(fit$coefficients), , drop = FALSE])
   covariance <- covariance[order(fit$qr$pivot), order(fit$qr$pivot)][own, own, drop = FALSE]
   estimate <- fit$coefficients[own]
-  contrast <- cbind(rbind(diag(length(items) - 1), -1), matrix(0, length(items), length(sizes)))
+  contrast <- cbind(contrast, matrix(0, length(items), length(sizes)))
   worth <- as.vector(contrast %*% estimate)
   spread <- contrast %*% covariance %*% t(contrast)
-  print(data.frame(item = items, log_worth = worth, se = sqrt(diag(spread))))
+  print(data.frame(item = items, level = level, log_worth = worth, se = sqrt(diag(spread))))
+  power <- ifelse(level == 1, exp(worth), 0)
   for (i in seq_along(items)) {
     id <- paste0("ranking/realization/", items[i], "/")
-    put(paste0(id, "worth"), exp(worth[i]) / sum(exp(worth)))
+    if (max(level) > 1) put(paste0(id, "level"), level[i])
+    put(paste0(id, "worth"), power[i] / sum(power))
+    if (alone[i]) next
     put(paste0(id, "log_worth"), worth[i])
     put(paste0(id, "log_worth_se"), sqrt(spread[i, i]))
-    for (j in seq_along(items)) if (j > i) {
+    for (j in seq_along(items)) if (j > i && level[i] == level[j]) {
       group <- paste0("ranking/pair/", items[i], "|", items[j])
       put(paste0(group, "/difference"), worth[i] - worth[j])
       put(paste0(group, "/se"), sqrt(spread[i, i] + spread[j, j] - 2 * spread[i, j]))
     }
   }
   for (size in seq_along(sizes)) {
-    at <- length(items) - 1 + size
+    at <- free + size
     put(paste0("ranking/ties/", sizes[size], "/log_delta"), estimate[[at]])
     put(paste0("ranking/ties/", sizes[size], "/log_delta_se"), sqrt(covariance[at, at]))
   }

@@ -153,7 +153,12 @@ impl<'a> Judge<'a> {
                 | Test::PreferenceVaf
                 | Test::Thresholds
                 | Test::ToldApart
-                | Test::Effect => None,
+                | Test::Effect
+                | Test::RankedAlike
+                | Test::RankedFirst
+                | Test::MapFollows
+                | Test::Adjusted
+                | Test::Identified => None,
             };
             tests.push(decided.ok_or(UNDEFINED));
         }
@@ -234,7 +239,12 @@ impl<'a> Judge<'a> {
                 | Test::PreferenceVaf
                 | Test::Thresholds
                 | Test::ToldApart
-                | Test::Effect => (None, UNDEFINED),
+                | Test::Effect
+                | Test::RankedAlike
+                | Test::RankedFirst
+                | Test::MapFollows
+                | Test::Adjusted
+                | Test::Identified => (None, UNDEFINED),
             };
             tests.push(decided.ok_or(why));
         }

@@ -1,8 +1,11 @@
-//! From a part of pairs or tracks to settings: defaults, then `[power]`, then flags.
+//! From a part that is no rating to settings: defaults, then `[power]`, then flags.
 
 use super::factors_plan;
+use super::felt::FeltWorld;
+use super::felt_plan::of_felt;
 use super::parts::{PairsWorld, PartWorld};
 use super::plan::{Defaults, LeftOut, numbers, slope, targets, tests};
+use super::planned::{NOTHING, Planned, neat};
 use super::tracks::{TrackWorld, TracksWorld, Truth};
 use super::{Assumptions, Cell, Overrides, Pace, Plan, PlanError, Scale, Settings, Test, Vaf};
 use crate::analyze::ALPHA;
@@ -29,6 +32,9 @@ const STUDIES_OF_TRACKS: u64 = 200;
 /// Of tracks of one condition, where there is no test: the mean width of an interval is known from
 /// few.
 const STUDIES_WITHOUT_TEST: u64 = 40;
+const STUDIES_OF_FELT: u64 = 1000;
+/// Of similarity, each of which takes many maps.
+const STUDIES_OF_MAPS: u64 = 200;
 
 /// The part that is meant: the one of the flag, or the one that asks the primary question;
 /// `None` if that is a part of ratings.
@@ -62,6 +68,10 @@ impl Plan {
         let meant = match part.map(|part| &part.task) {
             Some(Task::Pairs(_)) => Meant::Pairs,
             Some(Task::Discrimination { .. }) => Meant::Tracks,
+            Some(Task::Ranking(_)) => Meant::Ranking,
+            Some(Task::Similarity(_)) => Meant::Similarity,
+            Some(Task::Adjustment(_)) => Meant::Adjustment,
+            Some(Task::Identification(_)) => Meant::Identification,
             _ if crossing.is_some() => Meant::Effects,
             _ => Meant::Ratings,
         };
@@ -83,6 +93,10 @@ enum Meant {
     Effects,
     Pairs,
     Tracks,
+    Ranking,
+    Similarity,
+    Adjustment,
+    Identification,
 }
 
 impl Meant {
@@ -92,6 +106,10 @@ impl Meant {
             Self::Effects => "effects of factors",
             Self::Pairs => "pairs",
             Self::Tracks => "tracks",
+            Self::Ranking => "rankings",
+            Self::Similarity => "ratings of difference",
+            Self::Adjustment => "adjustment",
+            Self::Identification => "identification",
         }
     }
 }
@@ -102,21 +120,42 @@ fn unused(over: &PowerPlan, meant: Meant) -> Option<&'static str> {
     let ratings = is(&[Meant::Ratings]);
     let numbers = is(&[Meant::Ratings, Meant::Effects]);
     let (pairs, tracks) = (is(&[Meant::Pairs]), is(&[Meant::Tracks]));
+    let (ranking, similarity) = (is(&[Meant::Ranking]), is(&[Meant::Similarity]));
+    let adjustment = is(&[Meant::Adjustment]);
+    // What has a mean of its own.
+    let centered = is(&[Meant::Adjustment, Meant::Identification]);
     let sd = &over.sd;
     let flags = [
-        ("slope", over.slope.is_some(), ratings || pairs),
-        ("rho", over.rho.is_some(), ratings || pairs),
+        (
+            "slope",
+            over.slope.is_some(),
+            ratings || pairs || ranking || similarity,
+        ),
+        ("rho", over.rho.is_some(), ratings || pairs || ranking),
         ("smallest", over.smallest.is_some(), ratings),
-        ("mean", over.mean.is_some(), numbers),
+        ("mean", over.mean.is_some(), numbers || centered),
         ("scale", over.scale.is_some(), numbers),
         ("vaf", over.vaf.is_some(), ratings),
         ("reference", over.reference.is_some(), ratings),
         ("effect", !over.effects.is_empty(), is(&[Meant::Effects])),
         ("ties", over.ties.is_some(), pairs),
         ("track", over.track != PowerTrack::default(), tracks),
-        ("sd participant", sd.participant.is_some(), !pairs),
-        ("sd realization", sd.realization.is_some(), !tracks),
-        ("sd residual", sd.residual.is_some(), numbers),
+        (
+            "sd participant",
+            sd.participant.is_some(),
+            !(pairs || ranking || similarity),
+        ),
+        (
+            "sd realization",
+            sd.realization.is_some(),
+            !(tracks || adjustment),
+        ),
+        ("sd interaction", sd.interaction.is_some(), !centered),
+        (
+            "sd residual",
+            sd.residual.is_some(),
+            numbers || ranking || similarity || adjustment,
+        ),
         ("sd slope", sd.slope.is_some(), ratings),
     ];
     let found = flags.into_iter().find(|(_, given, used)| *given && !used);
@@ -136,14 +175,10 @@ fn plan(protocol: &Protocol, flags: &Overrides, part: &Part) -> Result<Plan, Pla
         Task::Discrimination { tracks } => {
             of_tracks(protocol, (&stated, flags.pooled), tracks, &mut defaults)?
         }
-        Task::Rating(_)
-        | Task::Magnitude(_)
-        | Task::Mushra(_)
-        | Task::Identification(_)
-        | Task::Search(_)
-        | Task::Similarity(_)
-        | Task::Ranking(_)
-        | Task::Adjustment(_) => {
+        Task::Identification(_) | Task::Similarity(_) | Task::Ranking(_) | Task::Adjustment(_) => {
+            of_felt(protocol, &stated, part, &mut defaults)?
+        }
+        Task::Rating(_) | Task::Magnitude(_) | Task::Mushra(_) | Task::Search(_) => {
             return Err(PlanError::NoPower(part.id.clone()));
         }
     };
@@ -184,6 +219,8 @@ fn plan(protocol: &Protocol, flags: &Overrides, part: &Part) -> Result<Plan, Pla
     }
     let studies = match world {
         PartWorld::Factors(_) | PartWorld::Pairs(_) => STUDIES_OF_PAIRS,
+        PartWorld::Felt(FeltWorld::Similarity { .. }) => STUDIES_OF_MAPS,
+        PartWorld::Felt(_) => STUDIES_OF_FELT,
         PartWorld::Tracks(_) if tests.is_empty() => STUDIES_WITHOUT_TEST,
         PartWorld::Tracks(_) => STUDIES_OF_TRACKS,
     };
@@ -230,6 +267,7 @@ fn of_part(
 ) -> Result<Vec<Test>, PlanError> {
     let possible = match world {
         PartWorld::Factors(_) => vec![Test::Effect],
+        PartWorld::Felt(felt) => felt.tests(),
         PartWorld::Pairs(pairs) => {
             let mut known: Vec<f64> = pairs.vaf.iter().copied().flatten().collect();
             known.sort_by(f64::total_cmp);
@@ -260,8 +298,6 @@ fn of_part(
         None => Ok(asked),
     }
 }
-
-type Planned = (PartWorld, Spread, f64, Cell, Vec<usize>);
 
 fn of_pairs(
     protocol: &Protocol,
@@ -302,24 +338,6 @@ fn of_pairs(
     };
     let repetitions = vec![own.repetitions];
     Ok((PartWorld::Pairs(world), spread, slope, own, repetitions))
-}
-
-const NOTHING: Spread = Spread {
-    subject: 0.0,
-    realization: 0.0,
-    interaction: 0.0,
-    residual: 0.0,
-    slope: 0.0,
-};
-
-/// Two digits of a default, which people read.
-fn neat(x: f64) -> f64 {
-    let unit = 10f64.powi(x.abs().log10().floor() as i32 - 1);
-    if x == 0.0 {
-        0.0
-    } else {
-        (x / unit).round() / (1.0 / unit)
-    }
 }
 
 fn of_tracks(
@@ -437,16 +455,26 @@ fn of_tracks(
 }
 
 impl Pace {
-    /// Of a study whose part of pairs has other numbers of repetitions.
+    /// Of a study whose part has other numbers of repetitions.
     fn of_part(protocol: &Protocol, part: &Part, realizations: usize) -> Self {
         let minutes = check::minutes(protocol);
         let mut longer = protocol.clone();
         let mut repetitions = 0.0;
         for other in longer.parts.iter_mut().filter(|p| p.id == part.id) {
-            if let Task::Pairs(own) = &mut other.task {
-                repetitions = f64::from(own.repetitions);
-                own.repetitions += 1;
-            }
+            let repeated = match &mut other.task {
+                Task::Pairs(own) => &mut own.repetitions,
+                Task::Ranking(own) => &mut own.repetitions,
+                Task::Similarity(own) => &mut own.repetitions,
+                Task::Adjustment(own) => &mut own.repetitions,
+                Task::Identification(own) => &mut own.presentations.repetitions,
+                Task::Rating(_)
+                | Task::Magnitude(_)
+                | Task::Mushra(_)
+                | Task::Discrimination { .. }
+                | Task::Search(_) => continue,
+            };
+            repetitions = f64::from(*repeated);
+            *repeated += 1;
         }
         let one = check::minutes(&longer) - minutes;
         Self {

@@ -1,5 +1,5 @@
-//! Parts of pairs, of tracks (`tracks`) and of factors (`factors`): answers are drawn one by one, and
-//! decided by the analysis of such parts.
+//! Parts of pairs, of tracks (`tracks`), of factors (`factors`) and of what is ranked, compared, set or labeled (`felt`): answers are
+//! drawn one by one, and decided by the analysis of such parts.
 //!
 //! **Pairs.** The ability of a realization is slope·x + scatter + what a participant adds, in
 //! logits; P(first preferred) follows from the difference (Bradley and Terry), with ties by
@@ -8,6 +8,7 @@
 use super::decide::{Outcome, is_lost, verdict};
 use super::draw::standardized;
 use super::factors::{FactorsJudge, FactorsWorld};
+use super::felt::{FeltJudge, FeltWorld};
 use super::tracks::{TracksJudge, TracksWorld};
 use super::{Cell, STREAM, Settings, Test};
 use crate::analyze::psychophysics::{Choice, Preference, decided};
@@ -23,6 +24,8 @@ pub enum PartWorld {
     Pairs(PairsWorld),
     /// Tracks of levels, or of two realizations.
     Tracks(TracksWorld),
+    /// Ranking, similarity, adjustment or identification.
+    Felt(FeltWorld),
 }
 
 /// Comparisons of realizations.
@@ -58,6 +61,7 @@ enum Prepared<'a> {
         names: Vec<String>,
     },
     Tracks(TracksJudge<'a>),
+    Felt(FeltJudge<'a>),
 }
 
 impl<'a> PartJudge<'a> {
@@ -81,6 +85,7 @@ impl<'a> PartJudge<'a> {
                 }
             }
             PartWorld::Tracks(world) => Prepared::Tracks(TracksJudge::new(settings, world, cell)),
+            PartWorld::Felt(world) => Prepared::Felt(FeltJudge::new(settings, world, cell)),
         };
         Self {
             settings,
@@ -106,6 +111,7 @@ impl<'a> PartJudge<'a> {
                 self.of_choices(world, &chosen, permutation.as_ref(), stream("permutations"))
             }
             Prepared::Tracks(judge) => judge.decide(k),
+            Prepared::Felt(judge) => judge.decide(k),
         }
     }
 

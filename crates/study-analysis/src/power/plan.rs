@@ -39,16 +39,16 @@ pub enum PlanError {
     /// A number that the factors fix.
     #[error("the number of realizations is that of the factors' levels")]
     FixedByFactors,
-    /// No number and no part of pairs or tracks.
-    #[error("`{0}` is no rating, and no part of pairs or tracks asks it")]
+    /// No number, and no part that is simulated.
+    #[error("`{0}` is no rating, and no part that can be simulated asks it")]
     NoRatings(QuestionId),
     /// No such part.
     #[error("there is no part `{0}`")]
     NoPart(PartId),
     /// Another kind of part.
     #[error(
-        "the power of part `{0}` is not computed: ratings, pairs and tracks are simulated, but not \
-         magnitude estimation, MUSHRA, identification, similarity, ranking and adjustment; a search has no test"
+        "the power of part `{0}` is not computed: ratings, pairs, tracks, ranking, similarity, adjustment and identification are \
+         simulated, but not magnitude estimation and MUSHRA"
     )]
     NoPower(PartId),
     /// Assumptions that a search does not have.
@@ -60,6 +60,18 @@ pub enum PlanError {
     /// More answers than a search can have.
     #[error("a search has at most {MAX_TRIALS} trials, not {0}")]
     TooManyAnswers(u32),
+    /// Nothing that a map could follow.
+    #[error(
+        "the map of part `{0}` can follow no property: it takes 4 to 30 realizations that all have a level of a family or a VAF, \
+         not all the same"
+    )]
+    NoProperty(PartId),
+    /// Settings without a level that they could differ from.
+    #[error("part `{0}` has no level as its standard, so that settings are compared with nothing")]
+    NoStandard(PartId),
+    /// A share of correct answers that is none.
+    #[error("the mean of identification is a share of correct answers: {0} is not between 0 and 1")]
+    NoShare(f64),
     /// A pilot of ratings for another part.
     #[error("a pilot has estimates for ratings, not for part `{0}`: state its assumptions")]
     PilotOfPart(PartId),
@@ -70,7 +82,7 @@ pub enum PlanError {
     #[error("`{0}` is no test of part `{1}`")]
     NotOfPart(&'static str, PartId),
     /// A test of a part for ratings.
-    #[error("`{0}` is no test of the relation with VAF, but of pairs, tracks or factors")]
+    #[error("`{0}` is no test of the relation with VAF, but of another part or of factors")]
     NotOfRatings(&'static str),
     /// A flag that changes nothing.
     #[error("`--{0}` does not apply to {1}: leave it out")]
@@ -159,7 +171,7 @@ pub struct Overrides {
 pub struct Plan {
     /// How.
     pub settings: Settings,
-    /// The part of pairs or tracks; `None`: ratings.
+    /// The part that is simulated; `None`: ratings.
     pub part: Option<PartId>,
     /// The protocol's own design.
     pub own: Cell,
@@ -190,7 +202,7 @@ pub struct LeftOut {
     pub sessions: bool,
     /// Other parts that can be simulated.
     pub parts: Vec<PartId>,
-    /// Parts of magnitude estimation, MUSHRA, identification, similarity, ranking and adjustment.
+    /// Parts of magnitude estimation and MUSHRA.
     pub never: Vec<PartId>,
 }
 
@@ -207,17 +219,14 @@ impl LeftOut {
             .filter(|part| Some(&part.id) != simulated)
         {
             match part.task {
-                Task::Pairs(_) | Task::Discrimination { .. } | Task::Search(_) => {
-                    found.parts.push(part.id.clone());
-                }
-                Task::Magnitude(_)
-                | Task::Mushra(_)
+                Task::Pairs(_)
+                | Task::Discrimination { .. }
+                | Task::Search(_)
                 | Task::Identification(_)
                 | Task::Similarity(_)
                 | Task::Ranking(_)
-                | Task::Adjustment(_) => {
-                    found.never.push(part.id.clone());
-                }
+                | Task::Adjustment(_) => found.parts.push(part.id.clone()),
+                Task::Magnitude(_) | Task::Mushra(_) => found.never.push(part.id.clone()),
                 Task::Rating(_) => {}
             }
         }

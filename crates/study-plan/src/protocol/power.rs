@@ -34,12 +34,22 @@ words! {
         ToldApart = "told-apart",
         /// Of a factorial study: each effect that is tested, with Holm's correction over all.
         Effect = "effect",
+        /// Of a part of ranking: participants rank the realizations alike.
+        RankedAlike = "ranked-alike",
+        /// Of a part of ranking: one realization is above each other one.
+        RankedFirst = "ranked-first",
+        /// Of a part of similarity: the map follows the level of a family, or VAF.
+        MapFollows = "map-follows",
+        /// Of a part of adjustment: settings differ from the standard.
+        Adjusted = "adjusted",
+        /// Of a part of identification: the right label is given more often than by guessing.
+        Identified = "identified",
     }
 }
 
 impl PowerTest {
     /// All of them.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 18] = [
         Self::Verdict,
         Self::Pearson,
         Self::Permutation,
@@ -53,6 +63,11 @@ impl PowerTest {
         Self::Thresholds,
         Self::ToldApart,
         Self::Effect,
+        Self::RankedAlike,
+        Self::RankedFirst,
+        Self::MapFollows,
+        Self::Adjusted,
+        Self::Identified,
     ];
 
     /// Whether it is one of ratings, and not of another part.
@@ -64,6 +79,11 @@ impl PowerTest {
                 | Self::Thresholds
                 | Self::ToldApart
                 | Self::Effect
+                | Self::RankedAlike
+                | Self::RankedFirst
+                | Self::MapFollows
+                | Self::Adjusted
+                | Self::Identified
         )
     }
 }
@@ -157,7 +177,7 @@ pub struct PowerPlan {
     pub rho: Option<f64>,
     /// The smallest slope of interest.
     pub smallest: Option<f64>,
-    /// Mean rating.
+    /// Mean rating; of adjustment the mean level that is set, of identification the share of correct answers.
     pub mean: Option<f64>,
     /// Standard deviations.
     pub sd: PowerSpread,

@@ -9,7 +9,7 @@ use super::functions::{
 use super::identification::confusions;
 use super::rankings::worths;
 use super::searches::search_map;
-use super::similarity::map;
+use super::similarity::{map, weights};
 use super::thresholds::{by_conditions, by_participant};
 use super::weber::webers_law;
 use super::{Canvas, Drawn, MAX_DRAWN, cell, drawn, head};
@@ -40,6 +40,7 @@ pub fn of_part(number: usize, part: &PartAnalysis) -> Vec<Drawn> {
         magnitudes(&name("magnitudes"), part),
         confusions(&name("confusions"), part),
         map(&name("map"), part),
+        weights(&name("weights"), part),
         worths(&name("worths"), part),
         settings(&name("settings"), part),
         search_map(&name("search"), part),

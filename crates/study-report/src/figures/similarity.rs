@@ -1,7 +1,7 @@
 //! The map of the realizations, in which distances stand for differences.
 
 use super::{Canvas, Drawn, MAX_DRAWN, cell, drawn, head, rows_height};
-use crate::apa::plain;
+use crate::apa::{percent, plain};
 use crate::chart::{Axis, Label, Look, Mark, PALETTE, Panel, Whisker, shortened};
 use study_analysis::analyze::psychophysics::PartAnalysis;
 use study_analysis::analyze::psychophysics::results::Place;
@@ -77,6 +77,60 @@ pub(super) fn map(name: &str, part: &PartAnalysis) -> Option<Drawn> {
         figure.columns = columns;
         figure.panels = planes;
         figure.isometric()
+    }))
+}
+
+/// The map that participants share, and how each weighs its dimensions.
+pub(super) fn weights(name: &str, part: &PartAnalysis) -> Option<Drawn> {
+    let found = &part.results.over.similarity.as_ref()?.weights;
+    let axes = |all: [Option<f64>; 3]| -> Vec<(f64, Option<f64>)> {
+        all.into_iter().flatten().map(|x| (x, None)).collect()
+    };
+    let places = found.map.iter().map(|(name, at)| Placed {
+        name: name.as_str().to_owned(),
+        at: axes([at.x.number(), at.y.number(), at.z.number()]),
+    });
+    let people = found.participants.iter().map(|(name, own)| Placed {
+        name: name.as_str().to_owned(),
+        at: axes([own.x.number(), own.y.number(), own.z.number()]),
+    });
+    let (places, people): (Vec<Placed>, Vec<Placed>) = (places.collect(), people.collect());
+    let dimensions = people.first()?.at.len();
+    if places.len().max(people.len()) > MAX_DRAWN {
+        return None;
+    }
+    let mut data = vec![head(["what", "name", "x", "y", "z"])];
+    for (what, rows) in [("realization", &places), ("participant", &people)] {
+        data.extend(rows.iter().map(|row| {
+            let at = (0..3).map(|k| cell(row.at.get(k).map(|at| at.0)));
+            let names = [what.to_owned(), row.name.clone()];
+            names.into_iter().chain(at).collect()
+        }));
+    }
+    let fit = found.fit.number().map_or_else(String::new, percent);
+    let caption = format!(
+        "A map that participants share (INDSCAL), whose dimensions each of them weighs: the realizations, and the weights of the participants. A \
+         squared weight is about the share of the participant's scalar products for which the dimension accounts; the map accounts for \
+         {fit} of all. Its axes cannot be turned as those of other maps."
+    );
+    let title = "Dimensions that participants share, and their weights";
+    Some(drawn(name, caption, data, |c: Canvas| {
+        let columns = c.pick(2, 1);
+        let mut panels = Vec::new();
+        for second in 1..dimensions {
+            let mut map = plane(&places, second);
+            map.title = "realizations".to_owned();
+            let mut weights = plane(&people, second);
+            weights.title = "participants".to_owned();
+            weights.x.label = "weight of dimension 1".to_owned();
+            weights.y.label = format!("weight of dimension {}", second + 1);
+            panels.extend([map, weights]);
+        }
+        let lines = panels.len().div_ceil(columns);
+        let mut figure = c.figure(name, title, c.pick(340.0, 300.0) * lines as f64);
+        figure.columns = columns;
+        figure.panels = panels;
+        figure
     }))
 }
 
@@ -225,6 +279,14 @@ repetitions = 2
                 // Each name stands once in each panel.
                 let names = svg.matches(">detent-2-friction-2<").count();
                 assert_eq!(names, seconds.max(1));
+            }
+            // Realizations and participants of the map with weights, in a panel each.
+            let figure = figures.iter().find(|f| f.name == "part-1-weights");
+            assert_eq!(figure.is_some(), dimensions > 1);
+            if let Some(figure) = figure {
+                assert_eq!(figure.data.lines().count(), 1 + 9 + 6);
+                let svg = figure.narrow.to_svg();
+                assert_eq!(svg.matches(">weight of dimension 1<").count(), seconds);
             }
         }
     }

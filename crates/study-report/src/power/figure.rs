@@ -13,7 +13,9 @@ const HEIGHT: f64 = 300.0;
 fn line(report: &Report) -> &'static str {
     match report.plan.settings.part {
         Some(PartWorld::Tracks(_)) => "tracks",
-        None | Some(PartWorld::Factors(_) | PartWorld::Pairs(_)) => "realizations",
+        None | Some(PartWorld::Factors(_) | PartWorld::Pairs(_) | PartWorld::Felt(_)) => {
+            "realizations"
+        }
     }
 }
 

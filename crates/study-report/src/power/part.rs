@@ -1,7 +1,7 @@
-//! The power of a part of pairs or tracks, and of the effects of factors: page, document and paragraph. There is no closed
+//! The power of a part that is no rating, and of the effects of factors: page, document and paragraph. There is no closed
 //! form, so that the designs are those of the grid.
 
-use super::{Report, bar, name_of, percent, precision};
+use super::{Report, bar, felt, name_of, percent, precision};
 use crate::apa;
 use crate::text::Page;
 use crate::text::layout::{Paint, wrap};
@@ -83,6 +83,7 @@ pub(super) fn summary(report: &Report) -> String {
             let all: Vec<String> = tracks.tracks.iter().map(one).collect();
             format!("Part {}: assumed is {}.", id(report), all.join(", "))
         }
+        Some(PartWorld::Felt(world)) => felt::summary(world, &id(report), own),
     }
 }
 
@@ -139,6 +140,7 @@ fn assumed(report: &Report) -> String {
                 ))
             )
         }
+        Some(PartWorld::Felt(world)) => felt::assumed(world, a),
     }
 }
 
@@ -310,6 +312,9 @@ pub(super) fn warnings(report: &Report) -> Vec<String> {
                 );
             }
         }
+        Some(PartWorld::Felt(world)) => {
+            found.extend(felt::warnings(world, &report.plan.settings.assumptions));
+        }
         Some(PartWorld::Tracks(_)) | None => {}
     }
     found
@@ -396,6 +401,7 @@ pub(super) fn assumptions(report: &Report) -> Value {
             };
             value["tracks"] = tracks.tracks.iter().map(one).collect();
         }
+        Some(PartWorld::Felt(world)) => felt::assumptions(world, a, &mut value),
     }
     value
 }

@@ -24,7 +24,7 @@ use study_base::text::Untrusted;
 type Kind = (&'static str, fn(&PartResults) -> Table);
 
 /// All tables, in the order of a page; those without rows and notes are left out of it.
-pub(crate) const KINDS: [Kind; 32] = [
+pub(crate) const KINDS: [Kind; 34] = [
     ("part_thresholds.csv", thresholds),
     ("part_population.csv", population::population),
     ("part_population_contrasts.csv", population::contrasts),
@@ -44,6 +44,8 @@ pub(crate) const KINDS: [Kind; 32] = [
     ("part_dimensions.csv", similarity::dimensions),
     ("part_map.csv", similarity::map),
     ("part_map_follows.csv", similarity::follows),
+    ("part_weights.csv", similarity::weights),
+    ("part_weighted_map.csv", similarity::weighted_map),
     ("part_differences.csv", similarity::pairs),
     ("part_similarity.csv", similarity::participants),
     ("part_ranks.csv", ranking::realizations),
@@ -396,7 +398,7 @@ fn abilities(results: &PartResults) -> Table {
     items.small_sort_by(|a, b| order(b).total_cmp(&order(a)));
     let mut notes = Vec::new();
     if let Some(why) = items.first().and_then(|item| item.1.ability.reason()) {
-        notes.push(format!("No abilities: {}.", name(why)));
+        notes.push(format!("No abilities: {}.", Untrusted(why)));
         items.clear();
     } else if let Some(effect) = pairs.and_then(|p| p.order.as_ref())
         && let Some(order) = effect.order.number()

@@ -26,9 +26,12 @@ pub(crate) fn of_part<'a>(part: &'a PartAnalysis, f: &'a PartFinding) -> Words<'
 
 /// A question and the test that decides it, for a preregistration.
 pub(crate) fn declared_of_part(part: &PartAnalysis, f: &PartFinding) -> Option<String> {
-    of_part(part, f).fill(match f.test {
-        Some(_) => "Part `{part}`: {ask} Decided by: {corrected}; level {level}.",
-        None => "Part `{part}`: {ask} No test: {why}.",
+    of_part(part, f).fill(match (&f.test, &f.question) {
+        (Some(_), PartQuestion::RankedFirst) => {
+            "Part `{part}`: {ask} Decided by: {corrected}; level {level}. Where two never had another order, the sign test over participants takes its place."
+        }
+        (Some(_), _) => "Part `{part}`: {ask} Decided by: {corrected}; level {level}.",
+        (None, _) => "Part `{part}`: {ask} No test: {why}.",
     })
 }
 
@@ -122,7 +125,7 @@ fn texts(question: &PartQuestion) -> Wording {
             ask: "Is one realization ranked above each other one?",
             yes: "{first} was ranked above each other realization",
             not_shown: "It was not shown that one realization is ranked above each other one",
-            shown: "{first} over {second} by {size} on the logarithm of the worth, {result} ({corrected}, {people})",
+            shown: "{first} over {second} by {margin}, {result} ({corrected}, {people})",
             ..PART
         },
         PartQuestion::Adjusted => Wording {
@@ -195,6 +198,21 @@ fn value(part: &PartAnalysis, f: &PartFinding, key: &str) -> Option<String> {
             found
                 .and_then(|own| own.by_guessing.number())
                 .map_or_else(String::new, apa::two)
+        }
+        "margin" => {
+            let found = part.results.over.ranking.as_ref();
+            let bound = found.and_then(|own| own.best.ci95.lo.number());
+            match (&f.estimate, bound) {
+                (None, Some(bound)) => format!(
+                    "at least {} (95 %) on the logarithm of the worth, in every ranking",
+                    apa::two(bound)
+                ),
+                (estimate, _) => {
+                    let size = estimate.as_ref().map(|e| sentences::estimate(e, apa::two));
+                    let size = size.unwrap_or_default();
+                    format!("{size} on the logarithm of the worth")
+                }
+            }
         }
         "clearest" => match clearest(part) {
             Some(pair) => format!(

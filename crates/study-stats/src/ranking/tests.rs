@@ -1,4 +1,4 @@
-//! Reference values are those of `tests/reference/ranking.R`.
+//! Reference values are those of `tests/reference/ranking.R`; of levels, of `ranking_levels.py`.
 
 use super::*;
 use crate::random::SplitMix64;
@@ -254,8 +254,9 @@ fn ranks_can_skip_numbers() {
 fn what_has_no_maximum_has_a_reason() {
     let reason = |rows: &[([u8; 3], usize)]| worths(3, &rankings(rows)).unwrap_err();
     assert_eq!(reason(&[([1, 1, 1], 5)]), NoAbilities::AllTied);
-    let best = reason(&[([1, 2, 3], 2), ([1, 3, 2], 3)]);
-    assert_eq!(best, NoAbilities::Unbounded(vec![0]));
+    // The first and the second are above the third, but nothing says which of them is the higher one.
+    let apart = reason(&[([1, 0, 2], 2), ([0, 1, 2], 3)]);
+    assert_eq!(apart, NoAbilities::Unbounded(vec![0]));
     // Two items at the top each time, or two or three.
     let two = [([1, 1, 2], 1), ([2, 1, 1], 1), ([1, 2, 1], 1)];
     assert_eq!(reason(&two), NoAbilities::AlwaysTied);
@@ -281,6 +282,135 @@ fn what_has_no_maximum_has_a_reason() {
     }
     let many = worths(30, &[long, reversed]);
     assert_eq!(many.unwrap_err(), NoAbilities::TooManySets);
+}
+
+/// Three participants rank six items three times each: one is above all others every time, and two are below all others. The
+/// program has the likelihood of all items with the levels e⁶⁰ apart.
+#[test]
+fn worths_of_levels_are_the_limit_of_the_likelihood() {
+    let rows = [
+        [2, 3, 5, 1, 4, 6],
+        [3, 2, 6, 1, 4, 5],
+        [2, 2, 5, 1, 4, 6],
+        [4, 2, 5, 1, 3, 5],
+        [2, 4, 5, 1, 3, 6],
+        [2, 3, 5, 1, 3, 6],
+        [2, 3, 5, 1, 4, 6],
+        [3, 4, 5, 1, 2, 5],
+        [2, 3, 6, 1, 4, 5],
+    ];
+    let mut data = rankings(&rows.map(|row| (row, 1)));
+    for ranking in &mut data {
+        ranking.cluster /= 3;
+    }
+    let found = worths(6, &data).unwrap();
+    assert_eq!(found.levels, [vec![3], vec![0, 1, 4], vec![2, 5]]);
+    assert_eq!([0, 3, 5].map(|item| found.level(item)), [1, 0, 2]);
+    assert_eq!(found.first(), [0.0, 0.0, 0.0, 1.0, 0.0, 0.0]);
+    let worths = [
+        0.851_328_56,
+        -0.061_491_58,
+        0.401_951_21,
+        0.0,
+        -0.789_836_98,
+        -0.401_951_21,
+    ];
+    close(&found.abilities.abilities, &worths, 1e-6);
+    let ses = [
+        0.451_817_69,
+        0.412_732_85,
+        0.383_011_05,
+        0.0,
+        0.461_900_82,
+        0.383_011_05,
+    ];
+    close(&found.abilities.ses, &ses, 1e-6);
+    let (size, delta) = found.ties[0];
+    assert_eq!((size, found.ties.len()), (2, 1));
+    close(
+        &[delta.estimate, delta.se, found.log_likelihood],
+        &[-1.160_200_73, 0.557_750_04, -28.277_127_61],
+        1e-6,
+    );
+    let difference = found.abilities.difference(0, 4);
+    close(
+        &[
+            difference.effect.estimate,
+            difference.effect.se,
+            difference.clustered.unwrap().se,
+        ],
+        &[1.641_165_55, 0.815_251_35, 0.635_903_21],
+        1e-6,
+    );
+}
+
+/// A dressing that everybody puts last changes nothing of the others.
+#[test]
+fn what_is_always_last_leaves_the_worths_of_the_others() {
+    let five = SALAD.map(|(row, n)| {
+        let mut all = [5; 5];
+        // The last one is not the last by its number.
+        all[..2].copy_from_slice(&row[..2]);
+        all[3..].copy_from_slice(&row[2..]);
+        (all, n)
+    });
+    let (four, found) = (
+        worths(4, &rankings(&SALAD)).unwrap(),
+        worths(5, &rankings(&five)).unwrap(),
+    );
+    assert_eq!(found.levels, [vec![0, 1, 3, 4], vec![2]]);
+    let others = [0, 1, 3, 4];
+    close(
+        &others.map(|i| found.abilities.abilities[i]),
+        &four.abilities.abilities,
+        1e-9,
+    );
+    close(
+        &others.map(|i| found.abilities.ses[i]),
+        &four.abilities.ses,
+        1e-9,
+    );
+    close(&others.map(|i| found.first()[i]), &four.first(), 1e-9);
+    assert!((found.log_likelihood - four.log_likelihood).abs() < 1e-9);
+    let (own, known) = (
+        found.abilities.difference(0, 3),
+        four.abilities.difference(0, 2),
+    );
+    assert!((own.clustered.unwrap().se - known.clustered.unwrap().se).abs() < 1e-9);
+    assert!((own.participants - known.participants).abs() < 1e-9);
+}
+
+/// Everybody gives the same order: each level is one item, and no number is left to estimate.
+#[test]
+fn one_order_is_a_level_for_each_item() {
+    let found = worths(3, &rankings(&[([2, 1, 3], 4)])).unwrap();
+    assert_eq!(found.levels, [[1], [0], [2]]);
+    assert_eq!(found.first(), [0.0, 1.0, 0.0]);
+    assert!(found.log_likelihood.abs() < 1e-12);
+    assert!(found.ties.is_empty());
+}
+
+/// SciPy's `binomtest(n, n)`: its p, and the logit of the lower end of its exact interval.
+#[test]
+fn what_is_always_above_has_a_lower_bound() {
+    for (times, at_least, p) in [
+        (1, -3.663_561_646, 1.0),
+        (5, -0.087_350_499, 0.0625),
+        (6, 0.163_329_618, 0.031_25),
+        (10, 0.807_154_865, 0.001_953_125),
+        (20, 1.596_770_465, 1.907_348_633e-6),
+    ] {
+        let found = always_above(times, 1).unwrap();
+        close(&[found.at_least, found.p], &[at_least, p], 1e-8);
+        // Sets of tied items weaken a bound below zero only.
+        let tied = always_above(times, 3).unwrap().at_least;
+        close(
+            &[tied],
+            &[at_least * if at_least < 0.0 { 3.0 } else { 1.0 }],
+            1e-7,
+        );
+    }
+    assert_eq!(always_above(0, 1), None);
 }
 
 /// By hand: three participants who agree on three items are one of 36 relative orders, and tied ones tell nothing.

@@ -137,22 +137,7 @@ pub fn classical(dissimilarities: &Dissimilarities, dimensions: usize) -> Option
     if dimensions == 0 || n <= dimensions {
         return None;
     }
-    let squares: Option<Vec<f64>> = (0..n * n)
-        .map(|at| match (at / n, at % n) {
-            (i, j) if i == j => Some(0.0),
-            (i, j) => dissimilarities.get(i, j).map(|d| d * d),
-        })
-        .collect();
-    let squares = squares?;
-    let mean = |own: &mut dyn Iterator<Item = f64>| own.sum::<f64>() / n as f64;
-    let rows: Vec<f64> = (0..n)
-        .map(|i| mean(&mut (0..n).map(|j| squares[i * n + j])))
-        .collect();
-    let all = mean(&mut rows.iter().copied());
-    let centered = Matrix::from_fn(n, n, |i, j| {
-        -0.5 * (squares[i * n + j] - rows[i] - rows[j] + all)
-    });
-    let eigen = SymmetricEigen::new(centered);
+    let eigen = SymmetricEigen::new(centered(dissimilarities)?);
     let mut order: Vec<usize> = (0..n).collect();
     order.sort_by(|a, b| eigen.values[*b].total_cmp(&eigen.values[*a]));
     let eigenvalues: Vec<f64> = order.iter().map(|at| eigen.values[*at]).collect();
@@ -171,6 +156,26 @@ pub fn classical(dissimilarities: &Dissimilarities, dimensions: usize) -> Option
         eigenvalues,
         share,
     })
+}
+
+/// The scalar products of objects about their middle: the doubly centered matrix −½d². `None` if a pair is missing.
+pub(super) fn centered(dissimilarities: &Dissimilarities) -> Option<Matrix> {
+    let n = dissimilarities.objects();
+    let squares: Option<Vec<f64>> = (0..n * n)
+        .map(|at| match (at / n, at % n) {
+            (i, j) if i == j => Some(0.0),
+            (i, j) => dissimilarities.get(i, j).map(|d| d * d),
+        })
+        .collect();
+    let squares = squares?;
+    let mean = |own: &mut dyn Iterator<Item = f64>| own.sum::<f64>() / n as f64;
+    let rows: Vec<f64> = (0..n)
+        .map(|i| mean(&mut (0..n).map(|j| squares[i * n + j])))
+        .collect();
+    let all = mean(&mut rows.iter().copied());
+    Some(Matrix::from_fn(n, n, |i, j| {
+        -0.5 * (squares[i * n + j] - rows[i] - rows[j] + all)
+    }))
 }
 
 /// How distances follow dissimilarities.

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use study_stats::distribution::{normal_quantile, normal_upper, t_quantile, t_two_sided};
 use study_stats::paired::holm;
 use study_stats::pairs::{Abilities, Difference};
+use study_stats::ranking::Beyond;
 
 statistics! {
     /// The difference of two abilities.
@@ -13,7 +14,7 @@ statistics! {
         difference: Stat,
         /// standard error
         se: Stat,
-        /// by the error over participants, from two participants on
+        /// by the error over participants, from two participants on; one end only, exact, of what was always above in rankings
         ci95: Interval,
         /// 1/(1 + e^(−difference)): the share of comparisons that the first would win
         preferred: Stat,
@@ -23,7 +24,7 @@ statistics! {
         statistic: Stat as "t",
         /// n less 1, at least 1; none with one participant
         statistic_df: Option<Stat> as "t_df",
-        /// of `t`
+        /// of `t`; of the sign test over participants of what was always above in rankings
         p: Stat,
         /// with Holm's correction
         p_holm: Stat,
@@ -82,30 +83,77 @@ impl Judge {
     }
 }
 
-/// The differences of all pairs of items, with Holm's correction; `why` there are none.
+/// A difference without an end: one item was always above the other.
+pub(super) struct Endless {
+    /// Whether the first one of the pair was above.
+    pub(super) first: bool,
+    /// Its bound and its test; `None` if nobody compared the two.
+    pub(super) known: Option<Beyond>,
+    /// What is said in place of the difference.
+    pub(super) why: String,
+}
+
+impl Endless {
+    fn difference(&self, several: bool) -> AbilityDifference {
+        let none = || Stat::missing(self.why.clone());
+        let end = self.known.map(|known| known.at_least);
+        let bound = |sign: f64| Stat::or(end.map(|x| sign * x), self.why.clone());
+        let (lo, hi) = match self.first {
+            true => (bound(1.0), none()),
+            false => (none(), bound(-1.0)),
+        };
+        AbilityDifference {
+            difference: none(),
+            se: none(),
+            ci95: Interval { lo, hi },
+            preferred: none(),
+            se_clustered: several.then(none),
+            statistic: none(),
+            statistic_df: several.then(none),
+            p: Stat::or(self.known.map(|known| known.p), self.why.clone()),
+            p_holm: none(),
+        }
+    }
+}
+
+/// The differences of all pairs of items, with Holm's correction; `why` there are none. `endless` says which pairs of
+/// items have no finite difference.
 pub(super) fn differences(
     items: &[&str],
     found: Option<&Abilities>,
-    people: usize,
-    why: &str,
+    endless: impl Fn(usize, usize) -> Option<Endless>,
+    (people, why): (usize, &str),
 ) -> BTreeMap<PairName, AbilityDifference> {
     let stat = |x: Option<f64>| Stat::or(x, why.to_owned());
     let pairs: Vec<(usize, usize)> = (0..items.len())
         .flat_map(|a| (a + 1..items.len()).map(move |b| (a, b)))
         .collect();
-    let differences: Vec<_> = (pairs.iter())
-        .map(|(a, b)| found.map(|f| f.difference(*a, *b)))
+    let without_end: Vec<Option<Endless>> = pairs.iter().map(|(a, b)| endless(*a, *b)).collect();
+    let differences: Vec<_> = (pairs.iter().zip(&without_end))
+        .map(|((a, b), endless)| {
+            let found = found.filter(|_| endless.is_none());
+            found.map(|f| f.difference(*a, *b))
+        })
         .collect();
     let se = |d: &Difference| {
         Judge::of(people, d.participants).se(d.effect.se, d.clustered.map(|e| e.se))
     };
-    let p: Vec<Option<f64>> = (differences.iter())
-        .map(|d| {
-            (d.as_ref()).and_then(|d| Judge::of(people, d.participants).p(d.effect.estimate, se(d)))
+    let p: Vec<Option<f64>> = (differences.iter().zip(&without_end))
+        .map(|(d, endless)| match (d, endless) {
+            (Some(d), _) => Judge::of(people, d.participants).p(d.effect.estimate, se(d)),
+            (None, Some(endless)) => endless.known.map(|known| known.p),
+            (None, None) => None,
         })
         .collect();
     let p_holm = holm(&p);
     let of_pair = |(k, (a, b)): (usize, &(usize, usize))| {
+        if let Some(endless) = &without_end[k] {
+            let found = AbilityDifference {
+                p_holm: Stat::or(p_holm[k], endless.why.clone()),
+                ..endless.difference(people > 1)
+            };
+            return (PairName::of(items[*a], items[*b]), found);
+        }
         let difference = differences[k].as_ref();
         let deciding = difference.map(|d| (d.effect.estimate, se(d)));
         let interval = difference

@@ -1,11 +1,15 @@
 //! What decides about answers that belong to no study, such as simulated ones: the same
 //! estimates and findings as those of a study's parts.
 
+use super::adjustment::{SettingRow, adjustment};
 use super::discriminations::sensitivity;
 use super::findings::{self, PartFacts, PartFinding, PartQuestion, of_model, of_preferences};
+use super::identification::{LabelRow, identification};
 use super::over_participants::{ConditionModel, Threshold, Told, mixed, sensitivities};
 use super::population::{ConditionFit, Pooled, PopulationCell, population};
 use super::preferences::{Preference, in_both_orders, preferences};
+use super::ranking::{RankingRow, ranking};
+use super::similarity::{SimilarityRow, property_followed};
 use super::trials::{Asked, TrialCount, TrialSettings, discrimination};
 use crate::analyze::keys::{CellName, ConditionName};
 use crate::analyze::record::{Number as _, PairName};
@@ -219,6 +223,49 @@ pub(crate) fn together(
             .and_then(of),
         contrast,
     }))
+}
+
+/// What findings are made from, of the participants of some rows.
+fn facts<'a>(people: impl Iterator<Item = &'a str>, alpha: f64) -> PartFacts {
+    let people: BTreeSet<&str> = people.collect();
+    PartFacts {
+        alpha,
+        participants: people.len(),
+    }
+}
+
+/// The findings of rankings. `seed` is that of random orders.
+pub(crate) fn ranked(rows: &[RankingRow], alpha: f64, seed: u64) -> Vec<PartFinding> {
+    let facts = facts(rows.iter().map(|row| row.participant.as_str()), alpha);
+    findings::of_rankings(&facts, &ranking(rows, (seed, "power"))).0
+}
+
+/// Whether the map of ratings of difference follows a property of the realizations, from fewer random starts than that
+/// of a study. `None` without a map.
+pub(crate) fn follows(
+    rows: &[SimilarityRow],
+    property: &BTreeMap<String, f64>,
+    (alpha, seed): (f64, u64),
+) -> Option<PartFinding> {
+    let facts = facts(rows.iter().map(|row| row.participant.as_str()), alpha);
+    let fit = property_followed(rows, property, seed)?;
+    Some(findings::map_follows(&facts, "level", &fit, property.len()))
+}
+
+/// The findings of settings beside a standard.
+pub(crate) fn adjusted(
+    rows: &[SettingRow],
+    standard: f64,
+    (alpha, seed): (f64, u64),
+) -> Vec<PartFinding> {
+    let facts = facts(rows.iter().map(|row| row.participant.as_str()), alpha);
+    findings::settings_of(&facts, &adjustment(rows, Some(standard), (seed, "power")))
+}
+
+/// Whether the right labels are given more often than by guessing.
+pub(crate) fn identified(rows: &[LabelRow], labels: &[String], alpha: f64) -> PartFinding {
+    let facts = facts(rows.iter().map(|row| row.participant.as_str()), alpha);
+    findings::identified(&facts, &identification(rows, labels).0)
 }
 
 /// There is no pooled model of such data.

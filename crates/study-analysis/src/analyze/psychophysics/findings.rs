@@ -385,7 +385,13 @@ fn dimensions(facts: &PartFacts, found: &Similarities, realizations: usize) -> P
     finding
 }
 
-fn map_follows(facts: &PartFacts, name: &str, fit: &MapFit, realizations: usize) -> PartFinding {
+/// Whether the map follows these properties.
+pub(super) fn map_follows(
+    facts: &PartFacts,
+    name: &str,
+    fit: &MapFit,
+    realizations: usize,
+) -> PartFinding {
     let question = PartQuestion::MapFollows(name.to_owned());
     let (Some(r), Some(p)) = (fit.r.number(), fit.p.number()) else {
         return facts.undefined(question, &fit.p, realizations);

@@ -1,7 +1,7 @@
 //! Rankings of a study.
 
 use super::part_data::{Found, Intervals, PartData};
-use super::ranking::{RankingRow, ranking};
+use super::ranking::{RankingRow, Rankings, levels, ranking};
 use super::results::PartResults;
 use crate::analyze::Rules;
 use crate::analyze::warning::Warning;
@@ -39,13 +39,15 @@ pub(super) fn of_ranking(
     if is_one_order(rows, intervals) {
         found.cannot_be_told(ONE_ORDER);
     }
+    let mut warnings: Vec<Warning> = tied(&ranks).filter(|_| !own.ties).into_iter().collect();
+    warnings.extend(apart(&found));
     let mut results = PartResults::undefined("");
     results.over.ranking = Some(found);
     Found {
         task: "ranking",
         trials: rankings(&ranks).len(),
         results,
-        warnings: tied(&ranks).filter(|_| !own.ties).into_iter().collect(),
+        warnings,
         names: Vec::new(),
         data: PartData::default(),
     }
@@ -77,6 +79,21 @@ fn rankings(ranks: &[RankingRow]) -> BTreeMap<(&str, &str), Vec<f64>> {
             .push(row.rank);
     }
     all
+}
+
+/// Realizations that were above all others in every ranking: how their worths are to be read.
+fn apart(found: &Rankings) -> Option<Warning> {
+    let levels = levels(found);
+    let names: Vec<String> = levels.iter().map(|names| names.join(" and ")).collect();
+    (levels.len() > 1).then(|| Warning {
+        code: "ranked-apart",
+        text: format!(
+            "every ranking had {}: the difference of their worths has no upper limit. Worths are the limit of the model's likelihood, \
+             those within each of these levels; a difference between two levels has a lower bound only (exact) and is tested by the sign \
+             test over participants",
+            names.join(" above ")
+        ),
+    })
 }
 
 /// Equal ranks in a part without ties: a correction, in which each rank is changed on its own, can make them.

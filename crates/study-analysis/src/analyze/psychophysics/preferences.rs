@@ -238,7 +238,7 @@ pub fn preferences(rows: &[Preference], ties: bool, order: bool) -> Preferences 
         deviance: stat(found.map(|f| f.deviance)),
         df: stat(found.map(|f| f.df as f64)),
         rank: found.map(ranks),
-        pairs: differences(&items, found, people.len(), &why),
+        pairs: differences(&items, found, |_, _| None, (people.len(), &why)),
         triads: match items.len() {
             0..=2 => BTreeMap::new(),
             _ => triads(&items, &people, &comparisons),

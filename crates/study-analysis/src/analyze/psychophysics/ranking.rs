@@ -1,6 +1,6 @@
 //! Rankings: `ranking/…`.
 
-use super::abilities::{AbilityDifference, differences, interval_of};
+use super::abilities::{AbilityDifference, Endless, differences, interval_of};
 use super::preferences::reason;
 use crate::analyze::draws::Draws;
 use crate::analyze::keys::TiedName;
@@ -13,7 +13,7 @@ use study_stats::correlation::spearman;
 use study_stats::describe::{mean, mean_of, sd};
 use study_stats::pairs::NoAbilities;
 use study_stats::rank::mid_ranks;
-use study_stats::ranking::{Ranking, Worths, concordance, shares, worths};
+use study_stats::ranking::{Ranking, Worths, always_above, concordance, shares, worths};
 
 statistics! {
     /// Whether participants rank alike, by the mean ranks of each. Those without a ranking of all realizations do not count.
@@ -38,9 +38,9 @@ statistics! {
 
     /// The realization with the highest worth beside each other one.
     pub struct BestRank {
-        /// its logarithm of the worth less that of the next one
+        /// its logarithm of the worth less that of the next one; none if it is above all others in every ranking
         difference: Stat,
-        /// by the error over participants, from two participants on
+        /// by the error over participants, from two participants on; the lower end only, exact, if it is above all others in every ranking
         ci95: Interval,
         /// the largest p, with Holm's correction over all pairs, of its differences from the others
         p: Stat,
@@ -56,9 +56,11 @@ statistics! {
         sd: Stat,
         /// share of its rankings in which nothing is above it
         first: Stat,
-        /// probability that it has the first rank among all, if it is not tied there
+        /// where there are several: its level from 1, the highest; in every ranking those of a level are above all of lower ones
+        level: Option<Stat>,
+        /// probability that it has the first rank among all, if it is not tied there; 0 below the highest level
         worth: Stat,
-        /// logarithm of the worth; they sum to 0
+        /// logarithm of the worth; they sum to 0 within each level
         log_worth: Stat,
         /// its standard error
         log_worth_se: Stat,
@@ -149,6 +151,7 @@ pub struct RankingRow {
 const NO_RANKINGS: &str = "there are no rankings";
 const ONE_PARTICIPANT: &str = "there is one participant";
 const ONE_REALIZATION: &str = "there are not two realizations";
+const ALONE: &str = "it is the only one of its level, above or below all others in every ranking";
 const ALL_TIED: &str = "each participant gave all realizations the same rank";
 
 /// The ranks of all realizations in one ranking.
@@ -178,7 +181,11 @@ pub fn ranking(rows: &[RankingRow], (seed, name): (u64, &str)) -> Rankings {
     };
     let fit = fit.ok();
     let abilities = fit.as_ref().map(|fit| &fit.abilities);
-    let differences = differences(&items, abilities, people.len(), &why);
+    let endless = |a: usize, b: usize| {
+        let fit = fit.as_ref()?;
+        (fit.level(a) != fit.level(b)).then(|| without_end(&items, fit, &people, [a, b]))
+    };
+    let differences = differences(&items, abilities, endless, (people.len(), &why));
     let pair = |(name, worths): (&PairName, &AbilityDifference)| {
         let [a, b] = name.names();
         let place = |name: &str| items.iter().position(|item| *item == name).unwrap_or(0);
@@ -230,9 +237,53 @@ fn no_worths(error: &NoAbilities, items: &[&str]) -> String {
     };
     let names: Vec<&str> = top.iter().map(|i| items[*i]).collect();
     format!(
-        "none of the others was ever ranked above {}, or with the same rank: worths are unbounded",
+        "none of the others was ever ranked above {}, or with the same rank, and not all realizations were ranked \
+         together",
         names.join(" or ")
     )
+}
+
+/// What is known of two realizations of different levels. Each participant with a ranking of both counts once; of one
+/// participant each ranking does.
+fn without_end(
+    items: &[&str],
+    fit: &Worths,
+    people: &BTreeMap<&str, Vec<Ranks>>,
+    [a, b]: [usize; 2],
+) -> Endless {
+    let has_both = |ranks: &&Ranks| ranks[a].is_some() && ranks[b].is_some();
+    let of_person = |own: &Vec<Ranks>| own.iter().filter(has_both).count();
+    let times: usize = match people.len() {
+        1 => people.values().map(of_person).sum(),
+        _ => people.values().filter(|own| of_person(own) > 0).count(),
+    };
+    let most_tied = fit.ties.last().map_or(1, |(size, _)| *size);
+    let first = fit.level(a) < fit.level(b);
+    let (above, below) = if first { (a, b) } else { (b, a) };
+    Endless {
+        first,
+        known: always_above(times, most_tied),
+        why: format!(
+            "{} was above {} in every ranking: how much is unbounded",
+            items[above], items[below]
+        ),
+    }
+}
+
+/// The realizations of each level, the highest first; nothing if there is one. Untrusted.
+pub(super) fn levels(found: &Rankings) -> Vec<Vec<&str>> {
+    let mut levels: Vec<(u64, Vec<&str>)> = Vec::new();
+    for (name, item) in &found.items {
+        let Some(own) = item.level.number() else {
+            continue;
+        };
+        match levels.iter_mut().find(|(level, _)| *level == own as u64) {
+            Some((_, names)) => names.push(name.as_str()),
+            None => levels.push((own as u64, vec![name.as_str()])),
+        }
+    }
+    levels.sort();
+    levels.into_iter().map(|(_, names)| names).collect()
 }
 
 /// Rankings by participant; those of fewer than two realizations say nothing. Several ranks of a realization in one
@@ -295,12 +346,18 @@ fn agreement(means: &BTreeMap<&str, Vec<f64>>, items: usize, draws: &mut Draws) 
     }
 }
 
-/// The realizations by their worth, the highest first. Untrusted.
+/// The realizations by their level and worth, the highest first. Untrusted.
 pub(super) fn by_worth(found: &Rankings) -> Vec<&str> {
-    let mut all: Vec<(&str, f64)> = (found.items.iter())
-        .map(|(name, item)| (name.as_str(), item.log_worth.number().unwrap_or(0.0)))
+    let mut all: Vec<(&str, [f64; 2])> = (found.items.iter())
+        .map(|(name, item)| {
+            let level = item.level.number().unwrap_or(1.0);
+            (
+                name.as_str(),
+                [level, -item.log_worth.number().unwrap_or(0.0)],
+            )
+        })
         .collect();
-    all.small_sort_by(|a, b| b.1.total_cmp(&a.1));
+    all.small_sort_by(|(_, a), (_, b)| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
     all.into_iter().map(|(name, _)| name).collect()
 }
 
@@ -315,7 +372,8 @@ fn best(
     };
     let worths = &fit.abilities.abilities;
     let mut order: Vec<usize> = (0..items.len()).collect();
-    order.small_sort_by(|a, b| worths[*b].total_cmp(&worths[*a]));
+    let by_worth = |a: usize, b: usize| worths[b].total_cmp(&worths[a]);
+    order.small_sort_by(|a, b| fit.level(*a).cmp(&fit.level(*b)).then(by_worth(*a, *b)));
     let [first, next, ..] = order[..] else {
         return BestRank::undefined(ONE_REALIZATION);
     };
@@ -326,17 +384,27 @@ fn best(
     let own = differences.iter().filter(of_first);
     let p: Option<Vec<f64>> = own.map(|(_, d)| d.p_holm.number()).collect();
     let largest = p.and_then(|p| p.into_iter().reduce(f64::max));
-    let ends = differences
-        .get(&PairName::of(items[first], items[next]))
-        .and_then(|pair| pair.ci95.ends());
+    let Some(pair) = differences.get(&PairName::of(items[first], items[next])) else {
+        return BestRank::undefined(ONE_REALIZATION);
+    };
     // The difference of the pair is that of the name that sorts first.
-    let ends = match items[first] < items[next] {
-        true => ends,
-        false => ends.map(|(low, high)| (-high, -low)),
+    let turned = |x: &Stat| match x.number() {
+        Some(x) => Stat::of(-x),
+        None => x.clone(),
+    };
+    let ci95 = match items[first] < items[next] {
+        true => pair.ci95.clone(),
+        false => Interval {
+            lo: turned(&pair.ci95.hi),
+            hi: turned(&pair.ci95.lo),
+        },
     };
     BestRank {
-        difference: Stat::of(worths[first] - worths[next]),
-        ci95: Interval::or(ends, "it overflows"),
+        difference: match fit.level(first) == fit.level(next) {
+            true => Stat::of(worths[first] - worths[next]),
+            false => pair.difference.clone(),
+        },
+        ci95,
         p: Stat::or(largest, "a difference has no test"),
     }
 }
@@ -361,6 +429,15 @@ fn of_item(
     let first = own.iter().filter(is_first).count() as f64 / own.len() as f64;
     let ranks: Vec<f64> = means.values().map(|ranks| ranks[at]).collect();
     let stat = |x: Option<f64>| Stat::or(x, why.to_owned());
+    let level = fit.map(|fit| fit.level(at));
+    let alone = fit
+        .zip(level)
+        .is_some_and(|(fit, level)| fit.levels[level].len() < 2);
+    // What has nothing to be compared with.
+    let compared = |x: Option<f64>| match alone {
+        true => Stat::missing(ALONE),
+        false => stat(x),
+    };
     let interval = fit.and_then(|fit| interval_of(&fit.abilities, at, people));
     RankedItem {
         n: Stat::count(own.len()),
@@ -370,10 +447,15 @@ fn of_item(
             "fewer than two participants ranked all realizations",
         ),
         first: Stat::or((!own.is_empty()).then_some(first), NO_RANKINGS),
+        level: (level.filter(|_| fit.is_some_and(|fit| fit.levels.len() > 1)))
+            .map(|level| Stat::count(level + 1)),
         worth: stat(fit.map(|fit| fit.first()[at])),
-        log_worth: stat(fit.map(|fit| fit.abilities.abilities[at])),
-        log_worth_se: stat(fit.map(|fit| fit.abilities.ses[at])),
-        log_worth_ci95: Interval::or(interval, why.to_owned()),
+        log_worth: compared(fit.map(|fit| fit.abilities.abilities[at])),
+        log_worth_se: compared(fit.map(|fit| fit.abilities.ses[at])),
+        log_worth_ci95: match alone {
+            true => Interval::or(None, ALONE),
+            false => Interval::or(interval, why.to_owned()),
+        },
     }
 }
 
@@ -417,165 +499,4 @@ fn of_participant(who: &str, own: &[Ranks], means: &BTreeMap<&str, Vec<f64>>) ->
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// `rankings`: by participant, each the realizations in their order, `=` between those of one rank.
-    fn rows(rankings: &[&[&str]]) -> Vec<RankingRow> {
-        let mut all = Vec::new();
-        for (who, own) in rankings.iter().enumerate() {
-            for (n, ranking) in own.iter().enumerate() {
-                for (place, tied) in (1..).zip(ranking.split(' ')) {
-                    for realization in tied.split('=') {
-                        all.push(RankingRow {
-                            participant: format!("P{who}"),
-                            ranking: n.to_string(),
-                            realization: realization.to_owned(),
-                            rank: f64::from(place),
-                        });
-                    }
-                }
-            }
-        }
-        all
-    }
-
-    fn found(rankings: &[&[&str]]) -> Rankings {
-        ranking(&rows(rankings), (1, "order"))
-    }
-
-    const SIX: &[&[&str]] = &[
-        &["a b c", "a b c"],
-        &["a b c", "b a c"],
-        &["a c b", "a b c"],
-        &["a b=c", "a c b"],
-        &["b a c", "a b c"],
-        &["a b c", "c a b"],
-    ];
-
-    #[test]
-    fn the_best_one_is_above_each_other_one() {
-        let found = found(SIX);
-        assert_eq!(
-            (found.n.number(), found.n_participants.number()),
-            (Some(12.0), Some(6.0))
-        );
-        assert_eq!(by_worth(&found), ["a", "b", "c"]);
-        let a = &found.items["a"];
-        // Two rankings begin with b, and one with c.
-        assert_eq!(a.first.number(), Some(9.0 / 12.0));
-        let worths: f64 = found.items.values().filter_map(|i| i.worth.number()).sum();
-        assert!((worths - 1.0).abs() < 1e-12);
-        let pair = &found.pairs[&PairName::of("a", "b")];
-        assert_eq!(
-            (pair.above.number(), pair.tied.number()),
-            (Some(10.0 / 12.0), Some(0.0))
-        );
-        let of_b = &found.pairs[&PairName::of("b", "c")];
-        assert_eq!(of_b.tied.number(), Some(1.0 / 12.0));
-        assert_eq!(found.ties.len(), 1);
-        // The largest of the two p of the best one.
-        let p = |pair: &str, other: &str| {
-            let own = &found.pairs[&PairName::of(pair, other)].worths;
-            own.p_holm.number().unwrap()
-        };
-        assert_eq!(found.best.p.number(), Some(p("a", "b").max(p("a", "c"))));
-        let difference = pair.worths.difference.number();
-        assert_eq!(found.best.difference.number(), difference);
-        assert_eq!(found.best.ci95.ends(), pair.worths.ci95.ends());
-    }
-
-    /// The pair of the best and the next has its difference the other way round.
-    #[test]
-    fn the_names_do_not_matter() {
-        let renamed = |text: &str| text.replace('a', "z");
-        let all: Vec<Vec<String>> = (SIX.iter())
-            .map(|own| own.iter().map(|text| renamed(text)).collect())
-            .collect();
-        let all: Vec<Vec<&str>> = (all.iter())
-            .map(|own| own.iter().map(String::as_str).collect())
-            .collect();
-        let all: Vec<&[&str]> = all.iter().map(Vec::as_slice).collect();
-        let (one, other) = (found(SIX), found(&all));
-        assert_eq!(by_worth(&other), ["z", "b", "c"]);
-        let ends = |found: &Rankings| {
-            let (low, high) = found.best.ci95.ends().unwrap();
-            [low, high, found.best.difference.number().unwrap()]
-        };
-        for (a, b) in ends(&one).into_iter().zip(ends(&other)) {
-            assert!((a - b).abs() < 1e-9, "{a} {b}");
-        }
-    }
-
-    /// Rankings of one participant count once: W is that of the mean ranks.
-    #[test]
-    fn agreement_is_that_of_participants() {
-        let own = found(SIX).agreement;
-        assert_eq!((own.n.number(), own.df.number()), (Some(6.0), Some(2.0)));
-        let rows = [
-            [1.0, 2.0, 3.0],
-            [1.5, 1.5, 3.0],
-            [1.0, 2.5, 2.5],
-            [1.0, 2.75, 2.25],
-            [1.5, 1.5, 3.0],
-            [1.5, 2.5, 2.0],
-        ];
-        let expected = study_stats::friedman::friedman(&rows).unwrap();
-        assert_eq!(own.w.number(), expected.kendall_w);
-        assert_eq!(own.p.number(), expected.exact_p);
-        assert!(own.exact.is_set() && own.smallest_p.number().unwrap() < 1e-3);
-    }
-
-    #[test]
-    fn what_is_undefined_has_a_reason() {
-        let none = ranking(&[], (1, "order"));
-        assert_eq!(
-            none.agreement.w.reason(),
-            Some("there are no rankings of all realizations")
-        );
-        assert_eq!(none.best.p.reason(), Some(NO_RANKINGS));
-        let alone = found(&[&["a b c", "b a c", "c a b"]]);
-        assert_eq!(alone.agreement.w.reason(), Some(ONE_PARTICIPANT));
-        assert!(alone.participants["P0"].own_w.number().is_some());
-        let others = alone.participants["P0"].with_others.reason();
-        assert_eq!(others, Some("there are no other participants"));
-        let tied = found(&[&["a=b=c"], &["a=b=c"]]);
-        assert_eq!(tied.agreement.w.reason(), Some(ALL_TIED));
-        assert_eq!(tied.best.p.reason(), Some("every comparison is a tie"));
-        let always = found(&[&["a b c"], &["a c b"]]);
-        let reason = always.best.p.reason().unwrap();
-        assert!(reason.contains("ever ranked above a,"), "{reason}");
-        // One realization is no ranking.
-        let one = found(&[&["a"], &["a"]]);
-        assert_eq!(one.n.number(), Some(0.0));
-    }
-
-    /// What is described stays, and no test decides.
-    #[test]
-    fn what_cannot_be_told_has_no_p() {
-        let mut found = found(SIX);
-        found.cannot_be_told("one order");
-        assert!(found.agreement.w.number().is_some() && found.best.difference.number().is_some());
-        let pair = &found.pairs[&PairName::of("a", "b")].worths;
-        for p in [&found.agreement.p, &found.best.p, &pair.p, &pair.p_holm] {
-            assert_eq!(p.reason(), Some("one order"));
-        }
-        // A reason that there is already stays.
-        let mut none = ranking(&[], (1, "order"));
-        none.cannot_be_told("one order");
-        assert_eq!(none.best.p.reason(), Some(NO_RANKINGS));
-    }
-
-    /// A declined rank leaves a realization out of one ranking; W does without such rankings.
-    #[test]
-    fn a_ranking_can_lack_a_realization() {
-        let mut rows = rows(SIX);
-        let at = rows.iter().position(|row| row.realization == "c").unwrap();
-        rows.remove(at);
-        let found = ranking(&rows, (1, "order"));
-        assert_eq!(found.n_incomplete.number(), Some(1.0));
-        assert_eq!(found.items["c"].n.number(), Some(11.0));
-        assert_eq!(found.agreement.n.number(), Some(6.0));
-        assert_eq!(found.pairs[&PairName::of("a", "c")].n.number(), Some(11.0));
-    }
-}
+mod tests;

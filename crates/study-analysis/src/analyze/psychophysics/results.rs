@@ -25,8 +25,8 @@ pub use super::scales::{
 };
 pub use super::sequential::{SequentialEffect, SequentialResult};
 pub use super::similarity::{
-    Agreed, IdenticalPairs, MapFit, MapOf, OrderOfPairs, OwnDifferences, PairDifference, Place,
-    SecondDimension, Similarities, StressByChance,
+    Agreed, IdenticalPairs, MapFit, MapOf, OrderOfPairs, OwnDifferences, OwnWeights,
+    PairDifference, Place, SecondDimension, Similarities, StressByChance, WeightedPlace, Weights,
 };
 pub use super::standards::{AboveStandard, WebersLaw};
 pub use super::tracks::{

@@ -2,13 +2,14 @@
 
 mod maps;
 mod people;
+mod weights;
 
 use crate::analyze::draws::Draws;
 use crate::analyze::keys::{DimensionsName, PropertyName};
 use crate::analyze::record::{
     Interval, PairName, ParticipantName, RealizationName, Stat, Why, statistics,
 };
-use maps::{Maps, maps};
+use maps::{Maps, maps, scaling};
 use people::{Own, people};
 use std::collections::{BTreeMap, BTreeSet};
 use study_stats::describe::{mean, sd};
@@ -18,6 +19,8 @@ use study_stats::similarity::scaling::{Map, Scale};
 use study_stats::similarity::{
     Dissimilarities, agreement, asymmetry, pairs as pairs_of, with_the_others,
 };
+use weights::weights;
+pub use weights::{OwnWeights, WeightedPlace, Weights};
 
 statistics! {
     /// Whether participants find the same pairs different.
@@ -178,6 +181,8 @@ statistics! {
         map_stress: Stat,
         /// the map, by realization
         map: BTreeMap<RealizationName, Place>,
+        /// weights of dimensions
+        weights: Weights,
         /// by property of the realizations
         follows: BTreeMap<PropertyName, MapFit>,
         /// by pair
@@ -269,6 +274,15 @@ pub fn similarity(
         agreement: agreed(&all, none),
         order: order(&people, names.len(), &mut draws("order")),
         identical: identical(&people),
+        weights: {
+            let dimensions = scaled.map.as_ref().map(Map::dimensions);
+            weights(
+                &known,
+                &names,
+                dimensions.ok_or_else(|| scaled.why()),
+                &draws,
+            )
+        },
         follows: follows(&scaled, &all, properties, &names, &draws),
         participants: participants.collect(),
         pairs: pairs(&people, &names, unit.as_ref(), points, scaled.map.as_ref()),
@@ -286,6 +300,35 @@ pub fn similarity(
         dimensions: scaled.dimensions,
         second: scaled.second,
     }
+}
+
+/// Random starts of the maps of simulated studies.
+const SIMULATED_STARTS: usize = 10;
+
+/// How the map of some ratings follows a property of the realizations, as that of [`similarity`] but from fewer random starts and without
+/// an interval. `None` without a map.
+pub(super) fn property_followed(
+    rows: &[SimilarityRow],
+    property: &BTreeMap<String, f64>,
+    seed: u64,
+) -> Option<MapFit> {
+    let names: Vec<&str> = property.keys().map(String::as_str).collect();
+    let all: Vec<Dissimilarities> = (people(rows, &names).values())
+        .filter_map(|own| own.dissimilarities(names.len()).rescaled())
+        .collect();
+    let unit = Dissimilarities::in_common(all.iter())?;
+    let draws = |of: &str| Draws::new(seed, &format!("similarity/power/{of}"));
+    let map = scaling(&all, &unit, SIMULATED_STARTS, &draws).map?.map;
+    let columns = [property.values().copied().collect::<Vec<f64>>()];
+    let found = followed(&map, &columns, &mut draws("follows"))?;
+    Some(MapFit {
+        properties: Stat::count(columns.len()),
+        r: Stat::of(found.r),
+        ci95: Interval::or(None, "the interval is not simulated"),
+        p: Stat::of(found.p),
+        exact: Stat::flag(found.exact),
+        smallest_p: Stat::of(found.smallest),
+    })
 }
 
 /// Mean over participants of the factor between what they rated and what all have in common, in points of the scale.

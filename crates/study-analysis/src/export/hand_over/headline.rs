@@ -268,7 +268,7 @@ impl Numbers {
         let agreement = format!("{id}/agreement");
         self.add(&agreement, &found.agreement, &agreed, CLOSED);
         let of_item = format!("{id}/realization");
-        let described = ["n", "mean_rank", "sd", "first"];
+        let described = ["n", "mean_rank", "sd", "first", "level"];
         self.each(&of_item, &found.items, &described, CLOSED);
         let fitted = ["worth", "log_worth", "log_worth_se"];
         self.each(&of_item, &found.items, &fitted, FITTED);

@@ -13,12 +13,13 @@ const SHARE: Kind = Kind::Number((Bound::Included(0.0), Bound::Excluded(1.0)), "
 
 pub(super) const POWER: &[Key] = keys! {
     /// How many studies are simulated for each design.
-    "studies": Kind::Whole(10, 10_000_000), "40000", derived("10000; of pairs and of effects 2000, of tracks 200");
+    "studies": Kind::Whole(10, 10_000_000), "40000", derived("10000; of pairs and of effects 2000, of ranking, adjustment and identification 1000, of tracks and similarity 200");
     /// The power that is wanted.
     "targets": Kind::NumberList, "[0.8, 0.9]";
     /// The tests whose power is simulated: `verdict`, `pearson`, `permutation`, `crossed`,
     /// `friedman`, `clmm`, `equivalence`, `reference-equivalence`; of pairs `preferred`,
-    /// `preference-vaf`; of tracks `thresholds`, `told-apart`; of a factorial study `effect`. The first one decides about
+    /// `preference-vaf`; of tracks `thresholds`, `told-apart`; of a factorial study `effect`; of ranking `ranked-alike`,
+    /// `ranked-first`; of similarity `map-follows`; of adjustment `adjusted`; of identification `identified`. The first one decides about
     /// designs. Without it: the verdicts of the analysis.
     "tests": Kind::Texts(1), r#"["verdict", "crossed"]"#;
     /// Rating points per standard deviation of VAF (with the number of realizations as the
@@ -29,11 +30,12 @@ pub(super) const POWER: &[Key] = keys! {
     "rho": Kind::Number((Bound::Excluded(-1.0), Bound::Excluded(1.0)), ""), "0.86";
     /// The smallest slope of interest: how wrong would a significant estimate of it be?
     "smallest": Kind::positive("points"), "0.3";
-    /// The mean rating, before it is cut to the scale. Without it: the middle of the scale.
+    /// The mean rating, before it is cut to the scale. Without it: the middle of the scale. Of adjustment it is the mean level that
+    /// is set, of identification the share of correct answers.
     "mean": Kind::ANY_NUMBER, "4.5";
     /// Standard deviations of the random effects, in rating points; of pairs in logits, of
     /// tracks in natural logarithms of the threshold (in levels for a blend, in d′ for two
-    /// realizations).
+    /// realizations), of adjustment in levels, of identification in logits. Of ranking only their ratios count.
     "sd": Kind::Table(SD), "{ realization = 0.3, residual = 0.8 }";
     /// How a number becomes a rating. Without it: rounded for a rating, else continuous.
     "scale": Kind::WordOrTable(SCALES, ORDINAL), r#""continuous""#;

@@ -1,7 +1,7 @@
 //! The tables of similarity.
 
 use super::{column, count};
-use crate::apa::{one, or_dash, two};
+use crate::apa::{one, or_dash, percent, two};
 use crate::table::{Builder, Table, file};
 use study_analysis::analyze::psychophysics::results::{PartResults, Similarities};
 use study_analysis::analyze::results::Number as _;
@@ -72,6 +72,45 @@ pub(super) fn follows(results: &PartResults) -> Table {
         .done()
 }
 
+/// How participants weigh the dimensions of the map that they share.
+pub(super) fn weights(results: &PartResults) -> Table {
+    let own = found(results).map(|own| &own.weights);
+    let participants = own.into_iter().flat_map(|own| &own.participants);
+    let note = "Weights of the dimensions of a map that participants share (INDSCAL); a squared weight is about the share of the participant's \
+                scalar products for which the dimension accounts. Fit: the share for which the map accounts.";
+    let is_third = own.and_then(|own| own.dimensions.number()) > Some(2.0);
+    let fit = own.and_then(|own| {
+        Some(format!(
+            "The map accounts for {} of everybody's scalar products, one whose dimensions all weigh alike for {}; p {} by dealing the \
+             ratings of each pair to the participants.",
+            percent(own.fit.number()?),
+            percent(own.common_fit.number()?),
+            crate::apa::p(own.p.number()?)
+        ))
+    });
+    Builder::new("Weights of the dimensions", participants)
+        .name("participant", "participant", &|p| p.0.as_str().to_owned())
+        .field(column("1", "x").explained(note.to_owned()), two, |p| &p.1.x)
+        .field(column("2", "y"), two, |p| &p.1.y)
+        .field(column("3", "z").when(is_third), two, |p| &p.1.z)
+        .field(column("fit", "fit"), two, |p| &p.1.fit)
+        .notes(fit)
+}
+
+/// The map that participants share.
+pub(super) fn weighted_map(results: &PartResults) -> Table {
+    let own = found(results).map(|own| &own.weights);
+    let places = own.into_iter().flat_map(|own| &own.map);
+    let note = "The sum of squares of each dimension is 1. These dimensions cannot be turned: they are those that participants weigh differently.";
+    let is_third = own.and_then(|own| own.dimensions.number()) > Some(2.0);
+    Builder::new("Map with weights", places)
+        .name("realization", "realization", &|p| p.0.as_str().to_owned())
+        .field(column("1", "x").explained(note.to_owned()), two, |p| &p.1.x)
+        .field(column("2", "y"), two, |p| &p.1.y)
+        .field(column("3", "z").when(is_third), two, |p| &p.1.z)
+        .done()
+}
+
 /// Pairs of realizations, the most similar first.
 pub(super) fn pairs(results: &PartResults) -> Table {
     let mut pairs: Vec<_> = found(results)
@@ -88,7 +127,7 @@ pub(super) fn pairs(results: &PartResults) -> Table {
         Some(format!(
             "Identical pairs: {} on average, {} of different ones.",
             one(identical.mean.number()?),
-            or_dash(identical.share.number(), crate::apa::percent)
+            or_dash(identical.share.number(), percent)
         ))
     });
     Builder::new("Pairs of realizations", pairs)

@@ -1,6 +1,9 @@
 //! The findings of a part of ranking.
 
-use super::{PartFacts, PartFinding, PartQuestion, estimate, of_abilities, test_of_abilities};
+use super::{
+    AbilityDifference, PartFacts, PartFinding, PartQuestion, estimate, of_abilities,
+    test_of_abilities,
+};
 use crate::analyze::findings::{Estimate, Finding, Pair, Test, TestKind};
 use crate::analyze::psychophysics::ranking::{Rankings, by_worth};
 use crate::analyze::record::Number as _;
@@ -52,21 +55,38 @@ fn ranked_alike(facts: &PartFacts, found: &Rankings) -> PartFinding {
     finding
 }
 
-/// The highest one is above each other one if all of their differences are: the largest p decides.
+/// The highest one is above each other one if all of their differences are: the largest p decides. It is that of a sign test
+/// where the two never had another order.
 fn ranked_first(facts: &PartFacts, found: &Rankings) -> PartFinding {
     let (question, best) = (PartQuestion::RankedFirst, &found.best);
     let realizations = found.items.len();
-    let (Some(difference), Some(p)) = (best.difference.number(), best.p.number()) else {
+    let Some(p) = best.p.number() else {
         return facts.undefined(question, &best.p, realizations);
     };
-    let (kind, _) = test_of_abilities(facts);
+    let names: Vec<String> = by_worth(found).into_iter().map(str::to_owned).collect();
+    let highest = names.first().map_or("", String::as_str);
+    let own = (found.pairs.iter()).filter(|(name, _)| name.names().contains(&highest));
+    // Of equal p that of a pair with a difference.
+    let key = |pair: &AbilityDifference| {
+        let p = pair.p_holm.number().unwrap_or(0.0);
+        (p, pair.difference.number().is_some())
+    };
+    let deciding = own.map(|(_, pair)| &pair.worths).max_by(|a, b| {
+        let (a, b) = (key(a), key(b));
+        a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))
+    });
+    let kind = match deciding.and_then(|pair| pair.difference.number()) {
+        Some(_) => test_of_abilities(facts).0,
+        None => TestKind::Sign,
+    };
     let test = Test {
         comparisons: found.pairs.len(),
         ..Test::single(kind, p, facts.alpha)
     };
     let mut finding = Finding {
-        estimate: Some(estimate("difference", difference, &best.ci95)),
-        names: by_worth(found).into_iter().map(str::to_owned).collect(),
+        estimate: (best.difference.number())
+            .map(|difference| estimate("difference", difference, &best.ci95)),
+        names,
         ..Finding::decided(question, test, facts.design(realizations))
     };
     if facts.participants < 2 {

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use study_stats::describe::{mean, sd};
 use study_stats::paired::one_sample;
 use study_stats::similarity::dimensions::{chosen, complete, most, predicted, structure};
-use study_stats::similarity::scaling::{Map, Precision, Scale, classical, smacof};
+use study_stats::similarity::scaling::{Map, Precision, Scale, Scaled, classical, smacof};
 
 /// Random starts of a map that is reported.
 const STARTS: usize = 100;
@@ -48,13 +48,22 @@ impl Maps {
     }
 }
 
-/// `unit`: what the rescaled dissimilarities have in common; `points`: what 1 is on the scale.
-pub(super) fn maps(
+/// Maps of each number of dimensions, and the chosen one.
+pub(super) struct Scaling {
+    dimensions: BTreeMap<DimensionsName, MapOf>,
+    /// How each number of dimensions predicts participants.
+    predictions: Vec<Vec<Option<f64>>>,
+    pub(super) scale: Scale,
+    pub(super) map: Option<Scaled>,
+}
+
+/// `unit`: what the rescaled dissimilarities have in common; `starts`: random ones of each map.
+pub(super) fn scaling(
     all: &[Dissimilarities],
     unit: &Dissimilarities,
-    points: f64,
+    starts: usize,
     draws: &dyn Fn(&str) -> Draws,
-) -> Maps {
+) -> Scaling {
     let n = unit.objects();
     let mut fitted = Vec::new();
     let mut predictions: Vec<Vec<Option<f64>>> = Vec::new();
@@ -62,7 +71,7 @@ pub(super) fn maps(
     for k in 1..=most(n) {
         let of = |scale, stream: &str| {
             let random = &mut draws(&format!("{stream}/{k}"));
-            smacof(unit, k, scale, STARTS, Precision::FINE, random)
+            smacof(unit, k, scale, starts, Precision::FINE, random)
         };
         let (ordinal, ratio) = (of(Scale::Ordinal, "map"), of(Scale::Ratio, "ratio"));
         let predicted = predicted(all, k, &mut draws(&format!("predicted/{k}")));
@@ -93,6 +102,27 @@ pub(super) fn maps(
         Some(found) if found.stress < NO_STRESS => (Scale::Ratio, ratio),
         other => (Scale::Ordinal, other),
     };
+    Scaling {
+        dimensions,
+        predictions,
+        scale,
+        map,
+    }
+}
+
+/// `unit`: what the rescaled dissimilarities have in common; `points`: what 1 is on the scale.
+pub(super) fn maps(
+    all: &[Dissimilarities],
+    unit: &Dissimilarities,
+    points: f64,
+    draws: &dyn Fn(&str) -> Draws,
+) -> Maps {
+    let Scaling {
+        dimensions,
+        predictions,
+        scale,
+        map,
+    } = scaling(all, unit, STARTS, draws);
     let random = &mut draws("structure");
     let tested = structure(all, random);
     let why = |x: Option<f64>| Stat::or(x, NO_MAP);
