@@ -17,6 +17,7 @@
 //!   for the start: nothing that was measured or answered is lost with one line.
 
 mod adjusting;
+mod answers;
 mod attempt_log;
 mod facts;
 mod interval_log;
@@ -551,50 +552,6 @@ impl History {
         }
     }
 
-    fn answered(
-        &mut self,
-        form: FormId,
-        question: &QuestionId,
-        answer: (&Answer, Option<Channel>),
-        at: Moment,
-    ) {
-        self.given(form, question, answer).answered_at = Some(at);
-        let is_open = self.open().is_some_and(|o| o.form() == form);
-        if let Some(open) = self.open_mut().filter(|_| is_open)
-            && let Some((_, last)) = &mut open.rating
-        {
-            *last = at;
-        }
-    }
-
-    /// Sets an answer.
-    fn given(
-        &mut self,
-        form: FormId,
-        question: &QuestionId,
-        (answer, channel): (&Answer, Option<Channel>),
-    ) -> &mut GivenAnswer {
-        let known = self
-            .answers
-            .iter()
-            .position(|g| g.form == form && g.question == *question);
-        let index = known.unwrap_or(self.answers.len());
-        if known.is_none() {
-            self.answers.push(GivenAnswer {
-                form,
-                question: question.clone(),
-                answer: answer.clone(),
-                answered_at: None,
-                corrected: false,
-                channel,
-            });
-        }
-        let given = &mut self.answers[index];
-        given.answer = answer.clone();
-        given.channel = channel;
-        given
-    }
-
     /// Sets the trials to come: those that are planned, and of no track and no practice that has ended. One that failed before
     /// that end does not come again.
     fn set_queue(&mut self, queue: &[u32]) {
@@ -612,13 +569,6 @@ impl History {
             .filter_map(|t| self.planned(*t).filter(|t| t.practice)?.part.clone())
             .collect();
         self.ended_practice.retain(|part| !again.contains(part));
-    }
-
-    /// The answer with which a trial began: the first that was given.
-    fn first_answer(&self, trial: u32, attempt: u32) -> Option<Answer> {
-        let form = FormId::Trial { trial, attempt };
-        let first = self.answers.iter().find(|g| g.form == form);
-        first.map(|g| g.answer.clone())
     }
 }
 
