@@ -26,7 +26,7 @@ pub(super) fn desk(
 ) -> Desk {
     let language = Language::of_environment(|name| std::env::var(name).ok());
     let [overdue, due] = returns(sessions, kind, plan);
-    let unfinished = roster.unfinished().map(|(id, _)| id.to_string());
+    let unfinished = roster.who_is_unfinished().map(ToString::to_string);
     let come = overdue.iter().chain(&due).map(|v| v.participant.clone());
     let new = roster.next_ids().map(|id| id.to_string()).take(NEW_IDS);
     Desk {

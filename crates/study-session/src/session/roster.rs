@@ -96,6 +96,11 @@ impl Roster {
         });
     }
 
+    /// Whose session was interrupted last.
+    pub fn who_is_unfinished(&self) -> Option<&ParticipantId> {
+        self.interrupted.as_ref().map(|own| &own.participant)
+    }
+
     /// Two sentences that say whose session was interrupted and how it goes on.
     pub fn unfinished(&self) -> Option<[String; 2]> {
         let own = self.interrupted.as_ref()?;

@@ -94,11 +94,11 @@ fn weights_without_noise_come_back() {
         [2.0, 2.5],
         [5.0, 1.5],
     ];
-    let given = [[1.0, 0.0], [0.6, 0.8], [0.1, 1.5], [2.0, 2.0]];
+    let given: [[f64; 2]; 4] = [[1.0, 0.0], [0.6, 0.8], [0.1, 1.5], [2.0, 2.0]];
     let people: Vec<Dissimilarities> = (given.iter())
         .map(|[a, b]| {
             Dissimilarities::from_fn(6, |i, j| {
-                let along = |k: usize| places[i][k] - places[j][k];
+                let along = |k: usize| -> f64 { places[i][k] - places[j][k] };
                 Some((a * along(0).powi(2) + b * along(1).powi(2)).sqrt())
             })
         })
