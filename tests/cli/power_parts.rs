@@ -276,6 +276,14 @@ fn what_is_felt_has_power_by_its_own_analysis() {
         let (code, _, err) = study(&[&["power", kind], flags].concat(), dir);
         assert!(code != 0 && err.contains(why), "{kind}: {err}");
     }
+    // Ranks that may follow the order decide nothing, however many participants there are.
+    let path = dir.join("ranking/protocol.toml");
+    let text = fs::read_to_string(&path).unwrap();
+    let fixed = text.replacen("order = \"williams\"", "order = \"fixed\"", 1);
+    assert_ne!(fixed, text);
+    fs::write(&path, fixed).unwrap();
+    let (code, _, err) = study(&["power", "ranking"], dir);
+    assert!(code == 1 && err.contains("in the same order"), "{err}");
 }
 
 /// Precision of each design, and procedures beside each other.
@@ -395,7 +403,7 @@ fn numbers_of_answers_of_a_search_are_compared() {
     for part in [
         "10 perceivers of each kind search in the space switch, of which 81 points can be presented, up to 16 answers.",
         "recommended one, and is not noticed below 9.00.",
-        "ridge: with 12 answers the regret of at least 80 % is not noticed.",
+        "ridge: with 12 answers at least 80 % of the simulated perceivers do not notice their regret.",
         "What a search finds is to be confirmed.",
     ] {
         assert!(words.join(" ").contains(part), "{part}\n{page}");

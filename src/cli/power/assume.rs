@@ -344,6 +344,7 @@ pub(super) fn failure(error: &PlanError) -> Failure {
         | PlanError::NoRatings(_)
         | PlanError::NoTracks
         | PlanError::NoThresholds(_) => "--part names one of [[parts]]",
+        PlanError::OneOrder(_) => "take \"blocked\", \"williams\" or \"latin-square\"",
         PlanError::NotOfSearches(_) | PlanError::TooManyAnswers(_) => {
             "docs/power.md says what is simulated of a search"
         }

@@ -9,7 +9,7 @@ use super::planned::{NOTHING, Planned, neat};
 use study_base::text::ModelId;
 use study_plan::protocol::parts::{Part, Task};
 use study_plan::protocol::power::PowerPlan;
-use study_plan::protocol::{Adjustment, Identification, Protocol, Ranking, Similarity};
+use study_plan::protocol::{Adjustment, Identification, Order, Protocol, Ranking, Similarity};
 use study_stats::power::covariate::Spread;
 use study_stats::similarity::dimensions::MOST_OBJECTS;
 
@@ -48,6 +48,9 @@ pub(super) fn of_felt(
     defaults: &mut Defaults,
 ) -> Result<Planned, PlanError> {
     match &part.task {
+        Task::Ranking(own) if own.order == Order::Fixed => {
+            Err(PlanError::OneOrder(part.id.clone()))
+        }
         Task::Ranking(own) => of_ranking(protocol, stated, own, defaults),
         Task::Similarity(own) => {
             let found = of_similarity(protocol, stated, own, defaults);

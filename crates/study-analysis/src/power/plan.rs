@@ -66,6 +66,11 @@ pub enum PlanError {
          not all the same"
     )]
     NoProperty(PartId),
+    /// Rankings that no test decides about.
+    #[error(
+        "everybody feels the realizations of part `{0}` in the same order, so that the analysis decides nothing about their ranks"
+    )]
+    OneOrder(PartId),
     /// Settings without a level that they could differ from.
     #[error("part `{0}` has no level as its standard, so that settings are compared with nothing")]
     NoStandard(PartId),

@@ -107,21 +107,21 @@ pub(super) fn assumptions(world: &FeltWorld, a: &Assumptions, value: &mut Value)
 
 /// What a reader has to know.
 pub(super) fn warnings(world: &FeltWorld, a: &Assumptions) -> Vec<String> {
-    match world {
-        FeltWorld::Similarity { .. } => vec![
-            "the maps of simulated studies come from 10 random starts, those of a study from 100"
-                .to_owned(),
-        ],
-        FeltWorld::Ranking { .. } if a.slope == 0.0 && a.spread.realization == 0.0 => {
-            vec![NOTHING.to_owned()]
-        }
-        FeltWorld::Adjustment { standard, mean, .. } if standard == mean => {
-            vec![NOTHING.to_owned()]
-        }
-        FeltWorld::Ranking { .. }
-        | FeltWorld::Adjustment { .. }
-        | FeltWorld::Identification { .. } => Vec::new(),
-    }
+    let is_nothing = match world {
+        FeltWorld::Ranking { .. } => a.slope == 0.0 && a.spread.realization == 0.0,
+        FeltWorld::Similarity { .. } => a.slope == 0.0,
+        FeltWorld::Adjustment { standard, mean, .. } => standard == mean,
+        FeltWorld::Identification {
+            labels, correct, ..
+        } => *correct * *labels as f64 <= 1.0,
+    };
+    let starts = matches!(world, FeltWorld::Similarity { .. }).then_some(STARTS);
+    let nothing = is_nothing.then_some(NOTHING);
+    (starts.into_iter().chain(nothing))
+        .map(str::to_owned)
+        .collect()
 }
 
+const STARTS: &str =
+    "the maps of simulated studies come from 10 random starts, those of a study from 100";
 const NOTHING: &str = "no effect is assumed: this is how often the tests say yes without one";

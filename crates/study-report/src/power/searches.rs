@@ -75,7 +75,7 @@ fn sentence(plan: &SearchPlan, result: &SearchResult) -> String {
     let (who, share) = (result.likes.as_str(), apa::percent(plan.target));
     match (result.enough(plan.target), result.regrets.last()) {
         (Some(answers), _) => format!(
-            "{who}: with {} the regret of at least {share} is not noticed.",
+            "{who}: with {} at least {share} of the simulated perceivers do not notice their regret.",
             counted(answers as usize, "answer", "answers")
         ),
         (None, Some(last)) => format!(
