@@ -1,5 +1,6 @@
 //! The findings of a part that is no rating.
 
+mod groups;
 mod rankings;
 mod settings;
 
@@ -17,6 +18,7 @@ use crate::analyze::findings::{Direction, Estimate, Finding, Pair, Test, TestKin
 use crate::analyze::identifiers::group_id;
 use crate::analyze::record::{Interval, Number, PairName, Stat};
 use crate::analyze::results::{Correlation, Permuted};
+use groups::{differ_by_group, of_unequal_groups};
 use std::collections::BTreeMap;
 use study_base::apa;
 use study_base::sort::SmallSort as _;
@@ -516,6 +518,7 @@ pub(super) fn of_groups_and_sessions(facts: &PartFacts, again: &Again) -> Vec<Pa
         .flatten()
         .collect();
     differ_by_group(&mut found);
+    of_unequal_groups(&mut found, again);
     found
 }
 
@@ -525,25 +528,6 @@ fn interaction(facts: &PartFacts, test: &FTest, eps_gg: &Stat, p_gg: &Stat) -> O
     let df = [&test.df1, &test.df2].map(|df| Some(df.number()? * epsilon));
     let decides = Test::single(TestKind::BetweenWithin, p_gg.number()?, facts.alpha);
     Some(decides.with("F", test.f.number(), &df))
-}
-
-/// Says of the sessions and of the groups that they depend on each other, where that is shown.
-fn differ_by_group(found: &mut [PartFinding]) {
-    let shown = |f: &PartFinding| f.question == PartQuestion::GroupsSessions && f.is_yes();
-    if !found.iter().any(shown) {
-        return;
-    }
-    for finding in found.iter_mut().filter(|f| f.reason().is_none()) {
-        let over = match finding.question {
-            PartQuestion::Groups => "sessions between which the groups change differently",
-            PartQuestion::Sessions => "groups that change differently from session to session",
-            _ => continue,
-        };
-        finding.caveat(
-            "interaction",
-            format!("it is a mean over {over}: the interaction of group and session is shown"),
-        );
-    }
 }
 
 /// The contrast of two groups or sessions, where there are no more.
