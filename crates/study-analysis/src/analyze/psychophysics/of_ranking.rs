@@ -4,6 +4,7 @@ use super::part_data::{Found, Intervals, PartData};
 use super::ranking::{RankingRow, Rankings, levels, ranking};
 use super::results::PartResults;
 use crate::analyze::Rules;
+use crate::analyze::record::Number as _;
 use crate::analyze::warning::Warning;
 use std::collections::{BTreeMap, BTreeSet};
 use study_base::sort::SmallSort as _;
@@ -85,12 +86,21 @@ fn rankings(ranks: &[RankingRow]) -> BTreeMap<(&str, &str), Vec<f64>> {
 fn apart(found: &Rankings) -> Option<Warning> {
     let levels = levels(found);
     let names: Vec<String> = levels.iter().map(|names| names.join(" and ")).collect();
+    let is_tested = (found.pairs.values())
+        .any(|pair| pair.worths.p.number().is_some() && pair.worths.difference.number().is_none());
+    let over = match found.n_participants.number() {
+        Some(1.0) => "rankings",
+        _ => "participants",
+    };
+    let tested = match is_tested {
+        true => format!(" and is tested by the sign test over {over}"),
+        false => String::new(),
+    };
     (levels.len() > 1).then(|| Warning {
         code: "ranked-apart",
         text: format!(
             "every ranking had {}: the difference of their worths has no upper limit. Worths are the limit of the model's likelihood, \
-             those within each of these levels; a difference between two levels has a lower bound only (exact) and is tested by the sign \
-             test over participants",
+             those within each of these levels; a difference between two levels has a lower bound only (exact){tested}",
             names.join(" above ")
         ),
     })
@@ -110,4 +120,32 @@ fn tied(ranks: &[RankingRow]) -> Option<Warning> {
             counted(n, "ranking has", "rankings have")
         ),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What everybody puts first is tested over participants, of one person over rankings, and not at all in one order.
+    #[test]
+    fn levels_are_said_with_the_test_that_there_is() {
+        let rows = |people: u32| -> Vec<RankingRow> {
+            let of = |person: u32| {
+                [("a", 1.0), ("b", 2.0)].map(|(realization, rank)| RankingRow {
+                    participant: format!("P{person}"),
+                    ranking: "1".to_owned(),
+                    realization: realization.to_owned(),
+                    rank,
+                })
+            };
+            (0..people).flat_map(of).collect()
+        };
+        let said = |found: &Rankings| apart(found).unwrap().text;
+        let mut several = ranking(&rows(6), (1, "order"));
+        assert!(said(&several).ends_with("is tested by the sign test over participants"));
+        let one = ranking(&rows(1), (1, "order"));
+        assert!(said(&one).ends_with("is tested by the sign test over rankings"));
+        several.cannot_be_told(ONE_ORDER);
+        assert!(said(&several).ends_with("has a lower bound only (exact)"));
+    }
 }
