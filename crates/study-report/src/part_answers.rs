@@ -297,8 +297,9 @@ fn weights(part: &PartAnalysis) -> Option<String> {
     let found = &part.results.over.similarity.as_ref()?.weights;
     let (fit, common) = (found.fit.number()?, found.common_fit.number()?);
     Some(format!(
-        "With weights of the dimensions for each participant (INDSCAL, n = {}) a map accounts for {} of their scalar products, with the \
-         same for all for {} (p {} by chance).",
+        "A map whose dimensions each participant weighs (INDSCAL, n = {}) accounts for {} of the squares of their scalar products, one \
+         with the same weights for all, but for a factor of each, for {} (p {}, by dealing the ratings of each pair to the participants \
+         at random).",
         found.n.number()?,
         apa::percent(fit),
         apa::percent(common),

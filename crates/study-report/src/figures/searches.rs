@@ -2,7 +2,7 @@
 
 use super::functions::{MAX_PANELS, cut, grid};
 use super::{Canvas, Drawn, drawn, head};
-use crate::apa::digits;
+use crate::apa::{digits, number};
 use crate::chart::{Axis, ColorBar, Look, Mark, PALETTE, Panel, Scale, Shape, Span, shortened};
 use study_analysis::analyze::psychophysics::PartAnalysis;
 use study_analysis::analyze::psychophysics::search::{Exploration, Explored};
@@ -34,14 +34,19 @@ pub(super) fn search_map(name: &str, part: &PartAnalysis) -> Option<Drawn> {
         true => " White: points that cannot be presented.",
         false => "",
     };
-    let between = match found.people() {
-        _ if found.population.is_none() => String::new(),
-        1 => " SD: the standard deviation between the sessions.".to_owned(),
-        n => format!(" SD: the standard deviation between the maps of the {n} participants."),
-    };
+    let between = found.population.as_ref().map(|all| {
+        let what = match found.people() {
+            1 => "the sessions".to_owned(),
+            n => format!("the maps of the {n} participants"),
+        };
+        let most = number(largest(&all.sd), 2);
+        format!(" SD: the standard deviation between {what}, in colors from 0 to {most}.")
+    });
+    let between = between.unwrap_or_default();
+    let most = number(extent(found), 2);
     let caption = format!(
-        "What a search found: the utility of each point in units of the noise of one impression, from the mean of the map. \
-         Diamonds: the best point; dots: points that were felt.{between}{through}{border} A search decides nothing: its pairs \
+        "What a search found: the utility of each point in units of the noise of one impression, from the mean of the map, \
+         in colors from −{most} to {most}. Diamonds: the best point; dots: points that were felt.{between}{through}{border} A search decides nothing: its pairs \
          were chosen by the answers before them, and the best of many estimates is too good on average. The file has \
          all points of all participants.{}",
         cut(maps.len())
@@ -55,12 +60,21 @@ pub(super) fn search_map(name: &str, part: &PartAnalysis) -> Option<Drawn> {
     }))
 }
 
+/// The largest utility of all searches, in either direction.
+fn extent(found: &Exploration) -> f64 {
+    let all = found.searches.iter().flat_map(|own| &own.mean);
+    all.fold(1e-9, |most: f64, value| most.max(value.abs()))
+}
+
+/// The largest of some standard deviations.
+fn largest(sd: &[f64]) -> f64 {
+    sd.iter().copied().fold(1e-9, f64::max)
+}
+
 /// The map of all participants with its standard deviation, and that of each search.
 fn maps(found: &Exploration) -> Vec<Map<'_>> {
     // One scale of utilities, so that maps can be compared.
-    let all = found.searches.iter().flat_map(|own| &own.mean);
-    let most = all.fold(0.0, |most: f64, value| most.max(value.abs()));
-    let scale = Scale::diverging(most.max(1e-9));
+    let scale = Scale::diverging(extent(found));
     let mut maps = Vec::new();
     if let Some(population) = &found.population {
         maps.push(Map {
@@ -70,13 +84,12 @@ fn maps(found: &Exploration) -> Vec<Map<'_>> {
             felt: Vec::new(),
             scale,
         });
-        let most = population.sd.iter().copied().fold(1e-9, f64::max);
         maps.push(Map {
             title: "all: SD".to_owned(),
             values: &population.sd,
             best: population.best,
             felt: Vec::new(),
-            scale: Scale::ascending(0.0, most),
+            scale: Scale::ascending(0.0, largest(&population.sd)),
         });
     }
     let several = |own: &Explored| {
@@ -289,8 +302,10 @@ rule = {{ name = "sobol", trials = 10 }}
             let figure = figures.iter().find(|f| f.name == "part-1-search").unwrap();
             let points = 3usize.pow(dimensions as u32) - 1;
             assert_eq!(figure.data.lines().count(), 1 + 3 * points);
+            // The first utility is −0.5, and every SD is 0.5.
             for word in [
-                "between the maps of the 2 participants",
+                "in colors from −0.50 to 0.50.",
+                "between the maps of the 2 participants, in colors from 0 to 0.50.",
                 "points that cannot be presented",
                 "A search decides nothing",
             ] {

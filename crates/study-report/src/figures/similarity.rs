@@ -111,7 +111,7 @@ pub(super) fn weights(name: &str, part: &PartAnalysis) -> Option<Drawn> {
     let caption = format!(
         "A map that participants share (INDSCAL), whose dimensions each of them weighs: the realizations, and the weights of the participants. A \
          squared weight is about the share of the participant's scalar products for which the dimension accounts; the map accounts for \
-         {fit} of all. Its axes cannot be turned as those of other maps."
+         {fit} of all. As far as participants weigh the dimensions differently, its axes cannot be turned as those of other maps."
     );
     let title = "Dimensions that participants share, and their weights";
     Some(drawn(name, caption, data, |c: Canvas| {

@@ -82,7 +82,7 @@ pub(super) fn weights(results: &PartResults) -> Table {
     let fit = own.and_then(|own| {
         Some(format!(
             "The map accounts for {} of everybody's scalar products, one whose dimensions all weigh alike for {}; p {} by dealing the \
-             ratings of each pair to the participants.",
+             ratings of each pair to the participants at random.",
             percent(own.fit.number()?),
             percent(own.common_fit.number()?),
             crate::apa::p(own.p.number()?)
@@ -101,7 +101,7 @@ pub(super) fn weights(results: &PartResults) -> Table {
 pub(super) fn weighted_map(results: &PartResults) -> Table {
     let own = found(results).map(|own| &own.weights);
     let places = own.into_iter().flat_map(|own| &own.map);
-    let note = "The sum of squares of each dimension is 1. These dimensions cannot be turned: they are those that participants weigh differently.";
+    let note = "The sum of squares of each dimension is 1. As far as participants weigh these dimensions differently, they cannot be turned.";
     let is_third = own.and_then(|own| own.dimensions.number()) > Some(2.0);
     Builder::new("Map with weights", places)
         .name("realization", "realization", &|p| p.0.as_str().to_owned())
