@@ -79,7 +79,7 @@ impl SentNumber {
 }
 
 /// The numbers that count for the outcomes of a protocol, by outcome. `sent` has the presentation and the number, in
-/// the order in which they came. A presentation that was felt again takes the place of the one before.
+/// the order in which they came. Of several presentations of a trial the last one that sent the number counts.
 pub(super) fn counted(sent: &[(usize, SentNumber)], protocol: &Protocol) -> BTreeMap<String, f64> {
     let of = |(id, number): (&QuestionId, &DeviceNumber)| {
         let key = number.key();
