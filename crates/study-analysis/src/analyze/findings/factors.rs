@@ -114,7 +114,7 @@ fn decided(facts: &Compared<'_>, question: Question, numbers: &FactorialEffect) 
             "complete-only",
             format!(
                 "{complete} of {people} rated every realization; the others are left out of the analysis of the factors, \
-                 assuming that who did not rate everything would have rated alike"
+                 assuming that those who did not rate everything would have rated alike"
             ),
         );
     }
