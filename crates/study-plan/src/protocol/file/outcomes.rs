@@ -313,8 +313,15 @@ pub(super) fn agree(all: &[PartialOutcome], sections: &Sections<'_>, document: &
             }
         }
         let measure = |o: &'_ PartialOutcome| o.outcome.as_ref().map(|o| o.measure.clone());
-        let same =
-            |other: &&PartialOutcome| measure(own).is_some() && measure(other) == measure(own);
+        // A number of a device is known by its key alone: `peak_mn` of mN and of MN.
+        let key = |o: &'_ PartialOutcome| match measure(o) {
+            Some(Measure::Device(number)) => Some(number.key()),
+            _ => None,
+        };
+        let same = |other: &&PartialOutcome| {
+            let is_same = measure(own).is_some() && measure(other) == measure(own);
+            is_same || (key(own).is_some() && key(other) == key(own))
+        };
         if let Some(other) = all[..i].iter().find(same).and_then(|o| o.id.as_ref()) {
             let what = format!("`{other}` and `{name}` are the same measurement");
             fault(path, "measure", Fault::error(what));

@@ -80,6 +80,10 @@ fn a_number_of_the_device_has_a_key_with_its_unit() {
             r#"[{ id = "a", from = "device", measure = "t" }, { id = "b", from = "device", measure = "t" }]"#,
             "are the same measurement",
         ),
+        (
+            r#"[{ id = "a", from = "device", measure = "t", unit = "mN" }, { id = "b", from = "device", measure = "t", unit = "MN" }]"#,
+            "are the same measurement",
+        ),
     ] {
         let parsed = of(outcomes);
         let found = parsed.findings.render(false);
