@@ -2,15 +2,16 @@
 //! report and a paper. Names in them are untrusted.
 
 mod again;
+mod rankings;
 
 use super::answers::Answer;
 use super::{apa, sentences, wording};
 use again::{changes, retest};
+use rankings::{of_one_order, ranks};
 use study_analysis::analyze::psychophysics::results::LabelPair;
 use study_analysis::analyze::psychophysics::{LevelData, PartAnalysis, PartFinding, PartQuestion};
 use study_analysis::analyze::results::Number as _;
 use study_analysis::analyze::{Pair, Verdict};
-use study_base::sort::SmallSort as _;
 use study_base::text::counted;
 use study_plan::protocol::Occasion;
 use study_stats::psychometric::{Core, Spacing};
@@ -70,6 +71,9 @@ fn answer(part: &PartAnalysis, f: &PartFinding) -> Option<Answer> {
     if f.question == PartQuestion::GroupsSessions && f.estimate.is_none() {
         answer.main.extend(changes(part));
     }
+    if f.question == PartQuestion::RankedFirst {
+        answer.main.extend(of_one_order(part));
+    }
     if matches!(
         f.question,
         PartQuestion::Preferred
@@ -95,8 +99,9 @@ fn different(part: &PartAnalysis) -> Option<String> {
     };
     (!differ.is_empty()).then(|| {
         let n = counted(differ.len(), "pair differs", "pairs differ");
+        let others = of_one_order(part).map_or("", |_| "the other ");
         format!(
-            "Of {}, {n}: {}{more}.",
+            "Of {others}{}, {n}: {}{more}.",
             part.pairs.len(),
             differ[..shown].join("; ")
         )
@@ -151,6 +156,7 @@ pub(super) fn results(part: &PartAnalysis) -> String {
     text.extend(dimensions(part));
     text.extend(weights(part));
     text.extend(retest(part));
+    text.extend(of_one_order(part));
     let pairs = part.findings.iter().any(|f| {
         let of_conditions = [
             PartQuestion::Thresholds,
@@ -245,19 +251,6 @@ fn agreement(part: &PartAnalysis) -> Option<String> {
         "Agreement: the mean correlation of the ratings of two participants is {}{w}.{order}",
         apa::two(correlation)
     ))
-}
-
-/// The mean ranks, the first first, as many as a sentence lists.
-fn ranks(part: &PartAnalysis) -> Option<String> {
-    let found = part.results.over.ranking.as_ref()?;
-    let mut means: Vec<(&str, f64)> = (found.items.iter())
-        .filter_map(|(name, item)| Some((name.as_str(), item.mean_rank.number()?)))
-        .collect();
-    means.small_sort_by(|a, b| a.1.total_cmp(&b.1));
-    let listed: Vec<String> = (means.iter().take(MAX_LISTED))
-        .map(|(name, mean)| format!("{name} {}", apa::two(*mean)))
-        .collect();
-    (!listed.is_empty()).then(|| format!("Mean ranks: {}.", listed.join(", ")))
 }
 
 /// Where levels feel equal, and how much settings scatter.
