@@ -178,7 +178,8 @@ fn plan(protocol: &Protocol, flags: &Overrides, part: &Part) -> Result<Plan, Pla
         Task::Identification(_) | Task::Similarity(_) | Task::Ranking(_) | Task::Adjustment(_) => {
             of_felt(protocol, &stated, part, &mut defaults)?
         }
-        Task::Rating(_) | Task::Magnitude(_) | Task::Mushra(_) | Task::Search(_) => {
+        Task::Search(_) => return Err(PlanError::NoTest(part.id.clone())),
+        Task::Rating(_) | Task::Magnitude(_) | Task::Mushra(_) => {
             return Err(PlanError::NoPower(part.id.clone()));
         }
     };

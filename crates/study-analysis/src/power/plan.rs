@@ -51,6 +51,11 @@ pub enum PlanError {
          simulated, but not magnitude estimation and MUSHRA"
     )]
     NoPower(PartId),
+    /// A search where the power of a test is asked for.
+    #[error(
+        "part `{0}` is a search, which has no test: study power says how many answers it needs"
+    )]
+    NoTest(PartId),
     /// Assumptions that a search does not have.
     #[error(
         "the part `{0}` is a search, of which only the number of perceivers (--studies), --targets, --trials, --jnd and \

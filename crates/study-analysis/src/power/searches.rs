@@ -352,6 +352,12 @@ repetitions = 2
     #[test]
     fn what_does_not_apply_to_searches_is_refused() {
         let protocol = protocol();
+        let none = crate::power::Plan::of(&protocol, &Overrides::default()).unwrap_err();
+        assert_eq!(
+            none,
+            PlanError::NoTest(PartId::new("best").unwrap()),
+            "{none}"
+        );
         let pairs = PartId::new("pairs").unwrap();
         assert_eq!(SearchPlan::meant(&protocol, Some(&pairs)), None);
         let mut flags = Overrides::default();
