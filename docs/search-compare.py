@@ -79,14 +79,14 @@ def aepsych(perceiver, seed):
 parnames = [{", ".join(names)}]
 stimuli_per_trial = 2
 outcome_types = [binary]
-strategy_names = [init_strat, opt_strat]
+strategy_names = [init_strategy, opt_strategy]
 {parameters}
-[init_strat]
+[init_strategy]
 min_asks = {START}
 generator = SobolGenerator
 [SobolGenerator]
 seed = {seed}
-[opt_strat]
+[opt_strategy]
 min_asks = {AFTER[-1]}
 refit_every = 5
 generator = OptimizeAcqfGenerator

@@ -116,7 +116,7 @@ mod tests {
     use crate::analyze::psychophysics::over_participants::Measured;
     use crate::analyze::record::{Field as _, Number as _};
 
-    /// scipy: `ttest_ind` of the changes 1, 0.5, 1 and 0.5, 1.5, 1 of the two groups, whose t² is F; its
+    /// SciPy's t test of two samples, of the changes 1, 0.5, 1 and 0.5, 1.5, 1 of the two groups, whose t² is F; its
     /// interval, and g by the gamma function. R 4.2.2 has the same F and p by
     /// `anova(lm(y ~ group), lm(y ~ 1), X = ~1, test = "Spherical")`.
     const REFERENCE: [(&str, f64); 10] = [
