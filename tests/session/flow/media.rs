@@ -1,13 +1,13 @@
 //! Pictures and sounds beside what is felt: nothing is answered about what nobody is known to have seen.
 
 use super::device::{failures, screen};
-use super::part_rig::{adjustment, pairs};
+use super::part_rig::pairs;
 use super::rig::{DeviceMood, Rig, start};
 use super::studies::{MODELS, plain};
 use chrono::TimeDelta;
 use std::sync::Arc;
 use study_base::text::{ModelId, ParticipantId};
-use study_plan::protocol::{Medium, Protocol, Turn};
+use study_plan::protocol::{Medium, Protocol};
 use study_session::outcome::fold::attempt_rows;
 use study_session::outcome::{AttemptEvent, Entry, Event, Failure, Moment};
 use study_session::page::participant;
@@ -27,7 +27,7 @@ fn shown(medium: Medium) -> Shown {
 }
 
 /// With a page that shows these media of every realization.
-fn with(media: &[Medium]) -> Config {
+pub(super) fn with(media: &[Medium]) -> Config {
     let of = |id: &&str| {
         let id = ModelId::new(*id).unwrap();
         (id, media.iter().map(|medium| shown(*medium)).collect())
@@ -39,7 +39,7 @@ fn with(media: &[Medium]) -> Config {
     }
 }
 
-fn here(ready: bool) -> Input {
+pub(super) fn here(ready: bool) -> Input {
     Input::Media(MediaReport::Here { ready })
 }
 
@@ -63,7 +63,7 @@ fn cue(rig: &Rig) -> u64 {
 }
 
 /// A fifth of a second after the start the page says when a medium came.
-fn came(rig: &mut Rig, medium: Medium, after_ms: f64, uncertainty_ms: f64) {
+pub(super) fn came(rig: &mut Rig, medium: Medium, after_ms: f64, uncertainty_ms: f64) {
     let cue = cue(rig);
     rig.wait(0.2);
     rig.send(Input::Media(MediaReport::Onset {
@@ -74,12 +74,12 @@ fn came(rig: &mut Rig, medium: Medium, after_ms: f64, uncertainty_ms: f64) {
     }));
 }
 
-fn lost(rig: &mut Rig, cue: u64, why: Loss) {
+pub(super) fn lost(rig: &mut Rig, cue: u64, why: Loss) {
     rig.send(Input::Media(MediaReport::Lost { cue, why }));
 }
 
 /// Offsets and uncertainties in the journal, ms.
-fn onsets(rig: &Rig) -> Vec<(u32, Medium, f64, f64)> {
+pub(super) fn onsets(rig: &Rig) -> Vec<(u32, Medium, f64, f64)> {
     rig.events()
         .filter_map(|event| match event {
             Event::MediaShown {
@@ -104,7 +104,7 @@ fn details(rig: &Rig) -> Vec<String> {
 }
 
 /// Plays to the end with a page that shows everything in time.
-fn finish(rig: &mut Rig) {
+pub(super) fn finish(rig: &mut Rig) {
     for _ in 0..1000 {
         if rig.ending.is_some() {
             return;
@@ -497,86 +497,4 @@ fn a_session_whose_media_nobody_presents_goes_on_without_them() {
     assert_eq!((onsets(&rig), failures(&rig)), (Vec::new(), Vec::new()));
     let rows = rig.session.history().rating_rows(&plain());
     assert!(rows.iter().all(|row| row.media_offset_ms.is_none()));
-}
-
-/// Waits until something plays, with a page that is ready.
-fn until_plays(rig: &mut Rig) {
-    for _ in 0..50 {
-        if screen(rig) == "Playing" {
-            return;
-        }
-        rig.send(here(true)).wait(0.1);
-    }
-    panic!("it does not play: {:?}", rig.view());
-}
-
-/// A level plays that is set beside a standard with a picture, which was seen.
-fn setting() -> Rig {
-    let media = with(&[Medium::Picture]);
-    let protocol = adjustment("reference = \"XQZ-7\"");
-    let mut rig = Rig::with_config(protocol, media, Vec::new(), start());
-    rig.until("Reference").send(here(true)).send(Input::Advance);
-    until_plays(&mut rig);
-    assert!(rig.view().adjusting.unwrap().at_standard);
-    came(&mut rig, Medium::Picture, 20.0, 1.0);
-    rig.wait(1.0).send(here(true)).send(Input::Advance);
-    until_plays(&mut rig);
-    assert!(!rig.view().adjusting.unwrap().at_standard);
-    assert_eq!(rig.view().cue, None, "a level has no media");
-    rig
-}
-
-/// Confirms the level that plays in the first attempt.
-fn confirm(rig: &mut Rig) {
-    rig.wait(1.0).send(here(true)).send(Input::Advance);
-    assert_eq!(failures(rig), []);
-    assert_eq!(rig.closed()[&1], Some(1));
-}
-
-#[test]
-fn a_standard_that_was_stopped_before_its_picture_came_is_seen_again() {
-    let mut rig = setting();
-    rig.wait(1.0)
-        .send(here(true))
-        .send(Input::Adjust(Turn::Standard));
-    until_plays(&mut rig);
-    rig.send(here(true)).send(Input::Stop);
-    assert_eq!(screen(&rig), "Stopped");
-    rig.send(Input::PlayAgain);
-    until_plays(&mut rig);
-    assert!(rig.view().adjusting.unwrap().at_standard);
-    came(&mut rig, Medium::Picture, 20.0, 1.0);
-    rig.send(here(true)).send(Input::Advance);
-    until_plays(&mut rig);
-    assert_eq!(onsets(&rig).len(), 2);
-    confirm(&mut rig);
-}
-
-#[test]
-fn a_page_that_is_away_as_the_standard_is_asked_for_costs_the_step_and_not_the_setting() {
-    let mut rig = setting();
-    let level = rig.session.playing_model().cloned();
-    rig.device = DeviceMood::Silent;
-    rig.wait(1.0).send(Input::Adjust(Turn::Standard));
-    let playback = rig.playback;
-    rig.send(Input::DeviceStopped(playback));
-    assert_eq!(screen(&rig), "Loading");
-    rig.send(here(false)).send(Input::DeviceLoaded).wait(1.0);
-    assert_eq!(screen(&rig), "Stopped");
-    assert!(
-        !rig.view().armed,
-        "a table that was loaded is not left there"
-    );
-    let failed: Vec<Failure> = (rig.events())
-        .filter_map(|event| match event {
-            Event::StepFailed { failure, .. } => Some(*failure),
-            _ => None,
-        })
-        .collect();
-    assert_eq!((failed, failures(&rig)), (vec![Failure::Media], Vec::new()));
-    rig.device = DeviceMood::Willing;
-    rig.send(here(true)).send(Input::PlayAgain);
-    until_plays(&mut rig);
-    assert_eq!(rig.session.playing_model().cloned(), level);
-    confirm(&mut rig);
 }
