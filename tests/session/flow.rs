@@ -17,6 +17,7 @@ mod initials;
 mod interpreters;
 mod late_forms;
 mod media;
+mod media_steps;
 mod numbers;
 mod part_rig;
 mod parts;

@@ -286,10 +286,8 @@ impl People {
     /// A key may be pressed twice.
     fn type_key(&mut self, at: Duration, input: Input) {
         if self.chance.unit() < self.loss {
-            self.send(
-                at + ms(20 + self.chance.below(150)),
-                Parcel::Key(input.clone()),
-            );
+            let again = at + ms(20 + self.chance.below(150));
+            self.send(again, Parcel::Key(input.clone()));
         }
         self.send(at, Parcel::Key(input));
     }

@@ -111,7 +111,8 @@ impl Course {
         let people = [PEOPLE[first], PEOPLE[second]];
         for _ in 0..2 + self.chance.below(4) {
             let person = people[usize::from(self.chance.below(4) == 0)];
-            let plan = Plan::drawn(&mut self.chance, self.mirrored());
+            let mirrored = self.mirrored();
+            let plan = Plan::drawn(&mut self.chance, mirrored);
             self.sitting(person, &plan, false)?;
             self.change_computers()?;
         }

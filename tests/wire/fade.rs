@@ -34,11 +34,11 @@ fn samples(host: &Host) -> Vec<TelemetrySample> {
 }
 
 fn last_event(host: &Host) -> Event {
-    let events = host.heard.iter().filter_map(|reply| match reply {
+    let mut events = host.heard.iter().filter_map(|reply| match reply {
         Reply::Event(event) => Some(*event),
         _ => None,
     });
-    events.last().unwrap()
+    events.next_back().unwrap()
 }
 
 /// A device that pushes with 3 N or more, so that a step of its force would show.

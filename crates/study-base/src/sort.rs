@@ -63,7 +63,7 @@ mod tests {
                 let items: Vec<(usize, u32)> =
                     (0..len).map(|i| (code / 3usize.pow(i) % 3, i)).collect();
                 let (mut theirs, mut ours) = (items.clone(), items.clone());
-                theirs.sort_by(|a, b| a.0.cmp(&b.0));
+                theirs.sort_by_key(|item| item.0);
                 ours.small_sort_by(|a, b| a.0.cmp(&b.0));
                 assert_eq!(ours, theirs);
                 let (mut theirs, mut ours) = (items.clone(), items.clone());

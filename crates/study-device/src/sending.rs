@@ -81,6 +81,10 @@ impl Device for Sending {
         self.device.stop(at)
     }
 
+    fn fade(&mut self, at: Duration) -> Result<(), DeviceError> {
+        self.device.fade(at)
+    }
+
     fn limp(&mut self, at: Duration) {
         self.device.limp(at);
     }
@@ -145,5 +149,45 @@ mod tests {
             assert!((0.8..=5.0).contains(&time), "{time}");
             assert!(errors.fract() == 0.0 && (0.0..4.0).contains(&errors));
         }
+    }
+
+    /// A device that only lets its force fall, and says that it did.
+    #[derive(Default)]
+    struct Falls(Vec<Report>);
+
+    impl Device for Falls {
+        fn identity(&self) -> Identity {
+            Manual::default().identity()
+        }
+
+        fn load(&mut self, _: &Stimulus<'_>, _: Limits, _: Duration) -> Result<(), DeviceError> {
+            Ok(())
+        }
+
+        fn start(&mut self, _: Duration) -> Result<(), DeviceError> {
+            Ok(())
+        }
+
+        fn stop(&mut self, _: Duration) -> Result<(), DeviceError> {
+            panic!("a stop at once");
+        }
+
+        fn fade(&mut self, _: Duration) -> Result<(), DeviceError> {
+            self.0.push(Report::Faded { from_s: 1.0 });
+            Ok(())
+        }
+
+        fn limp(&mut self, _: Duration) {}
+
+        fn poll(&mut self, _: Duration) -> Vec<Report> {
+            std::mem::take(&mut self.0)
+        }
+    }
+
+    #[test]
+    fn a_force_falls_as_without_numbers() {
+        let mut device = Sending::new(Box::new(Falls::default()), Vec::new(), 1);
+        device.fade(Duration::ZERO).unwrap();
+        assert_eq!(device.poll(Duration::ZERO), [Report::Faded { from_s: 1.0 }]);
     }
 }

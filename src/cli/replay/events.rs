@@ -207,6 +207,7 @@ pub(super) fn words(event: &Event, revealed: bool) -> String {
             "the {} comes {offset_ms:.1} ms after the start, ± {uncertainty_ms:.1} ms",
             medium.as_str()
         ),
+        // Left out before: their number tells.
         Event::MediaShown { .. } => "the participant's page shows or plays it".to_owned(),
         Event::NumbersSent { numbers, .. } if revealed => numbers_sent(numbers),
         Event::NumbersSent { .. } => "the device sends numbers".to_owned(),

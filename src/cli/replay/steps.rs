@@ -17,7 +17,7 @@ pub(super) enum Step<'a> {
 
 impl Step<'_> {
     /// Whether it tells of a realization: a page that says whether the answer was right, and which
-    /// one would have been.
+    /// one would have been, and media that came, since not all realizations have as many.
     pub(super) fn tells(&self) -> bool {
         match self {
             Self::Page(shown) => matches!(
@@ -27,7 +27,7 @@ impl Step<'_> {
                     ..
                 }
             ),
-            Self::Event(_) => false,
+            Self::Event(entry) => matches!(entry.event, Event::MediaShown { .. }),
         }
     }
 }
@@ -85,6 +85,7 @@ fn trial_of(event: &Event) -> Option<u32> {
         | Event::TrialDone { trial, .. }
         | Event::FormDelayed { trial, .. }
         | Event::StepFailed { trial, .. }
+        | Event::MediaShown { trial, .. }
         | Event::TrialClosed { trial, .. }
         | Event::Adjusted { trial, .. } => Some(*trial),
         Event::Remark { trial, .. } | Event::NumbersSent { trial, .. } => *trial,
@@ -114,6 +115,7 @@ pub(super) fn lines(view: &View) -> Vec<String> {
 mod tests {
     use super::*;
     use chrono::DateTime;
+    use study_plan::protocol::Medium;
     use study_session::outcome::{Author, Failure, Moment};
 
     fn entries(events: Vec<Event>) -> Vec<Entry> {
@@ -177,5 +179,26 @@ mod tests {
         assert_eq!(of(None), [0, 1, 2, 3, 4, 5, 6, 7]);
         assert_eq!(of(Some(2)), [1, 2, 3, 6]);
         assert_eq!(of(Some(3)), [5, 7]);
+    }
+    /// With a sound beside its picture a realization has one more of them.
+    #[test]
+    fn media_tell_which_realization_was_felt() {
+        let came = |medium| Event::MediaShown {
+            trial: 2,
+            attempt: 1,
+            interval: None,
+            medium,
+            offset_ms: 20.0,
+            uncertainty_ms: 1.0,
+        };
+        let entries = entries(vec![
+            attempt(2),
+            came(Medium::Picture),
+            came(Medium::Sound),
+            Event::Paused,
+        ]);
+        let steps = steps(&entries, &[], Some(2));
+        let told: Vec<bool> = steps.iter().map(Step::tells).collect();
+        assert_eq!(told, [false, true, true, false]);
     }
 }

@@ -189,8 +189,8 @@ fn whatever_comes_between_is_a_pause() {
         rig.store = StoreMood::Prompt;
         rig.send(Input::RetrySave);
     };
-    let between: [(&str, &dyn Fn(&mut Rig)); 3] = [
-        ("stood still", &stood_still),
+    let between = [
+        ("stood still", &stood_still as &dyn Fn(&mut Rig)),
         ("suspended", &suspended),
         ("disk", &disk),
     ];

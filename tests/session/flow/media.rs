@@ -27,7 +27,7 @@ fn shown(medium: Medium) -> Shown {
 }
 
 /// With a page that shows these media of every realization.
-fn with(media: &[Medium]) -> Config {
+pub(super) fn with(media: &[Medium]) -> Config {
     let of = |id: &&str| {
         let id = ModelId::new(*id).unwrap();
         (id, media.iter().map(|medium| shown(*medium)).collect())
@@ -39,7 +39,7 @@ fn with(media: &[Medium]) -> Config {
     }
 }
 
-fn here(ready: bool) -> Input {
+pub(super) fn here(ready: bool) -> Input {
     Input::Media(MediaReport::Here { ready })
 }
 
@@ -63,7 +63,7 @@ fn cue(rig: &Rig) -> u64 {
 }
 
 /// A fifth of a second after the start the page says when a medium came.
-fn came(rig: &mut Rig, medium: Medium, after_ms: f64, uncertainty_ms: f64) {
+pub(super) fn came(rig: &mut Rig, medium: Medium, after_ms: f64, uncertainty_ms: f64) {
     let cue = cue(rig);
     rig.wait(0.2);
     rig.send(Input::Media(MediaReport::Onset {
@@ -74,12 +74,12 @@ fn came(rig: &mut Rig, medium: Medium, after_ms: f64, uncertainty_ms: f64) {
     }));
 }
 
-fn lost(rig: &mut Rig, cue: u64, why: Loss) {
+pub(super) fn lost(rig: &mut Rig, cue: u64, why: Loss) {
     rig.send(Input::Media(MediaReport::Lost { cue, why }));
 }
 
 /// Offsets and uncertainties in the journal, ms.
-fn onsets(rig: &Rig) -> Vec<(u32, Medium, f64, f64)> {
+pub(super) fn onsets(rig: &Rig) -> Vec<(u32, Medium, f64, f64)> {
     rig.events()
         .filter_map(|event| match event {
             Event::MediaShown {
@@ -104,7 +104,7 @@ fn details(rig: &Rig) -> Vec<String> {
 }
 
 /// Plays to the end with a page that shows everything in time.
-fn finish(rig: &mut Rig) {
+pub(super) fn finish(rig: &mut Rig) {
     for _ in 0..1000 {
         if rig.ending.is_some() {
             return;

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use study_base::text::{ParticipantId, QuestionId};
 use study_plan::protocol::{DeviceNumber, Measure, OutcomeRules, Protocol, Transform};
 use study_session::outcome::fold::attempt_rows;
-use study_session::outcome::{AttemptEvent, Event, SentFault, SentNumber};
+use study_session::outcome::{AttemptEvent, Choice, Event, SentFault, SentNumber};
 use study_session::session::Input;
 
 /// A study whose device sends a time and a count.
@@ -158,4 +158,19 @@ fn without_a_declared_number_nothing_is_recorded() {
     rig.send(Input::DeviceStarted);
     rig.send(sent(&[("time_s", Some(3.2))], false));
     assert!(recorded(&rig).is_empty());
+}
+
+/// Whoever dropped out is no part of the study any more.
+#[test]
+fn nothing_is_recorded_of_who_dropped_out() {
+    let mut begun = Rig::new(study());
+    begun.until_reference(1);
+    let mut rig = Rig::back(study(), begun.journal.clone(), 50.0 * 3600.0);
+    rig.identify();
+    assert_eq!(screen(&rig), "ResumeChoice");
+    rig.send(Input::Resume(Choice::DropOut));
+    assert_eq!(screen(&rig), "End");
+    let before = rig.journal.len();
+    rig.send(sent(&[("time_s", Some(3.2))], true));
+    assert_eq!(rig.journal.len(), before);
 }

@@ -5,6 +5,7 @@
 
 mod adjustments;
 mod counted_out;
+mod debriefing;
 mod exposure;
 mod ladders;
 mod maps;
@@ -42,6 +43,7 @@ pub fn warnings(protocol: &Protocol, spans: &Spans, unread: &[&ModelId]) -> Vec<
     language(protocol, spans, &mut faults);
     untranslated(protocol, spans, &mut faults);
     questionnaires::warnings(protocol, spans, &mut faults);
+    debriefing::warnings(protocol, spans, &mut faults);
     birth_dates(protocol, spans, &mut faults);
     if is_about_realizations(protocol) {
         realizations(protocol, spans, &mut faults);

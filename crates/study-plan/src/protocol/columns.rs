@@ -337,7 +337,7 @@ table! {
             ("unverified", "the device reports no samples or plays no table, or does not tell the constants that its force depends on"),
             ("too-little", "too little was felt or reported to judge it"),
             ("flag", "the force was not that of the table, and the protocol marks it"),
-            ("fault", "the force was not that of the table, and the attempt failed"),
+            ("fault", "the force was not that of the table, and the attempt failed, or in an adjustment the step"),
         ], "whether the force was that of the table; of several playbacks the worst")
             .empty("no playback ended, or it was not judged").optional(),
         RenderedVaf: number("rendered_vaf", "share of the variance of the table's force for the reported motion that the device commanded")

@@ -358,7 +358,7 @@ impl Session {
 
     /// Nothing more is recorded of a participant who dropped out or did not
     /// consent.
-    fn accepts_records(&self) -> Result<(), InputRefused> {
+    pub(super) fn accepts_records(&self) -> Result<(), InputRefused> {
         if self.history.over() && !self.history.finished() {
             Err(InputRefused::SessionOver)
         } else {

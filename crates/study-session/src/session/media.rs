@@ -23,6 +23,8 @@ const MOST_AGO_S: f64 = 3600.0;
 /// What the experimenter reads after an attempt that failed: the same whatever was presented.
 const NOT_IN_STEP: &str =
     "the participant's page was not in step: the trial comes again; attempts.csv has the reason";
+/// The same where a step of an adjustment failed.
+const STEP_NOT_IN_STEP: &str = "the participant's page was not in step: the level before is felt again; attempts.csv has the reason";
 /// Why an attempt failed that ended, or went on, without a report.
 const NOT_CONFIRMED: &str =
     "the participant's page did not confirm in time what it showed and played";
@@ -74,14 +76,18 @@ impl Session {
         self.media.shows.is_some() && !self.media.is_ready(at)
     }
 
-    /// Whether the interval that is loaded has media that the page could not present now: its attempt then fails.
+    /// Whether the interval that is loaded has media that the page could not present now: its attempt then fails, or its step
+    /// alone where a level is set.
     pub(super) fn lacks_page(&mut self, at: Moment) -> bool {
         let lacks = !self.media_of_interval().is_empty() && !self.media.is_ready(at);
         if lacks {
-            self.lose_media(
-                "the participant's page was not ready when the playback was to start",
-                at,
-            );
+            let what = "the participant's page was not ready when the playback was to start";
+            if self.step_failed(Failure::Media, what, at) {
+                self.out.push(Effect::Limp);
+                self.notify(STEP_NOT_IN_STEP);
+            } else {
+                self.lose_media(what, at);
+            }
         }
         lacks
     }
@@ -210,13 +216,18 @@ impl Session {
         }
     }
 
-    /// Whether something of the attempt under way was presented without media that belong to it.
+    /// Whether something of the attempt under way was presented without media that belong to it. Of an adjustment only what was
+    /// felt last: what was stopped before its media came is felt again there in the same attempt.
     pub(super) fn lacks_media(&self) -> bool {
         let (Some(shows), Some(open)) = (&self.media.shows, self.history.open()) else {
             return false;
         };
         let attempt = open.attempt;
-        attempt.presentations.iter().any(|p| {
+        let before = match attempt.is_adjusted() {
+            true => attempt.presentations.len().saturating_sub(1),
+            false => 0,
+        };
+        attempt.presentations[before..].iter().any(|p| {
             let model = attempt.models.get(p.interval.saturating_sub(1) as usize);
             let media = model.and_then(|model| shows.get(model));
             media.is_some_and(|media| media.iter().any(|m| p.media.of(m.medium).is_none()))

@@ -7,7 +7,7 @@ use crate::outcome::{Event, Moment, SentFault, SentNumber};
 
 impl Session {
     /// Records what a controller program sent, in a study that declares numbers of its device. `outside`: the device
-    /// knows of no playback that they belong to.
+    /// knows of no playback that they belong to. Nothing is recorded once the participant has dropped out.
     pub(super) fn device_numbers(
         &mut self,
         mut numbers: Vec<SentNumber>,
@@ -15,7 +15,8 @@ impl Session {
         at: Moment,
     ) {
         let is_declared = self.protocol.numbers_of_device().next().is_some();
-        if numbers.is_empty() || !is_declared || !self.phase.under_way() {
+        let goes_on = self.phase.under_way() && self.accepts_records().is_ok();
+        if numbers.is_empty() || !is_declared || !goes_on {
             return;
         }
         let plays = matches!(self.phase, Phase::Playing { .. } | Phase::Stopping { .. });

@@ -95,8 +95,8 @@ impl Graph {
         }
         let above = closure(preferred);
         let mut classes: Vec<Vec<usize>> = Vec::new();
-        for item in 0..items {
-            let same = |other: usize| above[item][other] && above[other][item];
+        for (item, below) in above.iter().enumerate() {
+            let same = |other: usize| below[other] && above[other][item];
             match classes.iter_mut().find(|class| same(class[0])) {
                 Some(class) => class.push(item),
                 None => classes.push(vec![item]),

@@ -167,7 +167,7 @@ mod tests {
             let p =
                 |a: &Analysis, effect: &str| number(a, &format!("factorial/{effect}/clustered/p"));
             let mut family: Vec<Option<f64>> =
-                shares.iter().map(|(name, _)| Some(p(&a, *name))).collect();
+                shares.iter().map(|(name, _)| Some(p(&a, name))).collect();
             let close = |id: &str, expected: f64| {
                 let found = number(&a, &format!("missing/moved/effect/{effect}/{id}"));
                 assert!(
@@ -176,7 +176,7 @@ mod tests {
                 );
             };
             close("p", number(&a, &format!("factorial/{effect}/p_holm")));
-            family[at] = Some(p(&moved, *effect));
+            family[at] = Some(p(&moved, effect));
             close("p_moved", holm(&family)[at].unwrap());
             let finding = a.finding(&Question::Effect((*effect).to_owned())).unwrap();
             let turned = number(&a, &format!("missing/moved/effect/{effect}/p_moved")) > 0.05;

@@ -93,6 +93,6 @@ mod tests {
         );
         let all = [&pictures[..], &sounds[..]].concat();
         let pooled = jitter_ms(&all).unwrap();
-        assert!((pooled - 8.326_663_997_864_531).abs() < 1e-12, "{pooled}");
+        assert!((pooled - 8.326_663_997_864_53).abs() < 1e-12, "{pooled}");
     }
 }
