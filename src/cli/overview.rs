@@ -269,7 +269,8 @@ fn person(
         (None, _) => false,
         (Some(_), None) => true,
     };
-    let next = protocol.and_then(|protocol| {
+    // Whoever is here comes for no other session, also before the first page is left.
+    let next = protocol.filter(|_| !running).and_then(|protocol| {
         let again = comes_again(own, &Plan::of(protocol, None, now))?;
         Some(Coming {
             due: again.due(now),
