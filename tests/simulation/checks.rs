@@ -166,8 +166,9 @@ pub(crate) fn table(
             given.insert((*form, question), answer);
         }
     }
-    let rows = || derived.rows.iter().filter(|row| row.participant == *id);
-    let mut trials: Vec<u32> = rows().map(|row| row.trial).collect();
+    let rows = derived.rows.iter().filter(|row| row.participant == *id);
+    let rows: Vec<_> = rows.collect();
+    let mut trials: Vec<u32> = rows.iter().map(|row| row.trial).collect();
     let mut planned: Vec<u32> = session.history.schedule().iter().map(|t| t.trial).collect();
     trials.sort_unstable();
     planned.sort_unstable();
@@ -175,7 +176,7 @@ pub(crate) fn table(
         return Err(format!("{id}: the table has the trials {trials:?}"));
     }
     let closed = closed(&session.entries);
-    for row in rows() {
+    for row in rows {
         let trial = row.trial;
         let counted = closed.get(&trial).copied().flatten();
         let form = counted.map(|attempt| FormId::Trial { trial, attempt });
