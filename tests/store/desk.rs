@@ -500,6 +500,17 @@ fn in_a_terminal_it_is_drawn_again_until_q() {
         assert_eq!(terminal.exit_code(), 0);
         assert!(!terminal.alternate());
     }
+    // A terminal that becomes smaller gets a smaller page, with what asks for somebody and the key.
+    let mut terminal = Terminal::start(&["desk", "results", "--watch"], old.home.path(), 24, 80);
+    terminal.wait_for("q: quit");
+    terminal.resize(20, 60);
+    terminal.wait_until("a page of 20 rows", |screen| {
+        let lines: Vec<&str> = screen.trim_end().lines().collect();
+        let fits = lines.len() <= 20 && screen.contains("OVERDUE: P01");
+        fits && lines.last().is_some_and(|line| line.starts_with("q: quit"))
+    });
+    terminal.keys("q");
+    assert_eq!(terminal.exit_code(), 0);
     // Somebody who begins meanwhile appears.
     let mut terminal = Terminal::start(&["desk", "results", "--watch"], old.home.path(), 24, 80);
     terminal.wait_for("1 unfinished");
