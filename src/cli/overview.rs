@@ -8,7 +8,7 @@ use serde::Serialize;
 use std::path::Path;
 use study_analysis::load;
 use study_base::text::{PartId, ParticipantId};
-use study_plan::protocol::Protocol;
+use study_plan::protocol::{Assign, Groups, Protocol};
 use study_session::outcome::{ParticipantRow, State};
 use study_session::store::disk::{Disk as _, RealDisk};
 use study_session::store::{
@@ -38,7 +38,7 @@ pub(super) struct Overview {
     pub(super) participants: Vec<Person>,
     /// The rows of the schedule.
     pub(super) rows: Rows,
-    /// The groups; none if the protocol has none.
+    /// The groups that the experimenter gives; none if the protocol has none.
     pub(super) groups: Vec<Group>,
     /// When somebody last took part.
     pub(super) last_activity: Option<DateTime<FixedOffset>>,
@@ -57,7 +57,7 @@ pub(super) struct Person {
     pub(super) kind: Reality,
     /// Row of the schedule.
     pub(super) row: Option<u32>,
-    /// Group.
+    /// Group, if the experimenter gave it.
     pub(super) group: Option<PartId>,
     /// State of the last session.
     pub(super) state: State,
@@ -223,7 +223,7 @@ pub(super) fn of_study(
             person(row, &own, protocol, is_running(study, sessions, row), now)
         })
         .collect();
-    let groups = protocol.and_then(|p| p.groups.as_ref());
+    let groups = protocol.and_then(given_groups);
     let groups = groups.iter().flat_map(|groups| &groups.list);
     let stays = |p: &&Person| p.kind == Reality::Real && p.state.keeps_row();
     let groups: Vec<Group> = groups
@@ -250,6 +250,13 @@ pub(super) fn of_study(
     })
 }
 
+/// The groups of a protocol, if the experimenter says who belongs to which. Where the row decides, a
+/// group can tell which realizations somebody feels, and so can their numbers when somebody begins.
+fn given_groups(protocol: &Protocol) -> Option<&Groups> {
+    let groups = protocol.groups.as_ref();
+    groups.filter(|groups| groups.assign == Assign::Given)
+}
+
 fn own<'a>(sessions: &'a [SessionData], id: &ParticipantId) -> Vec<&'a SessionData> {
     sessions.iter().filter(|s| s.participant == *id).collect()
 }
@@ -269,7 +276,8 @@ fn person(
         (None, _) => false,
         (Some(_), None) => true,
     };
-    let next = protocol.and_then(|protocol| {
+    // Whoever is here comes for no other session, also before the first page is left.
+    let next = protocol.filter(|_| !running).and_then(|protocol| {
         let again = comes_again(own, &Plan::of(protocol, None, now))?;
         Some(Coming {
             due: again.due(now),
@@ -283,7 +291,7 @@ fn person(
         participant: row.participant.clone(),
         kind: Reality::of(row),
         row: row.row,
-        group: row.group.clone(),
+        group: (row.group.clone()).filter(|_| protocol.and_then(given_groups).is_some()),
         state: row.state,
         running,
         erased: row.erased,

@@ -281,6 +281,9 @@ fn at_the_desk_no_key_acts_on_the_page_and_stop_works() {
         KeyCode::Enter,
         KeyCode::Tab,
         KeyCode::Char('y'),
+        // Neither are questions declined there, nor is anything felt again.
+        KeyCode::F(6),
+        KeyCode::F(7),
     ] {
         assert_eq!(surface.event(&key(code), &asked), [], "{code:?}");
         let shown = look(&mut surface, &asked, 80, 24);

@@ -143,6 +143,55 @@ pub(crate) fn whole(session: &SessionData, protocol: &Protocol) -> Result<(), St
     Ok(())
 }
 
+/// Whether the table of ratings has every trial of a finished session once, with the answers of the
+/// attempt that counts and no others.
+///
+/// # Errors
+/// What it has not.
+pub(crate) fn table(
+    session: &SessionData,
+    derived: &Derived,
+    protocol: &Protocol,
+) -> Result<(), String> {
+    let id = &session.participant;
+    let mut given = BTreeMap::new();
+    for entry in &session.entries {
+        if let Event::Answered {
+            form,
+            question,
+            answer,
+            ..
+        } = &entry.event
+        {
+            given.insert((*form, question), answer);
+        }
+    }
+    let rows = derived.rows.iter().filter(|row| row.participant == *id);
+    let rows: Vec<_> = rows.collect();
+    let mut trials: Vec<u32> = rows.iter().map(|row| row.trial).collect();
+    let mut planned: Vec<u32> = session.history.schedule().iter().map(|t| t.trial).collect();
+    trials.sort_unstable();
+    planned.sort_unstable();
+    if trials != planned {
+        return Err(format!("{id}: the table has the trials {trials:?}"));
+    }
+    let closed = closed(&session.entries);
+    for row in rows {
+        let trial = row.trial;
+        let counted = closed.get(&trial).copied().flatten();
+        let form = counted.map(|attempt| FormId::Trial { trial, attempt });
+        for question in protocol.questions.iter().map(|q| &q.id) {
+            let answer = form.and_then(|form| given.get(&(form, question)).copied());
+            if row.answers.get(question) != answer {
+                return Err(format!(
+                    "{id}: the table has another answer to {question} of trial {trial}"
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
 /// The trials that are closed, each with the attempt that counts if it was completed.
 fn closed(entries: &[Entry]) -> BTreeMap<u32, Option<u32>> {
     let mut closed = BTreeMap::new();

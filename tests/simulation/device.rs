@@ -164,6 +164,10 @@ impl Device for SimDevice {
         self.own().ask(|device, now| device.stop(now))
     }
 
+    fn fade(&mut self, _: Duration) -> Result<(), DeviceError> {
+        self.own().ask(|device, now| device.fade(now))
+    }
+
     fn limp(&mut self, _: Duration) {
         let mut own = self.own();
         if own.bug == Some(Bug::DeafDevice) {

@@ -133,6 +133,11 @@ impl People {
         self.stop.take()
     }
 
+    /// [`Bug::HiddenSuspension`].
+    pub(crate) fn hide_suspensions(&self) -> bool {
+        self.bug == Some(Bug::HiddenSuspension)
+    }
+
     /// How the inputs that were taken last were entered.
     pub(crate) fn channel(&self) -> Channel {
         self.channel
@@ -409,7 +414,10 @@ impl People {
 
     /// Something arrives from the page.
     fn arrive(&mut self, json: &[u8], now: Duration) {
-        let sent = Sent::read(json).unwrap();
+        let mut sent = Sent::read(json).unwrap();
+        if let (Some(Bug::OtherRating), Sent::Reply(reply)) = (self.bug, &mut sent) {
+            change_ratings(reply);
+        }
         match &sent {
             Sent::Stop => {
                 self.stop = self.stop.or(Some(now));
@@ -430,6 +438,17 @@ impl People {
         }
         // It is sent again if too many wait.
         self.exchange.arrive(sent);
+    }
+}
+
+/// [`Bug::OtherRating`]: the next one of the seven.
+fn change_ratings(reply: &mut Reply) {
+    for given in reply.answers.values_mut() {
+        if let Given::Typed(text) = given
+            && let Ok(rating) = text.parse::<i64>()
+        {
+            *text = (rating % 7 + 1).to_string();
+        }
     }
 }
 

@@ -217,6 +217,10 @@ impl<'a> Sitting<'a> {
                     if !was_set {
                         self.forget(view, time);
                     }
+                    if self.people.hide_suspensions() {
+                        let time_ms = i64::try_from(time.as_millis()).unwrap();
+                        self.clock.set(-time_ms);
+                    }
                     return self.clock.suspend(time);
                 }
                 Trouble::Stall(time) => {

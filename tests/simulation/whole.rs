@@ -354,6 +354,7 @@ impl Course {
                 let own = own.find(|s| s.participant.as_str() == person.id);
                 let own = own.ok_or_else(|| format!("{} is not there", person.id))?;
                 checks::whole(own, &self.protocol)?;
+                checks::table(own, &derived, &self.protocol)?;
             }
         }
         self.notice()?;

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use study_analysis::load::{Loaded, load};
-use study_base::text::ParticipantId;
+use study_base::text::{PartId, ParticipantId};
 use study_session::outcome::{Event, State};
 use study_session::store::{
     ClaimRequest, Claimed, Frozen, Plan, SeatKind, StateRequest, StudyFolder,
@@ -44,6 +44,35 @@ max_gap_h = 72
     load(folder).unwrap()
 }
 
+/// The same protocol in two groups, of which one rates fewer realizations.
+fn in_groups(folder: &Path, assign: &str) -> Loaded {
+    let more = format!(
+        r#"
+[[parts]]
+id = "real"
+kind = "rating"
+repetitions = 2
+
+[groups]
+assign = "{assign}"
+[[groups.list]]
+id = "everything"
+[[groups.list]]
+id = "fewer"
+models = ["lambda-0.9991", "lambda-0.9995"]
+
+# Asked after"#
+    );
+    let changes = [
+        ("study-protocol/1", "study-protocol/2"),
+        ("repetitions = 3\n", ""),
+        ("order = \"blocked\"\n", ""),
+        ("# Asked after", more.as_str()),
+    ];
+    changed_protocol("turn-signal", folder, &changes);
+    load(folder).unwrap()
+}
+
 /// A study whose sessions took place in March 2007.
 struct Old {
     home: tempfile::TempDir,
@@ -53,8 +82,12 @@ struct Old {
 
 impl Old {
     fn new() -> Self {
+        Self::of(two_sessions)
+    }
+
+    fn of(protocol: impl FnOnce(&Path) -> Loaded) -> Self {
         let home = tempfile::tempdir().unwrap();
-        let loaded = two_sessions(&home.path().join("protocol"));
+        let loaded = protocol(&home.path().join("protocol"));
         let results = home.path().join("results");
         let study = StudyFolder::open_or_create(&results, &frozen(&loaded), at(0)).unwrap();
         Self {
@@ -263,6 +296,44 @@ fn no_realization_no_answer_and_no_order_is_on_the_desk() {
     }
 }
 
+/// A group can have realizations of its own. Who gives it knows it; where the row decides, nobody reads it here.
+#[test]
+fn a_group_is_named_only_where_the_experimenter_gives_it() {
+    for (assign, given) in [("given", true), ("row", false)] {
+        let old = Old::of(|folder| in_groups(folder, assign));
+        let fewer = PartId::new("fewer").unwrap();
+        let group = given.then(|| fewer.clone());
+        let claim = ClaimRequest {
+            plan: Plan::of(&old.loaded.protocol, group, at(0).wall),
+            ..request("P01", SeatKind::Real)
+        };
+        let mut claimed = old.study.claim(&claim).unwrap();
+        let mut journal = claimed.folder.journal().unwrap();
+        let events = session("P01", 1, claimed.seat);
+        for (mut event, n) in events.into_iter().zip(0..).take(14) {
+            if let Event::SessionStarted(start) = &mut event {
+                start.fingerprints = old.loaded.fingerprints.clone();
+                start.assigned.group = Some(fewer.clone());
+            }
+            journal.append(at(n), &event).unwrap();
+        }
+        drop((journal, claimed));
+        let document = old.json(&[]);
+        let (_, out, _) = old.desk(&[]);
+        let groups = match given {
+            true => serde_json::json!([
+                {"group": "everything", "participants": 0},
+                {"group": "fewer", "participants": 1}
+            ]),
+            false => serde_json::json!([]),
+        };
+        assert_eq!(document["studies"][0]["groups"], groups);
+        let named = &person(&document, "P01")["group"];
+        assert_eq!(named.as_str(), given.then_some("fewer"));
+        assert_eq!(out.contains("fewer"), given, "{out}");
+    }
+}
+
 /// Names, bytes and times of change of all files.
 fn files(folder: &Path) -> BTreeMap<PathBuf, (Vec<u8>, std::time::SystemTime)> {
     let mut found = BTreeMap::new();
@@ -429,6 +500,17 @@ fn in_a_terminal_it_is_drawn_again_until_q() {
         assert_eq!(terminal.exit_code(), 0);
         assert!(!terminal.alternate());
     }
+    // A terminal that becomes smaller gets a smaller page, with what asks for somebody and the key.
+    let mut terminal = Terminal::start(&["desk", "results", "--watch"], old.home.path(), 24, 80);
+    terminal.wait_for("q: quit");
+    terminal.resize(20, 60);
+    terminal.wait_until("a page of 20 rows", |screen| {
+        let lines: Vec<&str> = screen.trim_end().lines().collect();
+        let fits = lines.len() <= 20 && screen.contains("OVERDUE: P01");
+        fits && lines.last().is_some_and(|line| line.starts_with("q: quit"))
+    });
+    terminal.keys("q");
+    assert_eq!(terminal.exit_code(), 0);
     // Somebody who begins meanwhile appears.
     let mut terminal = Terminal::start(&["desk", "results", "--watch"], old.home.path(), 24, 80);
     terminal.wait_for("1 unfinished");

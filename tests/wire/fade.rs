@@ -220,6 +220,10 @@ struct Pair {
 
 impl Pair {
     fn new(minor: u8) -> Self {
+        Self::of(minor, Options::default())
+    }
+
+    fn of(minor: u8, options: Options) -> Self {
         let settings = HostSettings {
             supervision_timeout: None,
             ..HostSettings::default()
@@ -228,7 +232,7 @@ impl Pair {
         host.connected(ms(0));
         let mut pair = Self {
             host,
-            device: Firmware::new(Options::default()),
+            device: Firmware::new(options),
             minor,
             decoder: Decoder::new(),
             now: ms(0),
@@ -285,10 +289,15 @@ impl Pair {
 
     /// Plays a second of a shipped table.
     fn plays(&mut self) {
+        self.plays_up_to(12.0);
+    }
+
+    /// The same with a force limit.
+    fn plays_up_to(&mut self, force_n: f64) {
         let path = "protocols/turn-signal-passive/models/passive.toml";
         let text = std::fs::read_to_string(path).unwrap();
         let table = file::parse(path, &text).0.unwrap();
-        let limits = Limits::new(12.0, 1000.0).unwrap();
+        let limits = Limits::new(force_n, 1000.0).unwrap();
         let what = Stimulus::of_table(&table);
         self.host.load(&what, limits, self.now).unwrap();
         self.pass(500);
@@ -346,4 +355,36 @@ fn a_device_of_an_older_minor_version_is_stopped_as_ever() {
         assert!(pair.stopped_s().is_some_and(|s| s < 1.05));
         assert_eq!(pair.faded_from_s(), None);
     }
+}
+
+/// From 2000 N a fall within the slew limit of 2 N/ms takes π/2 · 1 s, for which no session waits. What counts
+/// is the limit of what is loaded, not that of the device.
+#[test]
+fn a_fall_that_takes_too_long_is_a_stop() {
+    let strong = || Options {
+        limits: Limits::new(2000.0, 1000.0).unwrap(),
+        ..Options::default()
+    };
+    let mut pair = Pair::of(3, strong());
+    pair.plays_up_to(2000.0);
+    pair.host.fade(pair.now).unwrap();
+    pair.pass(20);
+    assert!(
+        matches!(pair.ends[..], [Request::Stop(_)]),
+        "{:?}",
+        pair.ends
+    );
+    assert_eq!(pair.device.held_n(), 0.0);
+    assert_eq!(pair.faded_from_s(), None);
+
+    let mut pair = Pair::of(3, strong());
+    pair.plays();
+    pair.host.fade(pair.now).unwrap();
+    pair.pass(450);
+    assert!(
+        matches!(pair.ends[..], [Request::Fade(_)]),
+        "{:?}",
+        pair.ends
+    );
+    assert!(pair.faded_from_s().is_some());
 }

@@ -135,6 +135,8 @@ pub struct Host {
     rearm_retry: Option<RearmRetry>,
     /// CRC of the table that is being uploaded or is loaded.
     crc: u32,
+    /// Force limit of that table, N.
+    limit_n: f64,
     playback: u32,
     /// Whether nothing but a force that falls was asked to end the playback.
     fades: bool,
@@ -250,6 +252,7 @@ impl Host {
         let upload = upload::of(table, limits, what.allow_uncertified, device)
             .map_err(|e| DeviceError::Refused(e.to_string()))?;
         self.crc = upload.crc;
+        self.limit_n = limits.force_n.get();
         self.pending = None;
         // From any state: zero force first, then idle.
         self.queue = [Request::Limp, Request::Rearm].into();

@@ -227,7 +227,7 @@ pub trait Device: Send {
     fn stop(&mut self, at: Duration) -> Result<(), DeviceError>;
 
     /// Stops playing without a step of the force, which falls to zero before, on a device that can
-    /// do so; [`Report::Faded`] then precedes [`Report::Stopped`]. Other devices stop at once.
+    /// do so in 1.5 s; [`Report::Faded`] then precedes [`Report::Stopped`]. Other devices stop at once.
     /// [`Device::stop`] and [`Device::limp`] end the fall at once.
     ///
     /// # Errors

@@ -181,6 +181,8 @@ pub struct Servo<R = f64> {
     clamping: bool,
     /// Servo periods of the fall so far, once the force falls.
     fallen: Option<u32>,
+    /// Whether the handle has left the range during the fall: no force is left.
+    released: bool,
     tally: Tally<R>,
 }
 
@@ -273,6 +275,7 @@ impl<R: Real> Servo<R> {
             held_n: R::ZERO,
             clamping: false,
             fallen: None,
+            released: false,
             tally: Tally::new(),
         }
     }
@@ -300,6 +303,9 @@ impl<R: Real> Servo<R> {
 
     /// Lets the force fall to zero from the next period on, by half a cosine over
     /// [`ServoSettings::fade_periods`]. It falls once: later calls change nothing.
+    ///
+    /// The wall beyond the range falls, too. A hand that leans against it goes through it, which is no
+    /// [`Trip::Stroke`]: the force is zero from then on.
     pub fn fade(&mut self) {
         self.fallen = self.fallen.or(Some(0));
     }
@@ -335,6 +341,7 @@ impl<R: Real> Servo<R> {
             return R::ZERO;
         }
         self.tally.add_motion(self.held_n, motion.x_mm, range_mm);
+        self.released |= self.fallen.is_some() && !self.is_near(range_mm, motion.x_mm);
 
         let constants = self.constants;
         let wanted_n =
@@ -357,15 +364,20 @@ impl<R: Real> Servo<R> {
         self.held_n
     }
 
-    fn trip_cause(&self, [low, high]: [R; 2], motion: Motion<R>) -> Option<Trip> {
+    /// Whether a position is beyond the range by no more than the overtravel.
+    fn is_near(&self, [low, high]: [R; 2], x_mm: R) -> bool {
+        let beyond = self.constants.overtravel_mm;
+        x_mm >= low - beyond && x_mm <= high + beyond
+    }
+
+    fn trip_cause(&self, range_mm: [R; 2], motion: Motion<R>) -> Option<Trip> {
         let Motion { x_mm, v_mm_s, .. } = motion;
         if !motion.is_finite() {
             return Some(Trip::NotANumber);
         }
-        let beyond = self.constants.overtravel_mm;
         // With `<=` a limit that is NaN trips.
         let slow_enough = v_mm_s.abs() <= self.constants.velocity_mm_s;
-        let near_enough = x_mm >= low - beyond && x_mm <= high + beyond;
+        let near_enough = self.fallen.is_some() || self.is_near(range_mm, x_mm);
         let steady = self
             .tally
             .last_x_mm()
@@ -461,6 +473,9 @@ impl<R: Real> Servo<R> {
             return R::ONE;
         };
         *fallen = fallen.saturating_add(1);
+        if self.released {
+            return R::ZERO;
+        }
         let fraction = (R::of(f64::from(*fallen)) / self.constants.fade_periods).min(R::ONE);
         R::HALF + R::HALF * (R::of(core::f64::consts::PI) * fraction).cos()
     }

@@ -193,8 +193,10 @@ fn counts(study: &Overview) -> String {
     count(real().filter(whole).count(), "done");
     count(real().filter(|p| p.next.is_some()).count(), "to come again");
     count(real().filter(|p| p.running).count(), "running now");
-    let unfinished = |p: &&Person| p.state == State::Unfinished && !p.running;
-    count(real().filter(unfinished).count(), "unfinished");
+    // Whoever comes again is counted once, also if the last session was void or left before it began.
+    let left = || real().filter(|p| p.next.is_none() && !p.running);
+    let unfinished = |p: &&Person| p.state == State::Unfinished;
+    count(left().filter(unfinished).count(), "unfinished");
     for state in [
         State::DroppedOut,
         State::NoShow,
@@ -202,7 +204,7 @@ fn counts(study: &Overview) -> String {
         State::Withdrawn,
         State::Void,
     ] {
-        count(real().filter(|p| p.state == state).count(), state.as_str());
+        count(left().filter(|p| p.state == state).count(), state.as_str());
     }
     words.join(", ")
 }
@@ -471,6 +473,23 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn everybody_is_counted_once() {
+        let mut study = many();
+        // A second session that was void, and one that was left before its first page.
+        study.participants[0].state = State::Void;
+        study.participants[0].next = coming(Due::Now, 20);
+        study.participants[1].state = State::Unfinished;
+        study.participants[1].next = coming(Due::Now, 20);
+        // A first session that was void.
+        study.participants[2].state = State::Void;
+        assert_eq!(
+            counts(&study),
+            "48 planned, 32 done, 5 to come again, 1 running now, 1 excluded, 1 void"
+        );
+        assert_eq!(32 + 5 + 1 + 1 + 1, study.participants.len());
     }
 
     #[test]

@@ -52,21 +52,30 @@ pub(super) fn watch(
         })
         .map_err(|error| Failure::input(format!("no thread can be started: {error}")))?;
     let (mut studies, mut trouble) = (first, None);
+    let mut read_at = Instant::now();
     loop {
         match read.try_iter().last() {
-            Some(Ok(newest)) => (studies, trouble) = (newest, None),
+            Some(Ok(newest)) => (studies, trouble, read_at) = (newest, None, Instant::now()),
             Some(Err(why)) => trouble = Some(why),
             None => {}
         }
-        let lines = |columns, rows| page(&studies, trouble.as_deref(), columns, rows);
+        // It grows while a disk hangs.
+        let age = read_at.elapsed();
+        let lines = |columns, rows| page(&studies, trouble.as_deref(), age, (columns, rows));
         if screen.leaves(lines, SLICE) {
             return Ok(());
         }
     }
 }
 
-/// The lines of a terminal of this size: the studies share its rows, and the last row has the key.
-fn page(studies: &[Overview], trouble: Option<&str>, columns: usize, rows: usize) -> Vec<String> {
+/// The lines of a terminal with so many columns and rows: the studies share its rows, and the last row has
+/// the key and the age of what is shown.
+fn page(
+    studies: &[Overview],
+    trouble: Option<&str>,
+    age: Duration,
+    (columns, rows): (usize, usize),
+) -> Vec<String> {
     let room = rows.saturating_sub(2);
     let each = (room / studies.len().max(1)).saturating_sub(1);
     let mut lines = Vec::new();
@@ -82,10 +91,25 @@ fn page(studies: &[Overview], trouble: Option<&str>, columns: usize, rows: usize
         Some(why) => one_line(&format!("CANNOT BE READ NOW: {why}"), columns),
         None => String::new(),
     });
-    let every = EVERY.as_secs();
+    let seconds = age.as_secs();
     lines.push(one_line(
-        &format!("q: quit · read every {every} s"),
+        &format!("q: quit · read {seconds} s ago"),
         columns,
     ));
     lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_row_says_how_old_everything_is_and_the_one_above_why() {
+        let age = Duration::from_secs(340);
+        let lines = page(&[], Some("the disk\u{1b}[2J hangs"), age, (60, 20));
+        assert_eq!(lines.len(), 20);
+        assert_eq!(lines[19], "q: quit · read 340 s ago");
+        assert_eq!(lines[18], "CANNOT BE READ NOW: the disk\\u{1b}[2J hangs");
+        assert_eq!(page(&[], None, age, (60, 20))[18], "");
+    }
 }

@@ -113,6 +113,10 @@ impl UiState {
                 }),
                 None => Err("There is no trial to mark as bad.".to_owned()),
             },
+            // What is declined or felt again is asked for on a page that is not on the screen.
+            Key::Decline | Key::Replay if self.at_desk => {
+                Err(self.desk.clone().unwrap_or_default())
+            }
             Key::Decline => match &view.screen {
                 Screen::Form { form, .. } if form.can_be_declined() => Ok(Dialog::Decline {
                     reason: Editor::new(""),
@@ -162,7 +166,7 @@ impl UiState {
 
     fn press_on_screen(&mut self, key: Key, view: &View) -> Vec<Input> {
         if self.at_desk {
-            return self.press_at_desk(key, view);
+            return self.press_at_desk(key);
         }
         let read = self.reading.scrolled >= self.reading.most;
         match &view.screen {
@@ -220,16 +224,11 @@ impl UiState {
     }
 
     /// Keys at the desk: nobody answers or goes on on a page that is not on the screen.
-    fn press_at_desk(&mut self, key: Key, view: &View) -> Vec<Input> {
-        match (key, &view.screen) {
-            // Elsewhere it is explained.
-            (Key::Replay, Screen::Form { .. } | Screen::Stopped { .. }) => vec![Input::PlayAgain],
-            (Key::Enter | Key::Tab | Key::BackTab | Key::Char(_), _) => {
-                self.notice.clone_from(&self.desk);
-                Vec::new()
-            }
-            _ => Vec::new(),
+    fn press_at_desk(&mut self, key: Key) -> Vec<Input> {
+        if matches!(key, Key::Enter | Key::Tab | Key::BackTab | Key::Char(_)) {
+            self.notice.clone_from(&self.desk);
         }
+        Vec::new()
     }
 
     fn press_who(

@@ -4,6 +4,7 @@ use super::exchange::Exchange;
 use super::uploads::Upload;
 use super::{CheckFailure, ClauseResult, fail, tag};
 use std::num::NonZeroU16;
+use std::ops::Range;
 use std::time::Duration;
 use study_wire::message::{
     Ack, DeviceState, EventKind, Fault, Heartbeat, MINOR, Outcome, Play, Refusal, Request, Stop,
@@ -15,10 +16,9 @@ const SECOND: Duration = Duration::from_secs(1);
 /// Resolution of two clocks of whole ms, and one ms for the transfer.
 const CLOCK_RESOLUTION_MS: f64 = 2.0;
 
-/// Rounding of forces and their changes, N.
-const ROUNDING_N: f64 = 1e-3;
-/// Largest force of the last sample of a force that falls, N: it may be some milliseconds old.
-const LAST_N: f64 = 0.1;
+/// Part of the force limit below which a force has fallen. In the second quarter of a fall at least half of
+/// the force is left, and in the last tenth 2.5 %: ½ + ½ cos(0.9 π).
+const FELL: f64 = 0.1;
 
 /// A current playback.
 pub(super) struct Playback {
@@ -274,11 +274,12 @@ pub(super) fn fade(exchange: &mut Exchange<'_>) -> ClauseResult {
         return Ok("it ends at once; a fall is refused".to_owned());
     };
     exchange.first_heartbeat()?;
-    let playback = play_for(exchange, 1.0, SECOND / 2)?;
     let device = exchange.identity()?;
+    let limit_n = super::FORCE_N.min(device.force_n);
+    let playback = play_for(exchange, limit_n, SECOND / 2)?;
     let servo = ServoSettings {
         servo_hz: device.servo_hz,
-        force_n: super::FORCE_N.min(device.force_n),
+        force_n: limit_n,
         slew_n_s: told.slew_n_s,
         ramp_s: told.ramp_s,
         ..ServoSettings::default()
@@ -295,24 +296,34 @@ pub(super) fn fade(exchange: &mut Exchange<'_>) -> ClauseResult {
     let outcome = exchange.outcome()?;
     let took_ms = overhang_ms(&playback, &ack, outcome.ticks);
     let (all, _) = samples(exchange, &playback);
-    let steepest_n_per_ms = all.windows(2).map(|two| {
-        let apart = two[1].tick.saturating_sub(two[0].tick).max(1);
-        let [before_n, after_n] = [two[0], two[1]].map(|s| fixed::from_un(s.command_un));
-        (after_n - before_n).abs() / (1e3 * f64::from(apart) / servo.servo_hz)
-    });
-    let steepest_n_per_ms = steepest_n_per_ms.fold(0.0, f64::max);
-    let last_n = all.last().map_or(0.0, |s| fixed::from_un(s.command_un));
+    let periods = servo.fade_periods();
+    let from = outcome.ticks.saturating_sub(periods);
+    // Largest force in a part of the fall; `None` without samples of it.
+    let largest_n = |part: Range<u32>| {
+        let within = |s: &&TelemetrySample| part.contains(&s.tick.saturating_sub(from));
+        let sizes_n = all.iter().filter(within);
+        let sizes_n = sizes_n.map(|s| fixed::from_un(s.command_un).abs());
+        sizes_n.reduce(f64::max)
+    };
+    let early_n = largest_n(periods / 4..periods / 2);
+    let late_n = largest_n(periods - periods / 10..u32::MAX);
+    let in_words = |force_n: Option<f64>| match force_n {
+        Some(force_n) => format!("{force_n:.3} N"),
+        None => "no samples".to_owned(),
+    };
     let seen = format!(
-        "{took_ms:.0} ms of {:.0} ms; at most {steepest_n_per_ms:.2} N/ms; the last sample {last_n:.3} N",
-        1e3 * fade_s
+        "{took_ms:.0} ms of {:.0} ms; in its second quarter {}, in its last tenth {}",
+        1e3 * fade_s,
+        in_words(early_n),
+        in_words(late_n)
     );
     if outcome.state != DeviceState::Loaded || outcome.fault != Fault::None {
         return fail(format!("{seen}; then {}, {}", outcome.state, outcome.fault));
     }
     let allowed_ms = 1.0 + 1e3 / servo.servo_hz + CLOCK_RESOLUTION_MS;
-    // What the hand causes changes no faster than the slew limit, either.
-    let steep = steepest_n_per_ms > 2e-3 * told.slew_n_s + ROUNDING_N;
-    if (took_ms - 1e3 * fade_s).abs() > allowed_ms || steep || last_n.abs() > LAST_N {
+    let at_once = early_n.is_some_and(|force_n| force_n < FELL * limit_n);
+    let too_late = late_n.is_some_and(|force_n| force_n > FELL * limit_n);
+    if (took_ms - 1e3 * fade_s).abs() > allowed_ms || at_once || too_late {
         return fail(seen);
     }
     Ok(seen)

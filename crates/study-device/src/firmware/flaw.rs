@@ -8,7 +8,8 @@ use std::collections::VecDeque;
 use std::time::Duration;
 use study_wire::frame::{Decoder, FRAME_CRC_LEN, Frame};
 use study_wire::message::{
-    Ack, DeviceState, Fault, FixedVec, Header, Heartbeat, Refusal, Reply, Request, kind,
+    Ack, DeviceState, Fault, FixedVec, Header, Heartbeat, Refusal, Reply, Request, Telemetry,
+    TelemetrySample, kind,
 };
 
 /// A planted defect, with the clause of `docs/wire.md` that it violates.
@@ -28,6 +29,8 @@ pub enum Flaw {
     TakesStale,
     /// 6.3: goes limp only 300 ms after the last heartbeat.
     LateWatchdog,
+    /// 5.5: reports no force from FADE on.
+    AbruptFade,
     /// 7.5: reports 1.5 times the commanded force.
     NoClamp,
     /// 8.3: accepts invalid tables and limits.
@@ -46,7 +49,7 @@ pub enum Flaw {
 
 impl Flaw {
     /// Every flaw with its name on the command line and its clause.
-    pub const ALL: [(Self, &'static str, &'static str); 14] = [
+    pub const ALL: [(Self, &'static str, &'static str); 15] = [
         (Self::TakesDamaged, "takes-damaged", "2.3"),
         (Self::OtherVersion, "other-version", "3.3"),
         (Self::DeafToLimp, "deaf-to-limp", "3.4"),
@@ -54,6 +57,7 @@ impl Flaw {
         (Self::Unlatched, "unlatched", "5.2"),
         (Self::TakesStale, "takes-stale", "6.1"),
         (Self::LateWatchdog, "late-watchdog", "6.3"),
+        (Self::AbruptFade, "abrupt-fade", "5.5"),
         (Self::NoClamp, "no-clamp", "7.5"),
         (Self::TakesBadTables, "takes-bad-tables", "8.3"),
         (Self::TakesUncertified, "takes-uncertified", "8.4"),
@@ -93,6 +97,8 @@ pub(super) struct FlawInjector {
     /// Original sequence number.
     stands_for: u16,
     telemetry: u32,
+    /// Whether FADE came after the last PLAY.
+    fades: bool,
 }
 
 impl FlawInjector {
@@ -106,6 +112,7 @@ impl FlawInjector {
             sequence: 0,
             stands_for: 0,
             telemetry: 0,
+            fades: false,
         }
     }
 
@@ -186,6 +193,8 @@ impl FlawInjector {
                 body[2..4].copy_from_slice(&self.sequence.to_le_bytes());
             }
             (Flaw::Repeats, Some(Request::Hello(_))) => self.sequence = header.sequence,
+            (Flaw::AbruptFade, Some(Request::Fade(_))) => self.fades = true,
+            (Flaw::AbruptFade, Some(Request::Play(_))) => self.fades = false,
             (Flaw::TakesStale | Flaw::LateWatchdog, Some(Request::Heartbeat(beat))) => {
                 let ahead_ms = if self.flaw == Flaw::LateWatchdog {
                     900
@@ -246,14 +255,11 @@ impl FlawInjector {
                     ack.state = DeviceState::Loaded;
                 }
             }
+            (Flaw::AbruptFade, Reply::Telemetry(telemetry)) if self.fades => {
+                change_forces(telemetry, |_| 0);
+            }
             (Flaw::NoClamp, Reply::Telemetry(telemetry)) => {
-                let mut samples = FixedVec::new();
-                for sample in telemetry.samples.as_slice() {
-                    let mut more = *sample;
-                    more.command_un = sample.command_un.saturating_add(sample.command_un / 2);
-                    samples.push(more);
-                }
-                telemetry.samples = samples;
+                change_forces(telemetry, |force_un| force_un.saturating_add(force_un / 2));
             }
             (Flaw::NoClamp, Reply::Outcome(outcome)) => outcome.peak_force_n *= 1.5,
             (Flaw::LosesTelemetry, Reply::Telemetry(_)) => {
@@ -272,6 +278,17 @@ impl FlawInjector {
         }
         Some((sequence, reply))
     }
+}
+
+fn change_forces(telemetry: &mut Telemetry, change: impl Fn(i32) -> i32) {
+    let mut samples = FixedVec::new();
+    for sample in telemetry.samples.as_slice() {
+        samples.push(TelemetrySample {
+            command_un: change(sample.command_un),
+            ..*sample
+        });
+    }
+    telemetry.samples = samples;
 }
 
 fn pretend_idle(state: &mut DeviceState, fault: &mut Fault) {

@@ -52,7 +52,7 @@ impl Predicted {
 ///
 /// Between two samples the motion is interpolated, so that the servo runs at its own
 /// rate. `acceleration_m_s2` is that of a sample. From `faded_from_s` on, if it is known, the force
-/// falls.
+/// falls, and is zero once the handle has left the range.
 pub(super) fn predicted(
     what: &Rendering<'_>,
     settings: ServoSettings,
@@ -79,6 +79,9 @@ pub(super) fn predicted(
     let mut since_gap: Option<[f64; 2]> = None;
     let mut since_turn: Option<[f64; 2]> = None;
     let memory_mm = memory_mm(&what.law);
+    let ([low, high], beyond_mm) = (what.range_mm, settings.overtravel_mm);
+    let is_near = |x_mm: f64| x_mm >= low - beyond_mm && x_mm <= high + beyond_mm;
+    let mut released = false;
     for (i, sample) in samples.iter().enumerate() {
         let here = Motion {
             x_mm: sample.x_mm,
@@ -111,17 +114,20 @@ pub(super) fn predicted(
             let between = |a: f64, b: f64| a + part * (b - a);
             // It fell from a servo period on, whose time is rounded.
             let falls_s = between(from_s, sample.t_s) + 0.5 / hz;
+            let x_mm = between(from.x_mm, here.x_mm);
             if faded_from_s.is_some_and(|begins_s| falls_s >= begins_s) {
                 servo.fade();
+                released |= !is_near(x_mm);
             }
-            force_n = servo.step(
+            let stepped_n = servo.step(
                 what,
                 Motion {
-                    x_mm: between(from.x_mm, here.x_mm),
+                    x_mm,
                     v_mm_s: between(from.v_mm_s, here.v_mm_s),
                     a_m_s2: between(from.a_m_s2, here.a_m_s2),
                 },
             );
+            force_n = if released { 0.0 } else { stepped_n };
             ends_n = [ends_n[0].min(force_n), ends_n[1].max(force_n)];
         }
         all.push(Predicted {

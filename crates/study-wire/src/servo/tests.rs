@@ -487,3 +487,56 @@ fn a_fall_supplies_no_more_than_the_springs_hold() {
     }
     assert!(least_j > -1e-4, "{least_j}");
 }
+
+/// A hand with 5 N against the wall goes through it when the wall falls, and a playback that was to end
+/// does not end with a fault.
+#[test]
+fn a_hand_that_leans_against_the_wall_goes_through_it_without_a_trip() {
+    let what = damper(&NONE);
+    let pressed = |fades: bool| {
+        let mut servo = Servo::new(bare());
+        servo.start();
+        // Half a millimeter of the wall.
+        for _ in 0..4000 {
+            servo.step(&what, motion(30.5, 0.0));
+        }
+        assert!((servo.held_n() - 5.0).abs() < 1e-9);
+        if fades {
+            servo.fade();
+        }
+        // 10 mm/s.
+        let at = |period: i32| motion(30.5 + 0.0025 * f64::from(period), 10.0);
+        let forces_n: Vec<f64> = (1..=1600).map(|n| servo.step(&what, at(n))).collect();
+        (servo, forces_n)
+    };
+    let (servo, forces_n) = pressed(true);
+    assert_eq!(servo.state(), ServoState::Playing);
+    assert!(servo.faded());
+    // 32.5 mm are reached after 800 periods, and are still in the overtravel.
+    let gone = forces_n.iter().position(|n| *n == 0.0).unwrap();
+    assert!((799..=801).contains(&gone), "{gone}");
+    assert!(forces_n[gone..].iter().all(|n| *n == 0.0));
+    // 5 to 12 N, which is the limit, by half.
+    assert!(
+        (5.0..=6.1).contains(&forces_n[gone - 1]),
+        "{}",
+        forces_n[gone - 1]
+    );
+
+    let (servo, _) = pressed(false);
+    assert_eq!(servo.state(), ServoState::Tripped(Trip::Stroke));
+
+    // What else trips does so during a fall.
+    for (bad, cause) in [
+        (motion(15.0, 1001.0), Trip::Velocity),
+        (motion(40.0, 0.0), Trip::Encoder),
+        (motion(f64::NAN, 0.0), Trip::NotANumber),
+    ] {
+        let mut servo = Servo::new(bare());
+        servo.start();
+        servo.step(&what, motion(15.0, 0.0));
+        servo.fade();
+        assert_eq!(servo.step(&what, bad), 0.0);
+        assert_eq!(servo.state(), ServoState::Tripped(cause));
+    }
+}

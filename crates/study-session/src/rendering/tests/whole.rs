@@ -446,3 +446,61 @@ fn a_fall_is_not_compared_with_other_constants() {
     );
     assert_eq!(found.verdict, Verdict::Ok, "{found:?}");
 }
+
+/// Whoever leans against the wall goes through it in a fall: no force is left then, and none is expected.
+#[test]
+fn no_force_is_expected_beyond_the_wall_of_a_fall() {
+    let (table, w) = (table(), std::f64::consts::TAU * STROKES_HZ);
+    let x_mm = |t_s: f64| CENTER_MM - AMPLITUDE_MM * (w * t_s).cos();
+    let v_mm_s = |t_s: f64| AMPLITUDE_MM * w * (w * t_s).sin();
+    // From the place and the speed at the beginning of the fall to 36 mm within 0.2 s, in half of it.
+    let (x0_mm, v0_mm_s) = (x_mm(FALLS_S), v_mm_s(FALLS_S));
+    let a_mm_s2 = (36.0 - x0_mm - 0.2 * v0_mm_s) / 0.02;
+    let mut device = Servo::new(servo());
+    device.start();
+    let mut samples = Vec::new();
+    for tick in 0..(5.0 * HZ) as u32 {
+        let t_s = f64::from(tick) / HZ;
+        let since_s = t_s - FALLS_S;
+        let falls = since_s > -0.5 / HZ;
+        let motion = match falls {
+            false => Motion {
+                x_mm: x_mm(t_s),
+                v_mm_s: v_mm_s(t_s),
+                a_m_s2: 1e-3 * AMPLITUDE_MM * w * w * (w * t_s).cos(),
+            },
+            true => Motion {
+                x_mm: x0_mm + since_s * (v0_mm_s + 0.5 * a_mm_s2 * since_s),
+                v_mm_s: v0_mm_s + a_mm_s2 * since_s,
+                a_m_s2: 1e-3 * a_mm_s2,
+            },
+        };
+        if falls {
+            device.fade();
+        }
+        let force_command_n = device.step(&table.what(), motion);
+        if tick % 4 == 0 {
+            samples.push(Sample {
+                t_s,
+                x_mm: motion.x_mm,
+                v_mm_s: motion.v_mm_s,
+                force_command_n,
+                force_measured_n: None,
+            });
+        }
+    }
+    assert!(device.faded() && device.held_n() == 0.0);
+    let beyond = samples.iter().filter(|s| s.x_mm > 33.0);
+    assert!(beyond.clone().count() > 100);
+    assert!(beyond.clone().all(|s| s.force_command_n == 0.0));
+    let told = |played: &mut Played<'_>| played.faded_from_s = Some(FALLS_S);
+    let found = verdict(&samples, told, |_| ());
+    assert!(!found.defects.contains(&Defect::Error), "{found:?}");
+    // With half of the force of the wall instead.
+    let pushed = forced(&samples, |s| match s.x_mm > 33.0 {
+        true => 0.5 * LIMIT_N,
+        false => s.force_command_n,
+    });
+    let found = verdict(&pushed, told, |_| ());
+    assert!(found.defects.contains(&Defect::Error), "{found:?}");
+}
