@@ -105,56 +105,6 @@ impl Device for Sending {
 mod tests {
     use super::*;
     use crate::manual::Manual;
-    use std::sync::Arc;
-    use std::sync::atomic::{AtomicBool, Ordering};
-
-    /// A device that remembers whether its force was to fall.
-    struct Falls(Manual, Arc<AtomicBool>);
-
-    impl Device for Falls {
-        fn identity(&self) -> Identity {
-            self.0.identity()
-        }
-
-        fn load(
-            &mut self,
-            what: &Stimulus<'_>,
-            limits: Limits,
-            at: Duration,
-        ) -> Result<(), DeviceError> {
-            self.0.load(what, limits, at)
-        }
-
-        fn start(&mut self, at: Duration) -> Result<(), DeviceError> {
-            self.0.start(at)
-        }
-
-        fn stop(&mut self, at: Duration) -> Result<(), DeviceError> {
-            self.0.stop(at)
-        }
-
-        fn fade(&mut self, _: Duration) -> Result<(), DeviceError> {
-            self.1.store(true, Ordering::Relaxed);
-            Ok(())
-        }
-
-        fn limp(&mut self, at: Duration) {
-            self.0.limp(at);
-        }
-
-        fn poll(&mut self, at: Duration) -> Vec<Report> {
-            self.0.poll(at)
-        }
-    }
-
-    #[test]
-    fn a_fall_reaches_the_device() {
-        let fell = Arc::new(AtomicBool::new(false));
-        let device = Falls(Manual::default(), fell.clone());
-        let mut device = Sending::new(Box::new(device), Vec::new(), 1);
-        device.fade(Duration::ZERO).unwrap();
-        assert!(fell.load(Ordering::Relaxed));
-    }
 
     #[test]
     fn each_playback_sends_its_numbers_before_its_end() {
