@@ -90,6 +90,11 @@ impl<'d, 't> Section<'d, 't> {
         }
     }
 
+    /// Whether the file has it. One that is absent is read as an empty one.
+    pub(super) fn is_there(&self) -> bool {
+        self.table.is_some()
+    }
+
     /// Its path, such as `questions[0]`.
     pub(super) fn path(&self) -> &str {
         self.table.as_ref().map_or("", Table::path)

@@ -188,7 +188,8 @@ pub(super) fn consent(mut section: Section<'_, '_>) -> Option<Consent> {
 }
 
 pub(super) fn debriefing(mut section: Section<'_, '_>) -> Option<Debriefing> {
-    if section.value("text").is_none() && section.value("file").is_none() {
+    let says_nothing = section.value("text").is_none() && section.value("file").is_none();
+    if section.is_there() && says_nothing {
         let fault = Fault::error("[debriefing] is empty");
         section.fault_at(
             "text",
