@@ -421,7 +421,14 @@ mod tests {
         let mut texts: Vec<String> = new.map(str::to_owned).collect();
         for folder in subfolders(&Path::new(env!("CARGO_MANIFEST_DIR")).join("protocols")).unwrap()
         {
-            texts.push(fs::read_to_string(folder.join(load::FILE_NAME)).unwrap());
+            // A folder has a study, or designs of a file each.
+            let study = folder.join(load::FILE_NAME);
+            let designs = fs::read_dir(&folder).unwrap().map(|f| f.unwrap().path());
+            let files: Vec<PathBuf> = match study.exists() {
+                true => vec![study],
+                false => designs.collect(),
+            };
+            texts.extend(files.iter().map(|file| fs::read_to_string(file).unwrap()));
         }
         assert!(texts.len() > 20, "{}", texts.len());
         for text in texts {

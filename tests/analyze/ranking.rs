@@ -151,12 +151,7 @@ fn what_everybody_puts_first_or_last_has_bounds() {
         page.split_whitespace().collect::<Vec<_>>().join(" ")
     };
     let page = words(&table);
-    for said in [
-        "has no upper limit",
-        "one end",
-        "sum to 0 within a level",
-        "In 7 of 10 pairs one was above the other in every ranking (sign tests, Holm's correction over all pairs, largest p = .020).",
-    ] {
+    for said in ["has no upper limit", "one end", "sum to 0 within a level"] {
         assert!(page.contains(said), "{said}:\n{page}");
     }
     let apart = "participant,realization,rank\nP1,a,1\nP1,c,2\nP2,b,1\nP2,c,2\n";

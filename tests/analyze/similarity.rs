@@ -215,7 +215,7 @@ fn people_who_weigh_dimensions_differently_have_weights() {
         &["--task", "similarity"],
     ));
     assert!(
-        page.contains("Weights of the dimensions") && page.contains("Map with weights"),
+        page.contains("Weights of the dimensions") && page.contains("cannot be turned"),
         "{page}"
     );
     for (table, why) in [

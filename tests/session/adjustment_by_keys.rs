@@ -203,7 +203,7 @@ fn every_level_but_the_confirmed_one_ends_with_a_fall() {
     assert_eq!(code, 0, "{out}{err}");
     let (mut falls, mut stops) = (0, 0);
     for participant in ["SIM001", "SIM002"] {
-        let journal = format!("r/sessions/{participant}/journal.jsonl");
+        let journal = format!("r/p/sessions/{participant}/1/journal.jsonl");
         let text = std::fs::read_to_string(folder.join(journal)).unwrap();
         let lines = text.lines();
         let events: Vec<Json> = lines

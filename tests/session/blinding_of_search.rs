@@ -186,7 +186,11 @@ fn where_in_its_space_a_stimulus_lies_is_on_no_screen_and_takes_no_time() {
             points.extend(felt);
         }
         assert_eq!(points.len(), POINTS, "{points:?}");
-        assert_eq!(orders.len(), 2, "either point came first");
+        assert_eq!(
+            orders.len(),
+            2,
+            "either point came first: {orders:?} {points:?}"
+        );
     }
 }
 

@@ -68,7 +68,8 @@ fn a_session_over(bridge: &str, mock: &[&str], options: &str) {
     let telemetry = folder
         .path()
         .join("results/turn-signal/sessions/P01/1/telemetry");
-    assert_eq!(std::fs::read_dir(telemetry).unwrap().count(), 5);
+    // and a trial may take several attempts
+    assert!(std::fs::read_dir(telemetry).unwrap().count() >= 5);
     let told = pages.iter().find(|page| page.contains("lambda"));
     assert_eq!(told, None);
 }

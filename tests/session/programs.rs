@@ -3,11 +3,11 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use super::devices::has_python;
-use crate::support::player::play_until;
+use crate::support::player::play_to_end;
 use crate::support::repository;
 use std::fs;
 
-/// The example with a change, in a session up to the words on the screen.
+/// The example with a change, in a whole session, whose journal has the words.
 fn trouble(from: &str, to: &str, words: &[&str]) {
     if !has_python() {
         return;
@@ -25,7 +25,7 @@ fn trouble(from: &str, to: &str, words: &[&str]) {
     fs::write(&script, example.replacen(from, to, 1)).unwrap();
     let command = format!("python3 '{}'", script.display());
     let mut terminal = super::devices::run(folder.path(), &protocol, &["--command", &command]);
-    play_until(&mut terminal, "P01", "The session is finished");
+    play_to_end(&mut terminal, "P01");
     let journal = folder
         .path()
         .join("results/turn-signal/sessions/P01/1/journal.jsonl");

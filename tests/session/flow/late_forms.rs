@@ -267,9 +267,9 @@ fn a_form_after_a_pause_is_retraced_as_it_was_shown() {
     let mut rig = Rig::new(protocol.clone());
     (rig.pages, rig.watched) = (Some(Vec::new()), false);
     until_asked(&mut rig);
-    pause(&mut rig, 100.0);
+    pause(rig.wait(1.0), 100.0);
     rig.answer_page();
-    pause(&mut rig, 2.0);
+    pause(rig.wait(1.0), 2.0);
     rig.finish();
     let delayed = |e: &Event| matches!(e, Event::FormDelayed { .. });
     assert_eq!(rig.count(delayed), 2);

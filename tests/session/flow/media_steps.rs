@@ -119,6 +119,7 @@ fn failures_of_media_are_retraced_as_they_were_shown() {
     came(&mut rig, Medium::Picture, 20.0, 1.0);
     rig.send(Input::Advance);
     assert_eq!(screen(&rig), "Form");
+    rig.wait(1.0);
     lost(&mut rig, 2, Loss::Asleep);
     finish(&mut rig);
     rig.assert_whole();
