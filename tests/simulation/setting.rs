@@ -2,17 +2,18 @@
 
 use crate::bugs::Bug;
 use crate::disk::{Death, SimDisk};
-use crate::memory::{Crash, MemoryDisk};
+use crate::memory::{Crash, Fault, MemoryDisk};
 use crate::tables;
 use crate::world::{self, Kept, model, question};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 use study_base::text::ModelId;
 use study_haptics::model::Realization;
 use study_plan::protocol::{Breaks, Consent, Exposure, Question, QuestionKind, kinds};
-use study_session::outcome::Moment;
+use study_session::outcome::{Event, Moment};
 use study_session::store::disk::Disk;
 use study_session::store::{SeatKind, SessionData, StoreError, StudyFolder, layout};
 
@@ -168,6 +169,50 @@ impl Disks {
         let is_segment = |name: &str| layout::segment_number(name).is_some();
         let segments = self.0[side].on_medium(&session, is_segment);
         String::from_utf8_lossy(&segments.concat()).into_owned()
+    }
+
+    /// Whether one of two disks has what a loss of power would not leave on the other: a record in
+    /// the journal of a session, or a file of telemetry. Its removal would then be that of the only copy.
+    pub(crate) fn is_ahead(&self, side: usize) -> bool {
+        let other = 1 - side;
+        let [own, copies] = [side, other].map(|side| study_path(side).join(layout::SESSIONS));
+        let is_segment = |name: &str| layout::segment_number(name).is_some();
+        let others = self.0[other].files();
+        let is_alone = |(path, bytes): (&PathBuf, &Vec<u8>)| {
+            let Ok(inside) = path.strip_prefix(&own) else {
+                return false;
+            };
+            let copy = copies.join(inside);
+            let folder = copy.parent().unwrap();
+            let name = copy.file_name().unwrap().to_str().unwrap();
+            if is_segment(name) {
+                let journal = self.0[other].on_medium(folder, is_segment).join(&b'\n');
+                let there: BTreeSet<&[u8]> = journal.split(|byte| *byte == b'\n').collect();
+                let mut lines = bytes.split(|byte| *byte == b'\n');
+                return lines.any(|line| !line.is_empty() && !there.contains(line));
+            }
+            folder.ends_with(layout::TELEMETRY) && !others.contains_key(&copy)
+        };
+        self.0[side].files().iter().any(is_alone)
+    }
+}
+
+/// A record that is on one disk alone is seen there, also if the other one has it in its cache.
+#[test]
+fn a_disk_is_ahead_while_it_alone_has_a_record() {
+    // Of a record the write fails, or its sync.
+    for fails in [0, 1] {
+        let (disks, kept) = (Disks::new(true), kept());
+        let death = Death::default();
+        let study = disks.open(&kept, &death, None, world::at(0)).unwrap();
+        let mut claimed = study.claim(&world::real("P01")).unwrap();
+        let mut journal = claimed.folder.journal().unwrap();
+        let ahead = |disks: &Disks| [0, 1].map(|side| disks.is_ahead(side));
+        assert_eq!(ahead(&disks), [false, false]);
+        let mirror = &disks.0[1];
+        mirror.plan(mirror.calls() + fails, Fault::Error(ErrorKind::Other));
+        journal.append(world::at(1), &Event::Paused).unwrap();
+        assert_eq!(ahead(&disks), [true, false], "call {fails}");
     }
 }
 

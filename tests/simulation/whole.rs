@@ -7,7 +7,7 @@ use crate::clock::SimClock;
 use crate::device::SimDevice;
 use crate::disk::Death;
 use crate::faults::Plan;
-use crate::memory::Crash;
+use crate::memory::{Crash, Fault};
 use crate::people::{Ledger, People};
 use crate::setting::{Disks, LONGEST_PAUSE, PEOPLE, Person, kept, realizations, study_path};
 use crate::sitting::{Before, Sitting, turns};
@@ -23,8 +23,8 @@ use study_base::rng::Stream;
 use study_base::text::ModelId;
 use study_haptics::model::Realization;
 use study_plan::protocol::{DeviceKind, Protocol};
-use study_session::outcome::Entry;
-use study_session::session::{Config, Ending};
+use study_session::outcome::{Entry, Event};
+use study_session::session::{Config, Ending, Unsaved};
 use study_session::store::{SeatKind, SessionData, StoreError, StudyFolder};
 
 /// Sittings without faults that a participant needs to finish, at most.
@@ -176,11 +176,6 @@ impl Course {
         self.log.push(format!("{number}: {}, {plan:?}", person.id));
         let before = self.before(person)?;
         self.disks.mount();
-        for (disk, fault) in self.disks.0.iter().zip(plan.disks) {
-            if let Some((call, fault)) = fault {
-                disk.plan(call, fault);
-            }
-        }
         let death = Death::default();
         let origin = Duration::from_secs(self.chance.below(1_000_000));
         let clock = SimClock::new(self.wall(), origin);
@@ -202,6 +197,23 @@ impl Course {
         }
     }
 
+    /// Plans what goes wrong with the disks. A disk whose records are not all on the other one is
+    /// removed only after the folder is opened, which copies them: that the only copy is lost is beyond
+    /// what a mirror promises. Returns the disk, and the call after that.
+    fn plan_faults(&self, plan: &Plan) -> Option<(usize, usize)> {
+        let mut later = None;
+        for (side, fault) in plan.disks.into_iter().enumerate() {
+            match fault {
+                Some((call, Fault::Removed)) if self.disks.is_ahead(side) => {
+                    later = Some((side, call));
+                }
+                Some((call, fault)) => self.disks.0[side].plan(call, fault),
+                None => {}
+            }
+        }
+        later
+    }
+
     /// From the opening of the folder to the tables. `None` if there was no session, or if
     /// something is not saved.
     fn process(
@@ -216,7 +228,12 @@ impl Course {
         let device_seed = self.chance.next_u64();
         let faults = (plan.device_faults, plan.uneven);
         let device = SimDevice::new(device_seed, clock, death, self.bug, faults);
+        let removed_later = self.plan_faults(plan);
         let opened = self.disks.open(&self.kept, death, self.bug, clock.now());
+        if let (Ok(_), Some((side, call))) = (&opened, removed_later) {
+            let disk = &self.disks.0[side];
+            disk.plan(disk.calls() + call, Fault::Removed);
+        }
         let study = match opened.and_then(|study| study.refresh(&self.protocol).map(|_| study)) {
             Ok(study) => study,
             Err(error) => {
@@ -273,7 +290,15 @@ impl Course {
             let journal = self.disks.journal_on_medium(side, person.id);
             journal.contains("\"event\":\"finished\"")
         };
-        if ended.ending == Ending::Finished && !sides.any(finished) {
+        // What no disk takes is named as unsaved, and the program does not say that it is finished.
+        let is_named = |unsaved: &Unsaved| {
+            let mut events = unsaved.events.iter();
+            events.any(|(_, event)| *event == Event::Finished)
+        };
+        if ended.ending == Ending::Finished
+            && !sides.any(finished)
+            && !ended.unsaved.as_ref().is_some_and(is_named)
+        {
             return Err("it has finished, and no disk has it".to_owned());
         }
         self.seen.unsaved += u32::from(ended.unsaved.is_some());

@@ -255,6 +255,38 @@ fn an_erasure_reaches_the_mirror_at_the_next_start() {
     assert_eq!(journal, None);
 }
 
+/// A sync fails, and the process dies before it writes more: both sides read the same, and what is on the medium of one is not
+/// on that of the other.
+#[test]
+fn what_a_failed_sync_left_in_doubt_is_written_again_at_the_next_start() {
+    for side in [0, 1] {
+        let disks = Disks::new();
+        let (study, _) = disks.open().unwrap();
+        let mut claimed = study.claim(&real("P01")).unwrap();
+        let mut journal = claimed.folder.journal().unwrap();
+        let start = started("P01", claimed.session, claimed.seat);
+        let disk = &disks.0[side];
+        // A record is a write and a sync.
+        disk.plan(disk.calls() + 1, Fault::Error(ErrorKind::Other));
+        journal.append(at(1), &start).unwrap();
+        assert!(!study.copies().unwrap().in_step());
+        drop((journal, claimed, study));
+        let next = disks.after(Crash::Process);
+        let (study, notices) = next.open().unwrap();
+        assert!(study.copies().unwrap().in_step());
+        let leads = ["behind the mirror", "behind the results folder"][side];
+        assert!(notices.iter().any(|n| n.contains(leads)), "{notices:?}");
+        drop(study);
+        assert_eq!(next.differences(), []);
+        // Without power, and without the other disk.
+        let alone = Arc::new(next.0[side].after(Crash::OnlySynced));
+        let copy = StudyFolder::open_on(alone, &path(side)).unwrap();
+        let sessions = copy.sessions().unwrap();
+        assert!(!sessions[0].truncated, "{}", ROOTS[side]);
+        assert_eq!(sessions[0].entries.len(), 1, "{}", ROOTS[side]);
+    }
+}
+
 /// The participant's copy of a consent, on one disk or both.
 fn consents(disks: &Disks) -> [bool; 2] {
     [0, 1].map(|side: usize| {

@@ -7,10 +7,11 @@
 use super::Side;
 use crate::store::disk::Disk;
 use crate::store::error::{At as _, StoreError};
-use crate::store::head::Head;
+use crate::store::head::{Head, HeadFile};
 use crate::store::manifest::Manifest;
 use crate::store::replay::{Replay, replay};
 use crate::store::{atomic, journal, layout, lock_study, make_folders, remove_all};
+use std::cmp::Reverse;
 use std::collections::BTreeSet;
 use std::io::ErrorKind;
 use std::path::PathBuf;
@@ -118,9 +119,14 @@ impl Pair<'_> {
         if self.read(to, name)?.is_some_and(|old| old == bytes) {
             return Ok(false);
         }
-        self.make()?;
-        atomic::replace(self.disk(to), &self.at(to).join(name), &bytes)?;
+        self.put(to, name, &bytes)?;
         Ok(true)
+    }
+
+    /// Writes a file on a side.
+    fn put(&self, to: usize, name: &str, bytes: &[u8]) -> Result<(), StoreError> {
+        self.make()?;
+        atomic::replace(self.disk(to), &self.at(to).join(name), bytes)
     }
 
     /// Copies a file from the side that leads or, if only the other has it, from there;
@@ -128,6 +134,15 @@ impl Pair<'_> {
     fn copy_all(&self, lead: usize, name: &str) -> Result<bool, StoreError> {
         match self.read(lead, name)? {
             Some(_) => self.copy(lead, name),
+            None => self.copy(1 - lead, name),
+        }
+    }
+
+    /// As [`Self::copy_all`], also where the file reads the same on both sides: after a sync that
+    /// failed, what is read may not be on the medium.
+    fn write_again(&self, lead: usize, name: &str) -> Result<bool, StoreError> {
+        match self.read(lead, name)? {
+            Some(bytes) => self.put(1 - lead, name, &bytes).map(|()| true),
             None => self.copy(1 - lead, name),
         }
     }
@@ -275,27 +290,37 @@ impl Pair<'_> {
                 None => return Ok(()),
             }
         }
-        let (results, mirror) = (self.replay(0)?, self.replay(1)?);
+        let ((results, results_head), (mirror, mirror_head)) = (self.journal(0)?, self.journal(1)?);
         let contains = |a: &Replay, b: &Replay| b.hashes.iter().all(|h| a.hashes.contains(h));
         let lead = match (contains(&results, &mirror), contains(&mirror, &results)) {
-            (true, true) => usize::from(mirror.damage.len() < results.damage.len()),
+            (true, true) => {
+                let last = |head: &HeadFile| Reverse(head.head().map(|head| head.seq));
+                let results = (results.damage.len(), last(&results_head));
+                usize::from((mirror.damage.len(), last(&mirror_head)) < results)
+            }
             (true, false) => 0,
             (false, true) => 1,
             (false, false) => return Err(self.differs()),
         };
         let decided = [&results, &mirror][lead].history.consent.as_ref();
         let refused = decided.is_some_and(|decided| !decided.accepted);
+        // One side has not acknowledged what the other one has.
+        let in_doubt = results_head != mirror_head;
         let mut files = 0;
         for folder in [self.clone(), self.inner(layout::TELEMETRY)] {
             for name in folder.names()? {
                 // A copy from before a crash, whose participant then refused.
                 if refused && name == layout::CONSENT {
                     files += usize::from(folder.remove(&name)?);
-                } else if name != layout::TELEMETRY {
+                } else if in_doubt && layout::segment_number(&name).is_some() {
+                    files += usize::from(folder.write_again(lead, &name)?);
+                } else if ![layout::TELEMETRY, layout::HEAD].contains(&name.as_str()) {
                     files += usize::from(folder.copy_all(lead, &name)?);
                 }
             }
         }
+        // What it acknowledges is there now, also if this process dies before.
+        files += usize::from(self.copy_all(lead, layout::HEAD)?);
         if files > 0 {
             notices.push(updated(lead, &self.path.display().to_string()));
         }
@@ -303,9 +328,15 @@ impl Pair<'_> {
     }
 
     fn replay(&self, side: usize) -> Result<Replay, StoreError> {
+        self.journal(side).map(|(replay, _)| replay)
+    }
+
+    /// The journal of a session, and what it says of its last record.
+    fn journal(&self, side: usize) -> Result<(Replay, HeadFile), StoreError> {
         let path = self.at(side);
         let head = Head::read(self.disk(side), &path)?;
-        Ok(replay(&journal::segments(self.disk(side), &path)?, &head))
+        let replay = replay(&journal::segments(self.disk(side), &path)?, &head);
+        Ok((replay, head))
     }
 }
 
