@@ -4,6 +4,7 @@ use crate::cli::overview::{Coming, Copied, Overview, Person, Reality};
 use crate::tui::desk::size;
 use crate::tui::wrap::{one_line, width};
 use std::cmp::Reverse;
+use study_base::sort::SmallSort as _;
 use study_base::text::counted;
 use study_session::outcome::State;
 use study_session::store::{Due, when};
@@ -42,7 +43,7 @@ pub(super) fn within(study: &Overview, columns: usize, rows: usize) -> Vec<Strin
         .collect();
     lines.truncate(rows);
     let mut people: Vec<&Person> = study.participants.iter().collect();
-    people.sort_by_key(|person| (urgency(person), Reverse(person.last_activity)));
+    people.small_sort_by_key(|person| (urgency(person), Reverse(person.last_activity)));
     let table = table(&people, Some(columns));
     let room = rows.saturating_sub(lines.len() + 1);
     // A head and one participant, and a line that counts the others.
@@ -114,7 +115,7 @@ fn summary(study: &Overview, named: usize) -> Vec<String> {
     ] {
         let comes = |person: &&Person| person.next.as_ref().is_some_and(|next| next.due == due);
         let mut who: Vec<&Person> = study.participants.iter().filter(comes).collect();
-        who.sort_by_key(|person| {
+        who.small_sort_by_key(|person| {
             person
                 .next
                 .as_ref()

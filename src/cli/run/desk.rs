@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
+use study_base::sort::SmallSort as _;
 use study_plan::protocol::phrases::Words;
 use study_plan::protocol::{Protocol, ScaleDirection};
 use study_session::session::Roster;
@@ -70,7 +71,7 @@ fn returns(sessions: &[SessionData], kind: SeatKind, plan: &Plan) -> [Vec<Visit>
             Some((*own.first()?, comes_again(&own, plan)?))
         })
         .collect();
-    all.sort_by_key(|(_, again)| again.until.unwrap_or(again.from));
+    all.small_sort_by_key(|(_, again)| again.until.unwrap_or(again.from));
     [Due::Overdue, Due::Now].map(|due| {
         let of_due = all.iter().filter(|(_, again)| again.due(now) == due);
         let visit = |(session, again): &(&SessionData, Return)| Visit {

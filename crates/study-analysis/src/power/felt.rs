@@ -19,6 +19,7 @@ use crate::analyze::psychophysics::{
 };
 use std::collections::BTreeMap;
 use study_base::rng::Stream;
+use study_base::sort::SmallSort as _;
 
 /// What is assumed of the realizations of a part, and what participants do with them.
 #[derive(Debug, Clone, PartialEq)]
@@ -274,7 +275,7 @@ impl<'a> FeltJudge<'a> {
 /// The ranks of what was felt, the largest first; it has the rank of the one before if it is less than `apart` away.
 fn ranks(felt: &[f64], apart: f64) -> Vec<f64> {
     let mut order: Vec<usize> = (0..felt.len()).collect();
-    order.sort_by(|a, b| felt[*b].total_cmp(&felt[*a]));
+    order.small_sort_by(|a, b| felt[*b].total_cmp(&felt[*a]));
     let (mut ranks, mut rank) = (vec![0.0; felt.len()], 1.0);
     for (place, item) in order.iter().enumerate() {
         if place > 0 && felt[order[place - 1]] - felt[*item] >= apart {
