@@ -84,6 +84,17 @@ fn planned(
     (PartWorld::Felt(world), spread, slope, own, repetitions)
 }
 
+/// What is stated of how realizations, tastes and answers spread, or else `usual`.
+fn spread(stated: &PowerPlan, usual: Spread, defaults: &mut Defaults) -> Spread {
+    let sd = &stated.sd;
+    Spread {
+        realization: defaults.or("sd.realization", sd.realization, usual.realization),
+        interaction: defaults.or("sd.interaction", sd.interaction, usual.interaction),
+        residual: defaults.or("sd.residual", sd.residual, usual.residual),
+        ..NOTHING
+    }
+}
+
 /// The level of the family that all realizations have, or else their VAF.
 fn property(protocol: &Protocol, models: &[ModelId]) -> Option<(&'static str, Vec<f64>)> {
     let by = |of: &dyn Fn(&ModelId) -> Option<f64>| -> Option<Vec<f64>> {
@@ -102,13 +113,7 @@ fn of_ranking(
     let places = (0..own.models.len()).map(|at| at as f64);
     let (property, values) = property(protocol, &own.models)
         .unwrap_or_else(|| ("place in the protocol", places.collect()));
-    let sd = &stated.sd;
-    let spread = Spread {
-        realization: defaults.or("sd.realization", sd.realization, RANKED.realization),
-        interaction: defaults.or("sd.interaction", sd.interaction, RANKED.interaction),
-        residual: defaults.or("sd.residual", sd.residual, RANKED.residual),
-        ..NOTHING
-    };
+    let spread = spread(stated, RANKED, defaults);
     let slope = slope(stated, spread.realization)?;
     let slope = defaults.or("slope", slope, WORTH);
     let world = FeltWorld::Ranking {
@@ -132,13 +137,7 @@ fn of_similarity(
     if sd <= 0.0 || !(LEAST_MAPPED..=MOST_OBJECTS).contains(&x.len()) {
         return None;
     }
-    let sd = &stated.sd;
-    let spread = Spread {
-        realization: defaults.or("sd.realization", sd.realization, COMPARED.realization),
-        interaction: defaults.or("sd.interaction", sd.interaction, COMPARED.interaction),
-        residual: defaults.or("sd.residual", sd.residual, COMPARED.residual),
-        ..NOTHING
-    };
+    let spread = spread(stated, COMPARED, defaults);
     let slope = defaults.or("slope", stated.slope, POINTS);
     let place = |id: &ModelId| own.models.iter().position(|other| other == id).unwrap_or(0);
     let pairs = own.different.iter().map(|[a, b]| [place(a), place(b)]);
